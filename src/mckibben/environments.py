@@ -135,7 +135,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
                 control_time = max(0.02, chosen.sample_time)
             self._spreading = chosen if spread else None
         else:
-            _require(not spread, "spread", spread, "0 with a plant, whose band scatters")
+            _require(not spread, "spread", spread, "0 with a plant, which has its own scatter")
             _require(not load, "load", load, "0 with a plant, and held={'force': ...} to the plant")
             chosen = plant = _twin(plant)
             control_time = chosen.sample_time if control_time is None else control_time

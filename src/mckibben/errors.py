@@ -35,7 +35,7 @@ class MckibbenError(Exception):
     problem : str
         What is wrong, as a phrase without a final stop.
     remedy : str
-        What to do about it, as a phrase without a final stop. Parameters and operations stand in
+        What to do about it, as a phrase without a final stop. Parameters and operations are in
         backquotes, see `mckibben.errors`.
     file : path, optional
         The file it was found in.

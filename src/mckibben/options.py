@@ -26,7 +26,7 @@ class Option:
     help : str
         What it is, in a line.
     metavar : str
-        What stands for the value in a help text, such as ``HZ``.
+        Placeholder of the value in a help text, such as ``HZ``.
     flag : str
         The flag of the command line; default ``--`` and the name of the field.
     parse : callable, optional

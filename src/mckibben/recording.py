@@ -34,10 +34,10 @@ STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
 
 
 REST_LENGTH = 'the rest length (`rest_length=MM`, or meta["rest_length"] in Python)'
-"""How the length at which a displacement is 0 is stated."""
+"""Remedy that states the rest length."""
 
 PROVENANCE = ("file", "sha256")
-"""Entries of ``meta`` that say where a recording was read from; recordings are equal without them."""
+"""Entries of ``meta`` on the file of a recording; recordings are compared without them."""
 
 
 def standard_unit(channel: str) -> str | None:

@@ -16,10 +16,10 @@ from mckibben.arrays import Array
 from mckibben.signals.checking import generator
 
 RESAMPLES = 1000
-"""Of a bootstrap."""
+"""Number of resamples of a bootstrap."""
 
 UNCORRELATED = 0.05
-"""Autocorrelation up to which samples count as independent."""
+"""Autocorrelation below which samples count as independent."""
 
 MOST_TERMS = 40
 """Largest order of an autoregression of residuals."""

@@ -181,9 +181,9 @@ def compare(
 ) -> Leaderboard:
     """Fit models, choose by cross-validation, and test on data used for neither; all free-running.
 
-    Recordings in a folder with a ``protocol.json`` have their roles there; ``validation`` is what to
-    choose by, in place of cross-validation. An interrupted comparison returns what is finished; with
-    ``out``, the same call goes on from there.
+    Recordings in a folder with a ``protocol.json`` have the roles stated there; ``validation``
+    replaces cross-validation in the choice. An interrupted comparison returns the finished models;
+    with ``out``, the same call resumes it.
     """
     from mckibben.comparison.ranking import compare as rank
     from mckibben.report.results_folder import LEADERBOARD, write_leaderboard

@@ -135,8 +135,8 @@ class Drift:
                 same.append(group.name)
         if not changed:
             return f"{' and '.join(same)} unchanged since the day of the fit"
-        told = f"{', '.join(changed)} than on the day of the fit"
-        return f"{told}; {', '.join(same)} unchanged" if same else told
+        text = f"{', '.join(changed)} than on the day of the fit"
+        return f"{text}; {', '.join(same)} unchanged" if same else text
 
 
 def alarm_limit(time: float, n_groups: int, rate: float = FALSE_ALARMS) -> float:
@@ -248,7 +248,8 @@ class Adaptive(Block):
     time : float
         How long it takes to learn what the motion shows [s]; positive.
     noise : float
-        Standard deviation of what is measured [unit of the output]; errors below are not told apart.
+        Standard deviation of what is measured [unit of the output]; smaller errors are not
+        distinguished.
     memory : sequence of float, optional
         State to go on from, or what is learnt of it, as `resumed` keeps it; default is to start from
         the fit.
@@ -321,7 +322,7 @@ class Adaptive(Block):
         for name, found in wrong.items():
             if found:
                 raise ModelError(
-                    f"the {name} in the memory of {self.kind!r} cannot have come from running it",
+                    f"the {name} in the memory of {self.kind!r} cannot result from running it",
                     remedy="save the model afresh, or resume what was saved unchanged",
                 )
         for parameters in (theta, used):

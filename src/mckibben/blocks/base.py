@@ -73,8 +73,8 @@ class Cost:
 class Block(DrawsItself, Parametrised):
     """An immutable parameter set with dynamics.
 
-    Concrete blocks are frozen dataclasses, registered under `kind`. They know nothing of data or
-    fitting.
+    Concrete blocks are frozen dataclasses, registered under `kind`. They are independent of data
+    and fitting.
     """
 
     face: ClassVar[str] = "block"

@@ -252,7 +252,7 @@ class Series(Composition):
             driven = after.n_driven
             if len(before.outputs) != driven:
                 raise ModelError(
-                    f"{before.kind!r} gives {len(before.outputs)} output(s), "
+                    f"{before.kind!r} has {len(before.outputs)} output(s), "
                     f"{after.kind!r} after it takes {driven}",
                     remedy="connect blocks with matching channels",
                 )
@@ -284,9 +284,8 @@ class Series(Composition):
             at_rest = not part.rate_dependent or part.start in AT_REST
             if board.from_rest and number < len(self.parts) - 1 and not at_rest:
                 raise ModelError(
-                    f"{part.kind!r} starts from a memory of its own and depends on the "
-                    "rate, so parts behind it would start from another sample than in "
-                    "Python",
+                    f"{part.kind!r} has a saved start state and depends on the rate, so "
+                    "parts after it would start from another sample than in Python",
                     remedy="start it from 'first_sample'",
                 )
             driven = signals[: part.n_driven]

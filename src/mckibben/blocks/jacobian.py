@@ -47,7 +47,7 @@ def _laid_out(block: Block) -> Layout:
         if not each.c_kernels:
             raise ModelError(
                 f"{each.title!r} has no derivatives: it is not one kernel with a start kernel",
-                remedy="declare a start_kernel beside its kernel, or compose it of such blocks",
+                remedy="declare a start_kernel with its kernel, or compose it of such blocks",
             )
     return layout
 

@@ -30,13 +30,13 @@ def _computing(method: Callable[..., Any]) -> Callable[..., Any]:
     """Return a method whose arithmetic errors are raised as model errors."""
 
     @wraps(method)
-    def told(self: Any, *given: Any, **named: Any) -> Any:
+    def guarded(self: Any, *given: Any, **named: Any) -> Any:
         try:
             return method(self, *given, **named)
         except UNCOMPUTABLE as error:
             raise _beyond_sense(type(self), error) from error
 
-    return told
+    return guarded
 
 
 def _beyond_sense(cls: type, error: Exception) -> ModelError:

@@ -137,7 +137,7 @@ def allowed(n: int, rows: Array, path: Array, t: int, at_any_rate: bool) -> bool
 
 
 @kernel
-def kept_to(n: int, rows: Array, path: Array) -> bool:
+def clipped_to(n: int, rows: Array, path: Array) -> bool:
     """Clip a path to all limits, sample by sample; return whether it was feasible."""
     there = True
     for t in range(path.size // n - 1):
@@ -291,7 +291,7 @@ def plan_several(
     count, size_of = length * m, length * block
     hessian, system = scratch[:size_of], scratch[size_of : 3 * size_of]
     vectors = scratch[3 * size_of :]
-    wished, right = vectors[: length * n], vectors[length * n : 2 * length * n]
+    desired, right = vectors[: length * n], vectors[length * n : 2 * length * n]
     rest = vectors[2 * length * n :]
     step, others = rest[: (length + 1) * n], rest[(length + 1) * n :]
     duals, work = others[: 6 * count], others[6 * count :]
@@ -312,11 +312,11 @@ def plan_several(
                 own[i * n + j] = total / size
             own[i * n + i] += STAYS
         for i in range(n):
-            wished[t * n + i] = 0.0
+            desired[t * n + i] = 0.0
             for k in range(n_errors):
-                wished[t * n + i] += slope[k * n + i] * errors[t * n_errors + k] / size
+                desired[t * n + i] += slope[k * n + i] * errors[t * n_errors + k] / size
             for k in range(n):
-                wished[t * n + i] += own[i * n + k] * nominal[t * n + k]
+                desired[t * n + i] += own[i * n + k] * nominal[t * n + k]
     fill(p, nominal)
     for t in range(length):
         for i in range(m):
@@ -325,7 +325,7 @@ def plan_several(
             price[t * m + i] = ROOM
     for taken in range(MOST_STEPS):
         gap, amiss = 0.0, 0.0
-        fill(right, wished)
+        fill(right, desired)
         for t in range(length):
             curved = hessian[t * block : (t + 1) * block]
             applied(n, curved, p[t * n : (t + 1) * n], -1.0, right[t * n : (t + 1) * n])
@@ -417,9 +417,9 @@ def plan_one(
             x[place + 3], d[place + 3] = least + fall, over
             count += 4
         weight = slopes[t] * slopes[t] + staying
-        wished = weight * nominal[t] + slopes[t] * errors[t]
+        desired = weight * nominal[t] + slopes[t] * errors[t]
         for i in range(count):
-            d[i] += weight * x[i] - wished
+            d[i] += weight * x[i] - desired
     _, _ = turned(count, x, d, low, high, best, 0)
     last = path[0]
     for t in range(length):

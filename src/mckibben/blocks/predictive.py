@@ -35,7 +35,7 @@ from mckibben.blocks.parameters import same_as
 from mckibben.blocks.planning import (
     MOST_STEPS,
     allowed,
-    kept_to,
+    clipped_to,
     limit_rows,
     plan_one,
     plan_scratch,
@@ -234,7 +234,7 @@ def step_of(
         model: Array,
         nudges: Array,
         memory: Array,
-        wished: Array,
+        desired: Array,
         path: Array,
         given: Array,
         tables: Array,
@@ -245,7 +245,7 @@ def step_of(
 
         ``tables`` become [slopes, errors]; they are followed by three vectors to compute in.
         """
-        size, length, count = memory.size, path.size // n - 1, wished.size
+        size, length, count = memory.size, path.size // n - 1, desired.size
         m = count // length
         trial, kept, after = states[:size], states[size : 2 * size], states[2 * size : 3 * size]
         slopes, errors = tables[: n * count], tables[n * count : (n + 1) * count]
@@ -271,7 +271,7 @@ def step_of(
                     slopes[(t * m + i) * n + k] = (change[i] - answer[i]) / (way[k] * nudges[k])
                 given[k] = path[(t + 1) * n + k]
             for i in range(m):
-                errors[t * m + i] = wished[t * m + i] - answer[i]
+                errors[t * m + i] = desired[t * m + i] - answer[i]
             fill(kept, after)
 
     def predictive_step(
@@ -285,7 +285,7 @@ def step_of(
         n_limits = int(c[2]) * (n + 2)
         rows, own = numbers[:n_limits], numbers[n_limits:]
         model, undo = own[: int(c[5])], own[int(c[5]) : int(c[5]) + int(c[6])]
-        memory, wished, last = state[:size], state[size : size + count], state[size + count :]
+        memory, desired, last = state[:size], state[size : size + count], state[size + count :]
         states, undoing = scratch[: 3 * size], scratch[3 * size : 3 * size + n_undoing]
         more = scratch[3 * size + n_undoing :]
         asked, given = more[: inputs.size], more[inputs.size : 2 * inputs.size - m + n]
@@ -295,13 +295,13 @@ def step_of(
         room = rest[2 * (n + planned) + (n + 1) * count + n + 2 * m :]
         first = last[n] == 0.0
         for i in range(count - m):
-            wished[i] = inputs[i % m] if first else wished[i + m]
-        fill(wished[count - m :], inputs[:m])
+            desired[i] = inputs[i % m] if first else desired[i + m]
+        fill(desired[count - m :], inputs[:m])
         resume(model, memory, undoing)
         fill(asked, inputs)
         fill(given[n:], inputs[m:])
         for t in range(length):
-            fill(asked[:m], wished[t * m : (t + 1) * m])
+            fill(asked[:m], desired[t * m : (t + 1) * m])
             undoes(undo, undoing, room, asked, path[(t + 1) * n : (t + 2) * n])
         if first:  # whatever the rate
             fill(nominal[:n], lowest)
@@ -311,12 +311,12 @@ def step_of(
             last[n] = 1.0
         fill(path[:n], last[:n])
         fill(nominal, path)
-        if not kept_to(n, rows, path):
+        if not clipped_to(n, rows, path):
             slopes, errors = tables[: n * count], tables[n * count : (n + 1) * count]
             for _ in range(PASSES):
-                linearise(n, model, nudges, memory, wished, nominal, given, tables, states, room)
+                linearise(n, model, nudges, memory, desired, nominal, given, tables, states, room)
                 _ = planner(n, rows, slopes, nominal[n:], errors, path, room)
-                _ = kept_to(n, rows, path)
+                _ = clipped_to(n, rows, path)
                 fill(nominal, path)
             last[n + 1] += 1.0
         fill(last[:n], path[n : 2 * n])

@@ -130,7 +130,7 @@ def made(name: str, hint: Any, default: Any) -> click.Parameter:
     kind, *extras = get_args(hint) if get_origin(hint) is Annotated else (hint,)
     about = next((one for one in extras if isinstance(one, Option | Argument)), Option(""))
     required = default is Parameter.empty or default is MISSING
-    kind, several, width = _taken_apart(kind)
+    kind, several, width = _unwrapped(kind)
     if isinstance(about, Argument):
         return click.Argument(
             [name],
@@ -166,7 +166,7 @@ def _spellings(name: str, flag: str) -> list[str]:
     return [flag or f"--{name.replace('_', '-')}"]
 
 
-def _taken_apart(kind: Any) -> tuple[Any, bool, int]:
+def _unwrapped(kind: Any) -> tuple[Any, bool, int]:
     """Return the type of one value, whether it may be repeated, and its number of words."""
     if get_origin(kind) in (Union, types.UnionType):
         kind = next(one for one in get_args(kind) if one not in (type(None), Any))

@@ -72,25 +72,25 @@ def stoppable(folder: Path | None) -> Iterator[None]:
 @contextmanager
 def _watched() -> Iterator[None]:
     """Handle signals in a thread, as the main thread cannot while it runs compiled code."""
-    heard, told = os.pipe()
-    os.set_blocking(told, False)
+    read_end, write_end = os.pipe()
+    os.set_blocking(write_end, False)
 
     def watch() -> None:
-        if not os.read(heard, 1):
+        if not os.read(read_end, 1):
             return  # all is done
         with suppress(OSError):
             os.write(2, b"\nStopping ...\n")
-        ready, _, _ = select.select([heard], [], [], PATIENCE)
-        if not ready or os.read(heard, 1):
+        ready, _, _ = select.select([read_end], [], [], PATIENCE)
+        if not ready or os.read(read_end, 1):
             leave(INTERRUPTED)  # a second signal, or it takes too long
 
     threading.Thread(target=watch, daemon=True).start()
-    before = signal.set_wakeup_fd(told, warn_on_full_buffer=False)
+    before = signal.set_wakeup_fd(write_end, warn_on_full_buffer=False)
     try:
         yield
     finally:
         signal.set_wakeup_fd(before)
-        os.close(told)
+        os.close(write_end)
 
 
 def _quiet(printed: Any) -> Any:

@@ -142,15 +142,15 @@ def channels_of(
     given = _named(recordings, inputs, sides[0])
     wanted = _named(recordings, outputs, sides[1])
     channels = loads_told(recordings, Channels(given, wanted, (load,) if load else None))
-    told = channels.scheduling or ()
-    named = (*channels.inputs, *channels.outputs, *told)
+    further = channels.scheduling or ()
+    named = (*channels.inputs, *channels.outputs, *further)
     if twice := [name for name in named if named.count(name) > 1]:
         raise DataError(
             "the channel is named twice among inputs, outputs and load",
             channel=twice[0],
             remedy="an output cannot also be an input: name each channel once",
         )
-    for name in told:
+    for name in further:
         for recording in recordings:
             if name not in recording:
                 raise DataError(
@@ -176,7 +176,7 @@ def recognised(recordings: Sequence[Recording], channels: Sequence[str]) -> Side
 
 
 def loads_told(recordings: Sequence[Recording], channels: Channels) -> Channels:
-    """Return channels in which forces beside other inputs schedule, as loads are not commanded."""
+    """Return channels with forces as scheduling loads, if there are other inputs."""
     loads = loads_among(recordings, channels.inputs)
     if channels.scheduling is not None or not loads:
         return channels

@@ -156,12 +156,12 @@ def processes_for(seconds: float) -> int:
 
 
 def results(
-    data: Data, tasks: Sequence[Task], n: int, told: Callable[..., None] | None = None
+    data: Data, tasks: Sequence[Task], n: int, report: Callable[..., None] | None = None
 ) -> Iterator[Outcome]:
     """Yield the results of tasks as they finish; see `Workers.results`."""
     if backends.chosen():
         return backends.outcomes(fit, data, tasks)
-    return workers.outcomes(fit, data, tasks, n, told)
+    return workers.outcomes(fit, data, tasks, n, report)
 
 
 def fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:

@@ -74,7 +74,7 @@ def identify(
     jobs : int, optional
         Processes; default as many as there are cores, or none for little work.
     progress : bool or callable, optional
-        Whether to show a bar; or who is told the share done, and words.
+        Whether to show a bar; or a callback for the share done, and a text.
     **settings
         Further settings of the estimator.
 

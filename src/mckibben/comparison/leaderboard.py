@@ -236,7 +236,7 @@ class Leaderboard(DrawsItself):
     shared : tuple of str
         Where recordings to fit to and to test on are the same data, which the user insisted on.
     loads : tuple of str
-        Channels given to models beside the inputs, and never commanded.
+        Further input channels of models, which are never commanded.
     ignored : tuple of str
         Loads that vary in the recordings and that no model is given.
     outside : mapping of str to float

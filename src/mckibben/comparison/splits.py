@@ -188,7 +188,7 @@ def _tail(recordings: Sequence[Recording], channel: str, travel: float, rest: st
         raise DataError(
             f"{len(recordings[-1])} samples are too few to hold out a part for a test",
             file=recordings[-1].source,
-            remedy="give a longer recording, or a test recording of its own with `test`",
+            remedy="give a longer recording, or a separate test recording with `test`",
         )
     if whole:
         given = given_split(train, whole)

@@ -112,35 +112,34 @@ def track(
     Parameters
     ----------
     controller : Block or Controller
-        A block is driven as `BlockController` drives it.
+        A block is wrapped in a `BlockController`.
     plant : Plant
         A rig; it is run at the reference's sample time, which is the control rate.
     reference : Recording
-        Channels of motion to follow [mm or rad], or without any the force [N], and of what schedules the
-        controller and is held on the plant, such as ``pressure_extensor`` or the length in a test stand,
-        as they should be. What a block drives, as pressures recorded with it, is passed over. With the
-        rest length of the plant, or of the reference, a displacement, contraction or length is any of
-        these.
+        Desired motions [mm or rad], or without any the desired force [N], and scheduling or held
+        channels, such as ``pressure_extensor`` or the length in a test stand. Channels driven by
+        the block, such as recorded pressures, are ignored. With the rest length of the plant, or of
+        the reference, a displacement, contraction or length is any of these.
     approach : float
         Time to go from rest to the first reference [s], not scored.
     settle : float
         Time after that which is not scored either [s].
     pressure_loop : bool
-        Whether measured pressures are fed back inside, as regulators with a sensor do.
+        Whether an inner loop corrects pressures by measured ones, as regulators with a sensor do.
     noise : float
-        Standard deviation added to what is followed, as measured [mm or N].
+        Standard deviation of the noise added to the followed measurements [mm or N].
     delay : int
-        Control steps by which measurements come late.
+        Delay of measurements [control steps].
     slew : float, optional
         Fastest change of a pressure [bar/s].
     preview : float, optional
-        How far ahead compensators are given the reference [s], in whole steps, and never less than the
-        next step's; the end is held. Default the dead time of what they undo. Those that plan get it
-        the samples of their horizon earlier still.
+        Preview of the reference for compensators [s], in whole steps, at least one; its end is
+        extended. Default: the dead time of the inverted model. Predictive compensators receive
+        their horizon in addition.
     seed : int
-        Of all noise.
+        Seed of all noise.
     progress : bool or callable, optional
-        Whether to show a bar; or who is told the share of the time that has passed.
+        Whether to show a bar; or a callback for the share of the time passed.
 
     Returns
     -------
@@ -149,8 +148,8 @@ def track(
     Raises
     ------
     DataError
-        If the reference has no time, or no channel that the plant measures; or if the controller wants
-        or gives another channel than the loop, or in another unit.
+        If the reference has no time, or no channel that the plant measures; or if channels or units
+        of controller and loop do not match.
     ModelError
         On settings out of range.
     """

@@ -15,7 +15,7 @@ from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
-APART = 0.25
+LARGEST_DIFFERENCE = 0.25
 """Share of a model's stroke by which the ends of the plant's slow rise may differ before it counts
 as another muscle: specimens, temperatures and loads differ by less, muscle sizes by more.
 """
@@ -117,7 +117,7 @@ def _strokes(model: Block, plant: Plant, rise: Recording) -> list[str]:
         if channel.name not in rise:
             continue
         ours, theirs = rise[channel.name][within][[0, -1]], expected[channel.name][[0, -1]]
-        if np.abs(ours - theirs).max() > APART * abs(theirs[1] - theirs[0]):
+        if np.abs(ours - theirs).max() > LARGEST_DIFFERENCE * abs(theirs[1] - theirs[0]):
             notes.append(
                 f"in a slow rise ({ends}), {channel.name} of {plant.name} goes from {_span(*ours)} "
                 f"{channel.unit}, and of the compensator's model from {_span(*theirs)}. {REMEDY}"

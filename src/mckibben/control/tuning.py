@@ -67,7 +67,7 @@ def tune_pid(
     seed : int
         Of the noise.
     progress : bool or callable, optional
-        Whether to show a bar; or who is told the share of the muscles done, and words.
+        Whether to show a bar; or a callback for the share of muscles done, and a text.
 
     Raises
     ------
@@ -184,7 +184,7 @@ def _simc(
     final = float(_settled(response).mean())
     if not _moves(response):
         raise ModelError(
-            f"{name} moves nothing",
+            f"{name} has no effect",
             remedy=f"check the plant, or its middle {name.partition('_')[0]}",
         )
     way = np.sign(final)  # a displacement that counts stretching falls as pressure rises

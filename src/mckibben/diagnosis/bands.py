@@ -151,7 +151,7 @@ def calibrate(
     fitted : sequence of Recording, optional
         Those that it was fitted to, to make sure that none is among the recordings.
     progress : bool or callable, optional
-        Whether to show a bar; or who is told the share done, and words.
+        Whether to show a bar; or a callback for the share done, and a text.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def calibration(
     model = inside(model)
     if commands(model):
         raise ModelError(
-            f"{model.title!r} gives inputs, and bands are of outputs",
+            f"{model.title!r} computes inputs, but bands are of outputs",
             remedy="calibrate the model that was inverted",
         )
     if not recordings:

@@ -89,10 +89,10 @@ class Characterization(DrawsItself):
     loop_width, mid_width : float or None
         Distance of the largest cycles' branches at mid input: e_w [%] and [output unit].
     asymmetry, width_centroid : float or None
-        How far the loop is from its own image, turned by half a turn [%], 0 for classical
+        Distance of the loop from its image rotated by 180° [%], 0 for classical
         Prandtl-Ishlinskii models; where it is wide, from -1 (low input) to 1 (high input).
     loop_area, loop_area_share : float or None
-        Area that it encloses [input unit x output unit], and that over the rectangle round it [%].
+        Enclosed area [input unit x output unit], and its ratio to the bounding rectangle [%].
     dead_zone_upper, dead_zone_lower : float or None
         Change of the input after upper and lower reversals before the output moves [input unit].
     gain, onset, saturation : float or None
@@ -103,26 +103,25 @@ class Characterization(DrawsItself):
         [output unit], and the probability of such gaps without a loop. From four branches on drift
         cancels; of fewer there is no probability.
     creep, creep_time, drift : float or None
-        Change of the output in a hold of all inputs [output unit], over what time [s]; and from one
-        cycle to the next between the same extremes.
+        Change of the output in a hold of all inputs [output unit], and its time [s]; change from
+        one cycle to the next between the same extremes.
     rate_dependence, speeds
-        Growth of e_w at twice the speed [%], and the mean speeds between which it is found [input
-        unit/s].
+        Increase of e_w at twice the speed [%], and the mean speeds compared [input unit/s].
     closure_error : float or None
         Return-point memory: output after a minor loop against that before it [%].
     position_share, direction_share, loop_share : float
         Share of the output's variance that functions of the input alone, of its velocity alone, and of
         the input and its direction together explain.
     n_stretches : int or None
-        Stretches in which other inputs stand still; None where nothing else moves.
+        Segments in which other inputs are constant; None where nothing else moves.
     falls : bool
         Whether the output falls as the input grows.
     effects : tuple of Effect
-        What other inputs do; ``adjusted`` where it is taken away, as they stand still nowhere:
-        gain and branch gap alone are measured then.
+        Effects of other inputs; ``adjusted`` if they are never constant, and their effect was
+        removed: then only gain and branch gap are measured.
     levels : tuple of Level
-        Those at which other inputs stand still. What is found of the loop is that of the one at which
-        the output moves most.
+        Levels at which other inputs are constant. The loop is that of the level of largest output
+        motion.
     """
 
     face: ClassVar[str] = "characterization"
@@ -213,13 +212,13 @@ def characterize(
 ) -> Characterization:
     """Measure width and shape of the loop, memory, creep and rate dependence of a muscle.
 
-    Sensor noise is averaged away first, over samples within which the input moves by 1 % of its range.
+    Sensor noise is averaged first, over samples within which the input moves by 1 % of its range.
     Ranges are those of all recordings together.
 
-    Where other inputs, such as pressures of other muscles, loads or lengths, stand still, every level
-    of theirs has a loop of its own, and the one at which the output moves most is reported. Where they
-    never do while the input moves, their effect by straight lines is taken away, and gain and mean gap
-    of the branches alone are measured.
+    Other inputs, such as pressures of other muscles, loads or lengths, have a separate loop at
+    every level at which they are constant; the one of largest output motion is reported. If they
+    are never constant while the input moves, their linear effect is removed, and only gain and mean
+    gap of the branches are measured.
 
     Parameters
     ----------

@@ -55,15 +55,15 @@ class Finding:
     kind, channel : str
         As `mckibben.diagnosis.suspects.Group` has them.
     p_value : float
-        Probability of noise that looks so, beside what was found before.
+        p-value of noise alone, given the findings before.
     share : float
-        Of the residual's variance that it explains, 0 to 1, beside what was found before.
+        Share of the residual's variance explained, 0 to 1, given the findings before.
     size : float
         The same as a root mean square, unit of the output.
     coefficient : float or None
         The offset [unit of the output], or how much later measured motion is than modelled [samples].
     or_causes : tuple of (str, str)
-        What it may be as well: beside them it is not certain.
+        Alternatives from which it is not distinguished.
     """
 
     kind: str
@@ -146,7 +146,7 @@ class Validation(DrawsItself):
         Names of what it was checked on.
     outputs : tuple of OutputCheck
     untested : tuple of str
-        Names of recordings too short beside the others to be tested.
+        Names of recordings too short to be tested.
     runs : tuple of Run
         The recordings, and what the model makes of them; not in ``to_dict``.
     description : ModelDescription or None

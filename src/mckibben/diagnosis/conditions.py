@@ -54,13 +54,13 @@ def others_of(
     """
     quantity = given.rstrip("0123456789")
     seen = [name for name in recordings[0].channels if all(name in one for one in recordings)]
-    told = [
+    candidates = [
         *asked,
         *(n for n in seen if given != quantity and n.rstrip("0123456789") == quantity),
         *(n for n in schedules(recordings) if n in seen),
         *(n for n in seen if all(np.ptp(one[n]) == 0 for one in recordings)),
     ]
-    named = [n for n in dict.fromkeys(told) if n not in (given, wanted)]
+    named = [n for n in dict.fromkeys(candidates) if n not in (given, wanted)]
     return [n for n in named if moves([one[n] for one in recordings])]
 
 

@@ -171,7 +171,7 @@ def excitation(
     for recording in every:
         if len(recording) < FEWEST_SAMPLES:
             raise DataError(
-                f"{len(recording)} samples identify nothing",
+                f"{len(recording)} samples are too few for any model",
                 file=recording.source,
                 remedy=f"give recordings of {FEWEST_SAMPLES} samples or more",
             )
@@ -182,8 +182,8 @@ def excitation(
                 channel=absent[0],
                 remedy="name them with `input` and `output`, or give recordings with the same channels",
             )
-    told = dict.fromkeys((*(found.scheduling or ()), *schedules(every, names)))
-    loads = tuple(name for name in told if all(name in recording for recording in every))
+    further = dict.fromkeys((*(found.scheduling or ()), *schedules(every, names)))
+    loads = tuple(name for name in further if all(name in recording for recording in every))
     kept = tuple(without_copies(every, driven, found.outputs))
     return Excitation(kept, tuple(tests), driven, loads, found.outputs)
 

@@ -86,7 +86,7 @@ def caution(model: str) -> str | None:
     """Return why a model is reliable only near its training data, or None.
 
     A model that interpolates well may lead every ranking on motions like those of its training, and be
-    far off elsewhere: that is told beside its errors.
+    far off elsewhere: it is shown with its errors.
 
     >>> caution("gpi") is None, caution("narx")
     (True, 'a polynomial of past values leaves all bounds beyond them')

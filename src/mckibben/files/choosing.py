@@ -184,7 +184,7 @@ def _of_one_length(source: Source, fixed: Mapping[str, Column]) -> tuple[Source,
     asked = {channel: column.size for channel, column in fixed.items()}
     if len(set(asked.values())) > 1:
         sizes = ", ".join(f"{channel} {size}" for channel, size in asked.items())
-        problem = f"the columns asked for have unlike numbers of samples: {sizes}"
+        problem = f"the requested columns have different numbers of samples: {sizes}"
         remedy = "name columns of one length with `columns[CHANNEL]=COLUMN`"
         raise source.error(problem, remedy, next(iter(asked)))
     found = Counter(column.size for column in columns if column.size > 1)

@@ -62,7 +62,7 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
     if any(not np.array_equal(times, grid) for times in needed.values()):
         rates = ", ".join(f"{name} {1 / step:.4g}" for name, step in list(steps.items())[:10])
         source.warn(
-            f"channels have times of their own (samples a second: {rates}); they were put on the "
+            f"channels have separate times (samples a second: {rates}); they were put on the "
             f"{whose}, by interpolation"
         )
     columns: dict[str, Column] = {"time": Column("time", grid, "s")}

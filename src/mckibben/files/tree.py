@@ -268,7 +268,7 @@ def _timed(
     if all(np.array_equal(seconds[first], seconds[time], equal_nan=True) for time in others):
         return {place: each for place, each in columns.items() if place not in others}
     rest = [place for place in columns if place not in {first, *others, *clocks}]
-    unread |= {dot.join(at): "it has no times, and others have their own" for at in sorted(rest)}
+    unread |= {dot.join(at): "it has no times, but others have" for at in sorted(rest)}
     return {place: replace(columns[place], times=seconds[time]) for place, time in clocks.items()}
 
 

@@ -85,7 +85,7 @@ class Muscle:
     balance : Balance
         As fitted.
     errors : array
-        Standard errors of its traits (`mckibben.muscles.traits`); NaN of those not told.
+        Standard errors of its traits (`mckibben.muscles.traits`); NaN of undetermined ones.
     """
 
     name: str

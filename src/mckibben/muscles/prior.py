@@ -35,7 +35,7 @@ FEWEST = 3
 MIDDLE = 0.8413
 """Quantile of a normal distribution at one standard deviation."""
 
-UNTOLD = 1.0
+DEFAULT_SPREAD = 1.0
 """Spread assumed with fewer muscles."""
 
 
@@ -135,7 +135,7 @@ def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = No
         raise DataError("there are no muscles to derive a prior from", remedy="leave fewer out")
     muscles = sorted(muscles, key=lambda muscle: muscle.name)
     table = np.array([muscle.traits for muscle in muscles])
-    told = np.isfinite(table)
+    known = np.isfinite(table)
     shapes = np.array([muscle.sheet.shape for muscle in muscles])
     here = sheet.shape if like is None else like.sheet.shape
     mean = np.full(COUNT, np.nan)
@@ -144,12 +144,12 @@ def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = No
         level, shape = _spreads(table[:, place])
         spread = float(np.hypot(level, shape))
         for number in range(place.start, place.stop):
-            which = told[:, number]
+            which = known[:, number]
             if which.any():
                 middle = float(table[which, number].mean())
                 share, _ = _shares(shapes[which], here, spread)
                 mean[number] = middle + share @ (table[which, number] - middle)
-        left = _shares(shapes[told[:, place].any(axis=1)], here, spread)[1]
+        left = _shares(shapes[known[:, place].any(axis=1)], here, spread)[1]
         of_levels[name] = float(np.hypot(left * level, ALIKE))
         of_shapes[name] = float(np.hypot(left * shape, ALIKE))
     return Prior(sheet, mean, of_levels, of_shapes, ZERO * sheet.rest_length_mm)
@@ -175,16 +175,16 @@ def _spreads(table: Array) -> tuple[float, float]:
 
     A new one's is Student's; the Gaussian with the same middle two thirds is taken.
     """
-    told = np.isfinite(table)
-    muscles = told.any(axis=1)
+    known = np.isfinite(table)
+    muscles = known.any(axis=1)
     n = int(muscles.sum())
     if n < FEWEST:
-        return UNTOLD, UNTOLD
-    table, told = table[muscles], told[muscles]
-    away = np.where(told, table, 0.0)
-    away = np.where(told, away - away.sum(axis=0) / np.maximum(told.sum(axis=0), 1), 0.0)
-    level = away.sum(axis=1) / told.sum(axis=1)
-    shape = np.where(told, away - level[:, np.newaxis], 0.0)
+        return DEFAULT_SPREAD, DEFAULT_SPREAD
+    table, known = table[muscles], known[muscles]
+    away = np.where(known, table, 0.0)
+    away = np.where(known, away - away.sum(axis=0) / np.maximum(known.sum(axis=0), 1), 0.0)
+    level = away.sum(axis=1) / known.sum(axis=1)
+    shape = np.where(known, away - level[:, np.newaxis], 0.0)
     free = n - 1
     new = (1.0 + 1.0 / n) * float(stdtrit(free, MIDDLE)) ** 2
     of_level = float(np.sqrt(new * (level - level.mean()) @ (level - level.mean()) / free))

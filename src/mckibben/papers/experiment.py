@@ -408,7 +408,7 @@ def reproduce(
         Whether to forget what was kept when all is done; else the caller does, once it has written
         what is returned, by ``Checkpoints(folder).clear()``.
     progress : bool or callable, optional
-        Whether to show a bar; or who is told the share of the work done, and what is next.
+        Whether to show a bar; or a callback for the share done, and the next step.
 
     Raises
     ------

@@ -114,7 +114,7 @@ def narrowed(limits: Limits, asked: Mapping[str, Iterable[float | None]]) -> Lim
             rate = own.rate if own.span > 0 or high == low else (high - low) / CROSSING
         if not 0 < rate < math.inf:
             raise DataError(
-                f"nothing moves at {rate:g} {unit}/s",
+                f"there is no motion at {rate:g} {unit}/s",
                 channel=name,
                 remedy=f"give a positive rate, for instance {name}={low:g}:{high:g}:{own.rate:.3g}",
             )

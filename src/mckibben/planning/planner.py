@@ -53,16 +53,16 @@ from mckibben.statistics import Autoregression
 from mckibben.system.threads import one_blas_thread
 
 MOST_MINUTES = 60.0
-"""Longest plan: longer ones are better made after the first has been recorded."""
+"""Longest plan [min]; a longer one is better made in two."""
 
 MOST_VALUES = 2e7
 """Sensitivities that are computed at once, of all samples to all parameters."""
 
 NOISE = 0.003
-"""Noise of an output over its range, where nothing is recorded."""
+"""Assumed noise of an output, relative to its range, without recordings."""
 
 LOADED = 0.3
-"""Share of a muscle's largest force that it is loaded with at most, where no load is known."""
+"""Load of a muscle, as a share of its largest force, if no load is known."""
 
 USUAL = 0.02
 """Sample time of a plan without recordings [s]."""
@@ -143,8 +143,8 @@ def plan(
     muscle : str or path, optional
         A muscle of the library, or a data sheet (.toml), in place of recordings.
     model : str or Block, optional
-        Whose standard errors are told, to be fitted or fitted already; default ``balance`` where it
-        applies, or ``multistate`` where force is measured.
+        Model whose standard errors are planned, to be fitted or fitted already; default ``balance``
+        where it applies, or ``multistate`` where force is measured.
     minutes : float
         How long to record.
     limits : mapping of str to sequence of float, optional

@@ -17,8 +17,8 @@ Given = Mapping[str, Any]
 FORGOTTEN = 1e-6
 """Share of a gap between branches below which none is left: the rest is rounding."""
 
-RAN_AWAY = 10.0
-"""Error over the output's standard deviation from which a model is said to have run away."""
+DIVERGED = 10.0
+"""Error, relative to the output's standard deviation, above which a model counts as diverged."""
 
 ROUNDING = 1e-9
 """Error over the same below which there is none."""
@@ -70,11 +70,11 @@ class Column:
     def flag(self, row: Given) -> str:
         """Return a warning about a row's value; usually none."""
         value = self.value(row)
-        if self.key == "r2" and value is not None and value < 100 * (1 - RAN_AWAY**2):
+        if self.key == "r2" and value is not None and value < 100 * (1 - DIVERGED**2):
             return "diverged"
         if self.key not in ("chosen", "test", "train", "worst") or value is None:
             return ""
-        return "diverged" if value > RAN_AWAY * _deviation(row) else ""
+        return "diverged" if value > DIVERGED * _deviation(row) else ""
 
     def sorted_by(self, row: Given) -> float | str | None:
         """Return the sort key of a value: the midpoint of an interval."""

@@ -26,7 +26,7 @@ JUMP = 0.05
 loop at every step."""
 
 N_COLOURS = 6
-"""Colours that can be told apart; as many models or recordings share a panel at most."""
+"""Number of distinguishable colours, the most models or recordings in a panel."""
 
 N_AGES = 5
 """Steps of the colour scale from early to late."""

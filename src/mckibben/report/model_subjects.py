@@ -54,7 +54,9 @@ def leaderboard(board: Leaderboard) -> Drawing:
     """
     ranked = [row for row in board.rows if row.train is not None and row.test is not None]
     if not ranked:
-        raise ModelError("no model worked, so there is nothing to rank", remedy="read the reasons")
+        raise ModelError(
+            "no model could be fitted, so there is no ranking", remedy="read the reasons"
+        )
     place = np.arange(len(ranked), dtype=float)
     tested = np.array([row.test.rmse for row in ranked if row.test is not None])
     fitted = np.array([row.train.rmse for row in ranked if row.train is not None])

@@ -37,13 +37,14 @@ if TYPE_CHECKING:
     from mckibben.studying.study import Study
 
 N_VALUES = 180_000
-"""Numbers in all plots together, so that the file stays under 6 MB beside plotly.js."""
+"""Largest number of values in all plots together, which limits the file to 6 MB plus plotly.js."""
 
 FEWEST_POINTS = 400
 """Points left to a curve at least, however many curves there are."""
 
 COLUMNS = ("chosen", "test", "interval", "rank", "gap", "parameters", "inverse", "step")
-"""Columns of the leaderboard on the page, beside those of each output; the files have all."""
+"""Columns of the leaderboard on the page, in addition to those of each output; the files have all.
+"""
 
 MOST_CHECKED = 3
 """Outputs whose residuals have figures of their own."""

@@ -77,7 +77,7 @@ _WIDTHS = {"line": 0.9, "fine": 0.4, "broad": 2.6, "beads": 0.5}
 """Of lines [pt], by style."""
 
 _LEGEND = 45
-"""Letters of three names that stand side by side above a panel at most."""
+"""Largest number of letters of three names in one line of a legend."""
 
 _LEGEND_LINE = 0.14
 """Height that a figure gains by every line of a legend beyond two [in]."""

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from mckibben.studying.study import Study
 
 STARTS_MATTER = 0.05
-"""Relative difference of the errors from rest and from fitted starts from which both are given."""
+"""Relative difference of the errors from rest and from fitted starts above which both are shown."""
 
 BOARD = ("chosen", "test", "interval", "rank", "gap")
 """Columns of a leaderboard for a terminal of 80; the files have the rest."""
@@ -49,7 +49,7 @@ MOST = 12
 """Parameters of a plan that are listed."""
 
 UNFOLDED = 30
-"""Parameters that a page shows without being asked for."""
+"""Number of parameters that a page shows unfolded."""
 
 # --- Recordings -------------------------------------------------------------------------------------
 
@@ -340,7 +340,7 @@ def leaderboard(board: Leaderboard, keys: Sequence[str] = BOARD) -> list[Item]:
     return items
 
 
-def study_begun(found: Study) -> list[Item]:
+def study_started(found: Study) -> list[Item]:
     """Return the characterization of the muscle and a loop, before any model is fitted."""
     known, reviewed = found.characterization, found.review
     return [

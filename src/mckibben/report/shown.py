@@ -47,7 +47,7 @@ class Shown:
     role: str
     test_from: int | None = None
     several: bool = False
-    """Whether the recording has other outputs, which are shown apart."""
+    """Whether the recording has other outputs, which are shown separately."""
 
     @property
     def name(self) -> str:

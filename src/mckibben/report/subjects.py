@@ -31,7 +31,7 @@ from mckibben.report.drawing import (
 )
 
 HELD_OUT = "held out to test"
-"""What stands over the part of a recording that no model was fitted to."""
+"""Label of the part of a recording that no model was fitted to."""
 
 SMALL = 500
 """Points of a small picture."""

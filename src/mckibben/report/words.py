@@ -38,7 +38,7 @@ CHOICES = {
         "the last part of the training data, left out of a fit for it",
     ),
     "given": ("validation RMSE", "runs given for it, to which nothing is fitted"),
-    "fit": ("fit RMSE", "the error on the data fitted, for want of a validation"),
+    "fit": ("fit RMSE", "the error on the fitted data, as there is no validation"),
 }
 """What a model may be chosen by: the heading of its figure, and in words. The test is not among them."""
 
@@ -89,7 +89,7 @@ def not_recommended(
     own, mean = (f"{numeral(error, 3)} {unit}".strip() for error in errors)
     on = "the test data" if on_test else "what was left out to validate"
     return (
-        f"No model is recommended: on {on}, {row['model']} is off by {own} RMSE, and the mean of the "
+        f"No model is recommended: on {on}, {row['model']} has an RMSE of {own}, and the mean of the "
         f"training output by {mean}."
     )
 

@@ -132,7 +132,7 @@ def _saturates(rig: Rig, inputs: Recording, seed: int) -> None:
     _demand(
         rig,
         dict(recording.meta.get("saturated", {})) == dict.fromkeys(rig.inputs, len(inputs)),
-        "a recording says how many commands were limited",
+        "a recording states how many commands were limited",
     )
     _demand(
         rig,

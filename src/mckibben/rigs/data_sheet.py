@@ -41,7 +41,7 @@ LARGEST = 1e6
 """Of every number of a data sheet."""
 
 PERIOD = 20.0
-"""Of the triangle whose loop has the width asked for [s]."""
+"""Period of the triangle for the desired loop width [s]."""
 
 
 def rig_from_data_sheet(

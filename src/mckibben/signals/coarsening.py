@@ -13,10 +13,10 @@ from mckibben.recording import Recording
 from mckibben.signals.reversals import reversals
 
 FEWEST = 10
-"""Samples that a recording keeps; shorter ones are left out."""
+"""Smallest number of samples of a thinned recording; shorter ones are left out."""
 
 MOST = 100_000
-"""Samples to fit to, and to test on, of recordings that are longer."""
+"""Largest number of samples to fit to, and to test on."""
 
 HUGE = 1_000_000
 """Samples above which fewer are taken, of stretches: tens of models are then done in minutes."""
@@ -24,7 +24,7 @@ HUGE = 1_000_000
 MOST_OF_HUGE = 40_000
 
 PER_SWING = 20
-"""Samples that a swing of the input keeps, the median one, before stretches are cut out instead."""
+"""Smallest number of samples per swing of the input, before segments are cut out instead."""
 
 STRETCHES = 4
 """Taken of each recording, spread evenly."""
@@ -140,7 +140,7 @@ def made_manageable(
         lost += sum(_lost(recording[channel], factor) for recording in long)
         left_out = [r.name for r in recordings if len(r) < FEWEST * factor]
         if left_out:
-            notes.append(f"Too short beside the others, so left out: {', '.join(left_out)}.")
+            notes.append(f"Left out as too short: {', '.join(left_out)}.")
         if recordings and not long:
             raise DataError(
                 f"these recordings have {max(map(len, recordings))} samples at most, of which one in "

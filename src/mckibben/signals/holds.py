@@ -10,7 +10,7 @@ from mckibben.arrays import Array, true_runs
 from mckibben.signals.reversals import NOISE_SHARE, noise_level, swing_threshold
 
 STILL = 0.01
-"""Share of its range within which a signal stands still, unless noise or resolution is wider."""
+"""Share of its range within which a signal is constant, unless noise or resolution is wider."""
 
 CLEAR = 20.0
 """A step this many times the noise shows movement."""

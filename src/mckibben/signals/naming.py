@@ -48,7 +48,7 @@ def build(name: str, time: ArrayLike, **settings: Any) -> Array:
     time : array_like, shape (n,)
         Time [s].
     **settings
-        What it is told; numbers may be words, and sequences words joined by slashes: ``"1/2/3"``.
+        Its settings; numbers may be texts, and sequences words joined by slashes: ``"1/2/3"``.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from mckibben.system.compiling import deferred
 Indices = NDArray[np.int64]
 
 NOISE_SHARE = 0.05
-"""Sample-to-sample scatter above this share of the range is taken for movement, not for noise."""
+"""Sample-to-sample scatter, as a share of the range, above which it counts as motion, not noise."""
 
 SLIGHT = 1e-3
 """Scatter below this share of the range is small whatever makes it."""
@@ -29,8 +29,7 @@ RANGE_SHARE = 0.01
 """Smallest swing that counts as a movement, relative to the range."""
 
 WHOLE = 0.9
-"""A cycle at either end of a signal counts when its branch there is at least this share of the
-other one."""
+"""Smallest ratio of a first or last branch to its partner for a cycle to count."""
 
 
 def noise_level(x: ArrayLike, span: float | None = None) -> float:
@@ -49,9 +48,10 @@ def noise_level(x: ArrayLike, span: float | None = None) -> float:
     Returns
     -------
     float
-        NaN where noise cannot be told from movement: fewer than eight samples, or a scatter above
-        5 % of the range, as in levels chosen at random of which each was recorded once; or one above
-        0.1 % that grows where every second sample is left out, as that of fast motion does.
+        NaN where noise cannot be distinguished from movement: fewer than eight samples, or a
+        scatter above 5 % of the range, as in levels chosen at random of which each was recorded
+        once; or one above 0.1 % that grows where every second sample is left out, as that of fast
+        motion does.
 
     Raises
     ------

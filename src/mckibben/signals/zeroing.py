@@ -12,10 +12,10 @@ from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, moves, shortest_hold
 
 LOADS = ("pressure", "pressure_extensor", "force", "torque", "load")
-"""Quantities that stand still at rest, besides the input's own."""
+"""Quantities that are constant at rest, in addition to the input."""
 
-APART = 0.25
-"""Share of the travel by which recordings rest apart that are not of one zero."""
+LARGEST_DIFFERENCE = 0.25
+"""Largest difference of rest values, as a share of the travel, of recordings with one zero."""
 
 
 def rests(recordings: Sequence[Recording], channel: str, over: str) -> list[float] | None:
@@ -115,7 +115,7 @@ def apart(recordings: Sequence[Recording], channel: str, over: str) -> tuple[flo
     """
     found = rests(recordings, channel, over) if len(recordings) > 1 else None
     travel = max((float(np.ptp(one[channel])) for one in recordings), default=0.0)
-    if found is None or travel == 0 or max(found) - min(found) <= APART * travel:
+    if found is None or travel == 0 or max(found) - min(found) <= LARGEST_DIFFERENCE * travel:
         return None
     return min(found), max(found)
 

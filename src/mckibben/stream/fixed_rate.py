@@ -19,8 +19,8 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.errors import require
 
-KEPT = 1_000_000
-"""Steps that statistics are of, at most: the latest."""
+MOST_STORED = 1_000_000
+"""Largest number of steps in the statistics: the latest."""
 
 SPIN = 0.0005
 """Before a deadline, how long to watch the clock instead of sleeping [s]: sleep is never exact."""
@@ -104,7 +104,7 @@ class FixedRate:
 
     def __iter__(self) -> Iterator[int]:
         """Yield the number of every deadline, from 0, at its time."""
-        self._lateness, self._work = deque(maxlen=KEPT), deque(maxlen=KEPT)
+        self._lateness, self._work = deque(maxlen=MOST_STORED), deque(maxlen=MOST_STORED)
         self._missed = 0
         n = math.inf if math.isinf(self.duration) else round(self.duration / self.period)
         start, number = self._now(), 0

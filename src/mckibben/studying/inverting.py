@@ -23,10 +23,10 @@ MOST_RISE = 20_000
 """Samples of a slow rise, and as many without time."""
 
 FOLLOWED = 1e-6
-"""Largest error of an inverse that counts as one, relative to the reachable range."""
+"""Largest error of a valid inverse, relative to the reachable range."""
 
 NEARLY = 0.01
-"""The same on what a model makes of a recording, whose start may be out of reach."""
+"""The same for a model's output on a recording, whose start may be out of reach."""
 
 
 @dataclass(frozen=True)
@@ -127,17 +127,17 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
     """
     inverse = compensator(block)
     step, most, reachable, own = recording.sample_time, float("inf"), None, False
-    wished = recording
+    desired = recording
     if len(block.inputs) == 1:
         (output,) = block.outputs
         low, high = (float(end[0]) for end in block.reachable())
         own, most = bool(np.isinf([low, high]).all()), NEARLY
         if own:
             given = recording.select([channel.name for channel in block.inputs])
-            wished = given.with_channels(**{output.name: block.simulate(given)[output.name]})
+            desired = given.with_channels(**{output.name: block.simulate(given)[output.name]})
         elif np.isfinite([low, high]).all() and low < high:
             reachable, most = (low, high), FOLLOWED
-            wished = Recording(
+            desired = Recording(
                 {output.name: minor_loops(low, high)}, step, units={output.name: output.unit}
             )
         else:
@@ -145,13 +145,13 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
                 f"{model!r} has no output that it can reach whatever happened before",
                 remedy="identify it on a recording that covers the range of interest",
             )
-    reference = wished.matrix(channel.name for channel in block.outputs)
+    reference = desired.matrix(channel.name for channel in block.outputs)
     span = np.ptp(reference, axis=0) if reachable is None else np.array([high - low])
     span = np.maximum(span, np.finfo(float).tiny)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
-        found = inverse.simulate(wished.select([channel.name for channel in inverse.inputs]))
-        others = {c.name: wished[c.name] for c in block.inputs if c.name not in found}
+        found = inverse.simulate(desired.select([channel.name for channel in inverse.inputs]))
+        others = {c.name: desired[c.name] for c in block.inputs if c.name not in found}
         driven = found.with_channels(**others).select([c.name for c in block.inputs])
         output_of = block.simulate(driven).matrix(channel.name for channel in block.outputs)
     error = float((np.abs(output_of - reference) / span).max())
@@ -168,7 +168,7 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
         reference=reference,
         pressure=found.matrix(channel.name for channel in inverse.outputs),
         output=output_of,
-        time=wished.time,
+        time=desired.time,
         reachable=reachable,
         error=error,
         uncompensated=plain,

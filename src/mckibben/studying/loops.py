@@ -15,10 +15,10 @@ from mckibben.rigs import Rig
 from mckibben.rigs.files import changes, recorded_on
 
 LONGEST = 200.0
-"""Of the motion that is followed [s]."""
+"""Longest motion that is tracked [s]."""
 
 SMOOTHED = 0.5
-"""Half of the window that a measured motion is smoothed over before it is followed [s]."""
+"""Half width of the window that smooths a measured motion before it is tracked [s]."""
 
 
 def recorded_rig(recordings: Sequence[Recording]) -> Rig | None:

@@ -130,27 +130,27 @@ def study(
 ) -> Study:
     """Characterize recordings, choose a model by cross-validation, test it, and invert it if possible.
 
-    Where it cannot, the next in the order of the choice is inverted that can. Where no model is worth
-    recommending, none is inverted.
+    If the chosen model has no inverse, the next best one with an inverse is inverted. If no model
+    is recommended, none is inverted.
 
-    Of several muscles, or under a load, a motion of the test is followed on a virtual rig by every
-    inverse, with PID feedback beside. An interrupt ends the work at once; the study then holds what was
-    finished.
+    For several muscles, or under a load, a test motion is tracked on a virtual rig with every
+    inverse, and with PID feedback. An interrupt ends the work at once; the study then has the
+    finished results.
 
     Parameters
     ----------
     train, test, seed, jobs, folder, clear, progress
         As for `compare`.
     rig : str, optional
-        Virtual rig to close loops on; default the one that recordings of several muscles say they come
-        from, with what was changed of it.
+        Virtual rig to close loops on; by default the rig of the recordings, with its changed
+        parameters.
     found : callable, optional
         Called with the study so far: once the muscle is characterized, before any model is fitted,
         then whenever a model is finished.
     model, compensator : Block, optional
-        What ran when ``train`` was logged, which is then reviewed first; see `review`.
+        Model and compensator of the loop logged in ``train``, which is then reviewed; see `review`.
     **choices
-        What else `compare` takes: channels, models, settings, what is allowed.
+        Further arguments of `compare`.
 
     Returns
     -------

@@ -97,7 +97,7 @@ class Deferred:
         import numba
 
         digest = made_of(self)  # once: it looks at all that is called
-        compiled = numba.njit(**self.targetoptions)(_apart(self.py_func, digest))
+        compiled = numba.njit(**self.targetoptions)(_with_digest(self.py_func, digest))
         _compile_alike(compiled)
         if folder := cache_folder():
             compiled._cache = _Cache(folder, self.py_func.__qualname__, digest)
@@ -142,7 +142,7 @@ def deferred(function: Function, **options: Any) -> Function:
     return cast("Function", Deferred(function, _OPTIONS | options))
 
 
-def _apart(given: Any, digest: str) -> Callable[..., Any]:
+def _with_digest(given: Any, digest: str) -> Callable[..., Any]:
     """Return a function with a digest of its content in its name.
 
     Numba calls compiled code by name. Two functions of one name, as those that one function makes, would

@@ -26,7 +26,7 @@ from mckibben.errors import DataError, MckibbenError
 from mckibben.system import threads
 
 PRELOADED = ("mckibben.comparison.ranking", "mckibben.control", "numba", "scipy.optimize")
-"""What the server loads, so that no process has to."""
+"""Modules that the server of processes preloads."""
 
 ONE_THREAD = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
@@ -74,14 +74,14 @@ class Outcome:
 
 
 def in_turn(
-    work: Work, common: Any, items: Sequence[Any], told: Tell | None = None
+    work: Work, common: Any, items: Sequence[Any], report: Tell | None = None
 ) -> Iterator[Outcome]:
     """Do the work in this process, item after item; see `Workers.results`."""
     for index, item in enumerate(items):
 
         def tell(*progress: Any, index: int = index) -> None:
-            if told is not None:
-                told(index, *progress)
+            if report is not None:
+                report(index, *progress)
 
         tell()
         try:
@@ -118,7 +118,7 @@ class Workers:
             self._end(link)
 
     def results(
-        self, work: Work, items: Sequence[Any], told: Tell | None = None
+        self, work: Work, items: Sequence[Any], report: Tell | None = None
     ) -> Iterator[Outcome]:
         """Yield the outcome of every item as it finishes; items are started in order.
 
@@ -128,7 +128,7 @@ class Workers:
             A function of a module.
         items : sequence
             What to work on.
-        told : callable, optional
+        report : callable, optional
             Called with an item's index when it is begun, and with its progress.
         """
         waiting = list(enumerate(items))[::-1]
@@ -136,8 +136,8 @@ class Workers:
 
         def begin(link: connection.Connection) -> None:
             busy[link], item = waiting.pop()
-            if told is not None:
-                told(busy[link])
+            if report is not None:
+                report(busy[link])
             with suppress(ConnectionError):  # of one that has died, which is noticed next
                 link.send_bytes(pickle.dumps((work, item)))
 
@@ -162,8 +162,8 @@ class Workers:
                     del busy[link]
                     link = self._start() if waiting else link
                 if kind == "progress":
-                    if told is not None:
-                        told(index, *what)
+                    if report is not None:
+                        report(index, *what)
                     continue
                 if waiting:
                     begin(link)
@@ -198,15 +198,15 @@ def checked(jobs: int | None) -> int | None:
 
 
 def outcomes(
-    work: Work, common: Any, items: Sequence[Any], n: int, told: Tell | None = None
+    work: Work, common: Any, items: Sequence[Any], n: int, report: Tell | None = None
 ) -> Iterator[Outcome]:
     """Yield the outcome of every item, from worker processes or this one; see `Workers.results`."""
     if min(n, len(items)) <= 1 or multiprocessing.current_process().daemon:  # has no children
         with threads.one_blas_thread():
-            yield from in_turn(work, common, items, told)
+            yield from in_turn(work, common, items, report)
     else:
         with Workers(min(n, len(items)), common) as workers:
-            yield from workers.results(work, items, told)
+            yield from workers.results(work, items, report)
 
 
 def all_of(work: Work, items: Sequence[Any], jobs: int | None = None) -> list[Any]:

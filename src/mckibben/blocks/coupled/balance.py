@@ -537,7 +537,7 @@ class Balance(Invertible):
             return f"{ONE_EACH[field]}{of}"
         place = index[-1]
         if field == "grips":
-            return f"grip by {self.scheduled[place].name}"
+            return f"friction offset by {self.scheduled[place].name}"
         if field == "springs":
             power, to = divmod(place, 1 + len(on))
             name = f"{'constant force' if to == 0 else 'spring'}{of}"

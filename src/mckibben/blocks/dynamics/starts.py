@@ -143,6 +143,6 @@ def known_starts(free: Array, counts: Mask, least: float = KNOWN) -> tuple[Array
     responses, spread, turned = np.linalg.svd(free / size, full_matrices=False)
     moved = spread > 1e-12 * spread[0]
     seen, known, v = np.linalg.svd(responses[np.ix_(counts, moved)], full_matrices=False)
-    told = known > least
-    states = turned[moved].T @ (v[told] / spread[moved]).T / known[told] / size[:, None]
-    return np.asarray(states), np.asarray(seen[:, told])
+    determined = known > least
+    states = turned[moved].T @ (v[determined] / spread[moved]).T / known[determined] / size[:, None]
+    return np.asarray(states), np.asarray(seen[:, determined])

@@ -26,7 +26,7 @@ from mckibben.errors import ModelError
 
 PORTS: Ports = ("input",), ("force",), ("output",)
 
-UNDOES_A_MUSCLE = "has no inverse here: it already computes the pressure for a contraction"
+INVERTS_A_MUSCLE = "has no inverse here: it already computes the pressure for a contraction"
 INSTEAD = "use it as the compensator, or fit pressure to contraction by another model"
 
 
@@ -113,7 +113,7 @@ class ActivationPressure(Block):
     kernel = published_step
     start_kernel = published_start
     rate_dependent = True
-    no_inverse = UNDOES_A_MUSCLE
+    no_inverse = INVERTS_A_MUSCLE
     instead = INSTEAD
     parameters = ("contractions", "pressures", "phi", "gamma")
     typical = (
@@ -264,7 +264,7 @@ class ActivationMemory(Block):
     kernel = remembering_step
     start_kernel = remembering_start
     rate_dependent = True
-    no_inverse = UNDOES_A_MUSCLE
+    no_inverse = INVERTS_A_MUSCLE
     instead = INSTEAD
     parameters = ("surface", "friction", "viscosity", "relaxation")
     typical = (

@@ -252,10 +252,10 @@ class MultistateFriction(Block):
 
     def worked(self) -> tuple[str, ...]:
         """Return the values of every element in each direction."""
-        told: dict[str, list[str]] = {}
+        written: dict[str, list[str]] = {}
         for name, value in zip(self.parameter_names, self.values, strict=False):
             where, _, quantity = name.partition(": ")
             symbol, _, unit = quantity.rstrip("]").partition(" [")
             letter = {"sigma": r"\sigma", "F_c": "F_c"}.get(symbol, symbol)
-            told.setdefault(where, []).append(f"{letter} = {with_unit(tex(value), unit)}")
-        return tuple(rf"\text{{{at}: }}" + r",\quad ".join(lines) for at, lines in told.items())
+            written.setdefault(where, []).append(f"{letter} = {with_unit(tex(value), unit)}")
+        return tuple(rf"\text{{{at}: }}" + r",\quad ".join(lines) for at, lines in written.items())

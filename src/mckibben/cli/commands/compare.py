@@ -1,6 +1,6 @@
 """Fit models, choose by cross-validation, test on data used for neither; all free-running.
 
-A folder stands for all recordings in it. Recordings of several muscles (pressure_1 ...,
+A folder includes all recordings in it. Recordings of several muscles (pressure_1 ...,
 displacement_1 ...) get models that couple them, and with --load force models are given the load.
 Ctrl-C stops at once; with -o, the same command goes on from there.
 """

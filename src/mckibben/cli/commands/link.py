@@ -39,7 +39,7 @@ def link(
     if out is not None:
         if not settings:
             raise DataError(
-                "a device that nobody drives does nothing", remedy="give `settings[NAME]=VALUE` with it",
+                "no input is set to drive the device", remedy="give `settings[NAME]=VALUE` with it",
                 parameter="out",
             )  # fmt: skip
         claim_recording(out, inputs=[], force=force)

@@ -186,7 +186,7 @@ class Estimator(ABC):
     made_for: ClassVar[tuple[str, str] | None] = None
     """Kinds of input and output channels that it models; None for any."""
 
-    told: ClassVar[tuple[str, ...]] = ()
+    input_settings: ClassVar[tuple[str, ...]] = ()
     """Settings that name further input channels, of the block as well."""
 
     solves_starts: ClassVar[bool] = False
@@ -255,11 +255,11 @@ class Estimator(ABC):
                 f": name that as the input, and state {REST_LENGTH}, which makes it of {kinds[0]}"
             )
             return f"it maps {cls.made_for[0]} to {cls.made_for[1]}{made if nearly else ''}"
-        needed = cls(input=given, output=wanted)._told_channels()
+        needed = cls(input=given, output=wanted)._further_inputs()
         absent = [name for name in needed if any(name not in r for r in recordings)]
         if absent:
             return f"it needs the channel {absent[0]!r} too"
-        return None if cls.told else resting(recordings, inputs)
+        return None if cls.input_settings else resting(recordings, inputs)
 
     @classmethod
     def channel_settings(
@@ -273,7 +273,7 @@ class Estimator(ABC):
 
     def channels(self, data: TrainingData) -> dict[str, Channel]:
         """Return the channels of the block to build, as keyword arguments."""
-        beside = zip(self.told, data.scheduled, strict=True)
+        beside = zip(self.input_settings, data.scheduled, strict=True)
         return {"input": data.inputs[0], "output": data.outputs[0], **dict(beside)}
 
     @property
@@ -286,8 +286,8 @@ class Estimator(ABC):
         own = {"input_range": data.input_range, "initial": self.starting_rule}
         return own | self.channels(data)
 
-    def _told_channels(self) -> tuple[str, ...]:
-        return tuple(getattr(self, name) for name in self.told)
+    def _further_inputs(self) -> tuple[str, ...]:
+        return tuple(getattr(self, name) for name in self.input_settings)
 
     @property
     def fixed_fields(self) -> tuple[str, ...]:
@@ -307,7 +307,7 @@ class Estimator(ABC):
         )
 
     @property
-    def n_beside(self) -> int:
+    def n_further(self) -> int:
         """Number of fitted values that are not in ``model_.pack()``."""
         return 0
 
@@ -326,7 +326,7 @@ class Estimator(ABC):
         assert self.input is not None
         assert self.output is not None
         return training_data(
-            recordings, self.input, self.output, list(counted), self._told_channels()
+            recordings, self.input, self.output, list(counted), self._further_inputs()
         )
 
     @abstractmethod
@@ -348,19 +348,18 @@ class Estimator(ABC):
         Parameters
         ----------
         recordings : Recording, data frame, or sequence of these; or array, shape (n,) or (n, inputs)
-            What to learn from; every one starts with a memory of its own. With ``y``, an array of the
+            Training data; every recording starts with its own memory. With ``y``, an array of the
             inputs, in the package's units.
         y : array, shape (n,) or (n, outputs), optional
             The outputs.
         sample_time : float, optional
             Between samples of arrays [s].
         rows : sequence of bool arrays, optional
-            For every recording, the samples whose outputs count.
+            For every recording, the samples whose outputs are scored.
         validation : sequence of Recording
-            For searches that stop early; nothing is fitted to them, and most estimators have no use for
-            them.
+            For early stopping; not fitted. Most estimators do not use them.
         progress : bool or callable, optional
-            Whether to show a bar; or who is told the share of the work done and the best RMSE so far.
+            Whether to show a bar; or a callback for the share done and the best RMSE so far.
 
         Returns
         -------
@@ -514,7 +513,7 @@ class Estimator(ABC):
             rmse_by_output=tuple(by_output.tolist()),
             rmse_from_rest=float(_rms(from_rest.reshape(-1, len(data.outputs))).mean()),
             n_samples=residual.size // len(data.outputs),
-            n_free=block.n_parameters - len(self.fixed(block)) + self.n_beside,
+            n_free=block.n_parameters - len(self.fixed(block)) + self.n_further,
             n_evaluations=tracker.evaluations,
             seconds=time.perf_counter() - started,
             interrupted=tracker.interrupted,
@@ -534,8 +533,8 @@ class Estimator(ABC):
             return ()
         found = self.diagnostics_
         unknown = np.flatnonzero(np.isnan(found.standard_errors)).tolist()
-        told = {*found.at_bounds, *self.fixed(self.fitted)}
-        return tuple(place for place in unknown if place not in told)
+        excluded = {*found.at_bounds, *self.fixed(self.fitted)}
+        return tuple(place for place in unknown if place not in excluded)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
         """Return free-running outputs of blocks at scored samples, with fitted starts.

@@ -97,13 +97,13 @@ def covariance_of(
     finite = np.isfinite(slopes).all(axis=0) & (np.abs(slopes).max(axis=0, initial=0.0) < LARGEST)
     if not finite.any() or not np.isfinite(power):
         return np.inf, covariance
-    condition, own = told_by_runs(slopes[:, finite], residual, data.runs)
+    condition, own = covariance_by_runs(slopes[:, finite], residual, data.runs)
     places = np.array(free)[finite]
     covariance[np.ix_(places, places)] = own * np.outer(sizes[places], sizes[places])
     return condition if finite.all() else np.inf, covariance
 
 
-def told_by_runs(slopes: Array, residual: Array, runs: Sequence[Run]) -> tuple[float, Array]:
+def covariance_by_runs(slopes: Array, residual: Array, runs: Sequence[Run]) -> tuple[float, Array]:
     """Return the condition of sensitivities, (n, k), and the covariance for residuals, (n,).
 
     Both at the samples that count, as `TrainingData.target`.
@@ -121,8 +121,8 @@ def told_by_runs(slopes: Array, residual: Array, runs: Sequence[Run]) -> tuple[f
         left.append(np.full(shape, np.nan))
         left[-1][run.counts] = own.reshape(-1, shape[1])
     models = autoregressions(left)
-    condition, covariance, told = sandwich(moves, left, models)
-    return condition, blanked(covariance, told)
+    condition, covariance, determined = sandwich(moves, left, models)
+    return condition, blanked(covariance, determined)
 
 
 def autoregressions(left: Sequence[Array]) -> list[Autoregression]:
@@ -138,8 +138,8 @@ def sandwich(
 ) -> tuple[float, Array, NDArray[np.bool_]]:
     """Return condition, covariance, and which parameters are determined.
 
-    The pseudo-inverse leaves out directions that nothing tells, so that a parameter beside two of which
-    only the sum is told is as unsure as it is with their sum free.
+    The pseudo-inverse leaves out undetermined directions, so that a parameter beside two of which
+    only the sum is determined is as unsure as it is with their sum free.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def sandwich(
     n_outputs, k = moves[0].shape[1:]
     scale = np.array([np.sqrt(model.variance) or 1.0 for model in models])
     weighed = [slopes / scale[:, np.newaxis] for slopes in moves]
-    condition, own, told = pseudo_inverse(np.concatenate([w.reshape(-1, k) for w in weighed]))
+    condition, own, determined = pseudo_inverse(np.concatenate([w.reshape(-1, k) for w in weighed]))
     innovations = [
         np.concatenate([m.whitened(np.nan_to_num(e[:, j])) for e in left])
         for j, m in enumerate(models)
@@ -166,7 +166,7 @@ def sandwich(
                 middle += together[i, j] * (coloured[i].T @ coloured[j])
     # what the fit has taken out of the residuals, of all that was in them
     taken = float(np.sum(own * middle)) / sum(int(np.isfinite(e).sum()) for e in left)
-    return condition, own @ middle @ own / max(1.0 - taken, 0.1), told
+    return condition, own @ middle @ own / max(1.0 - taken, 0.1), determined
 
 
 def _pieces(series: Array) -> list[Array]:
@@ -206,8 +206,8 @@ def inverted(slopes: Array) -> tuple[float, Array]:
 
     Rows and columns of what the slopes do not determine are NaN.
     """
-    condition, inverse, told = pseudo_inverse(slopes)
-    return condition, blanked(inverse, told)
+    condition, inverse, determined = pseudo_inverse(slopes)
+    return condition, blanked(inverse, determined)
 
 
 def pseudo_inverse(slopes: Array) -> tuple[float, Array, NDArray[np.bool_]]:
@@ -219,8 +219,8 @@ def pseudo_inverse(slopes: Array) -> tuple[float, Array, NDArray[np.bool_]]:
     return condition, inverse, 1 - (right[~kept] ** 2).sum(axis=0) > DETERMINED
 
 
-def blanked(covariance: Array, told: NDArray[np.bool_]) -> Array:
+def blanked(covariance: Array, determined: NDArray[np.bool_]) -> Array:
     """Return a covariance with NaN for undetermined parameters."""
     covariance = covariance.copy()
-    covariance[~told] = covariance[:, ~told] = np.nan
+    covariance[~determined] = covariance[:, ~determined] = np.nan
     return covariance

@@ -38,7 +38,13 @@ from mckibben.estimators.coupled.balance_bench import (
     without_held,
     without_load,
 )
-from mckibben.estimators.coupled.balance_prior import Belief, Told, believed, check_alone, told_by
+from mckibben.estimators.coupled.balance_prior import (
+    PriorErrors,
+    PriorLike,
+    as_prior,
+    check_alone,
+    with_prior,
+)
 from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
@@ -189,7 +195,7 @@ class BalanceEstimator(CoupledEstimator):
     unknown_load: bool | None = None
     of_force: bool = False
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
-    prior: Told = None
+    prior: PriorLike = None
 
     @classmethod
     def objection(
@@ -224,7 +230,7 @@ class BalanceEstimator(CoupledEstimator):
     @property
     def spans(self) -> tuple[float, ...] | None:
         """The stroke of the data sheet, if there is one."""
-        return None if self.prior is None else (told_by(self.prior).sheet.stroke,)
+        return None if self.prior is None else (as_prior(self.prior).sheet.stroke,)
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the identified block, and the data without uninformative runs."""
@@ -257,9 +263,9 @@ class BalanceEstimator(CoupledEstimator):
         if not bench.tare:
             lacking = without_load(data, every=bool(self.unknown_load))
             bench = replace(bench, unmeasured=lacking)
-        belief = None
+        prior_errors = None
         if self.prior is not None:
-            bench, belief = believed(bench, self.prior)
+            bench, prior_errors = with_prior(bench, self.prior)
         still = self.prior is None and one_speed(data)
         if still and self.n_lags and self.lags is None:
             tracker.notes.append(
@@ -268,7 +274,7 @@ class BalanceEstimator(CoupledEstimator):
             )
         structure = self.widest(bench, timed=not still or self.lags is not None)
         with tracker.searching():
-            search, z = self._found(data, structure, belief, tracker)
+            search, z = self._found(data, structure, prior_errors, tracker)
             self._search, self._z = search, z
         search, z = self._search, self._z
         structure = search.structure
@@ -341,12 +347,12 @@ class BalanceEstimator(CoupledEstimator):
         """Return whether terms of a kind may be added."""
         return self.terms is None or kind in self.terms
 
-    def _first(self, structure: Structure, belief: Belief | None) -> Mask:
+    def _first(self, structure: Structure, prior_errors: PriorErrors | None) -> Mask:
         """Return which terms are free initially."""
 
         def there(term: Term) -> bool:
             kind, which, _ = term
-            if belief is not None and kind in OF_TRAITS:
+            if prior_errors is not None and kind in OF_TRAITS:
                 return True
             if kind == "springs":
                 return which == 0 or (which - 1) % structure.degree == 0
@@ -362,13 +368,17 @@ class BalanceEstimator(CoupledEstimator):
         return np.array([term.muscle is None and there(term) for term in structure.terms])
 
     def _found(
-        self, data: TrainingData, structure: Structure, belief: Belief | None, tracker: Tracker
+        self,
+        data: TrainingData,
+        structure: Structure,
+        prior_errors: PriorErrors | None,
+        tracker: Tracker,
     ) -> tuple[Search, Array]:
         """Return the search with the selected terms, and their values."""
         few = compared(coarser(data, FEW), FEW, of_force=structure.bench.of_force)
-        search = Search(few, structure, self._first(structure, belief), belief)
+        search = Search(few, structure, self._first(structure, prior_errors), prior_errors)
         z = self._balanced(search, tracker)
-        if belief is not None:
+        if prior_errors is not None:
             starts = (search.descend(one, TOWARDS, Tracker()) for one in (z, self._likely(search)))
             z = min(starts, key=search.cost)
         tried = np.array([self._tried(structure, term) for term in structure.terms])
@@ -390,7 +400,7 @@ class BalanceEstimator(CoupledEstimator):
             if (active == search.active).all() or number == ROUNDS - 1:
                 break
             search = replace(search, active=active)
-        added = search.active & ~self._first(structure, belief)
+        added = search.active & ~self._first(structure, prior_errors)
         names = (
             PARTS.get(t.kind, t.kind) if t.muscle is None else "muscles"
             for t in compress(structure.terms, added)
@@ -403,7 +413,7 @@ class BalanceEstimator(CoupledEstimator):
         z = search.descend(z, self.steps, tracker.part(0.5, 0.7))
         whole = compared(coarser(data, MOST_SAMPLES), MOST, of_force=structure.bench.of_force)
         search = replace(search, problem=whole)
-        for _ in range(1 if belief is None else REFINED):
+        for _ in range(1 if prior_errors is None else REFINED):
             search = search.weighed(z)
             z = search.descend(z, min(self.steps, LAST_STEPS), tracker.part(0.7, 0.9))
         return search, z
@@ -433,15 +443,15 @@ class BalanceEstimator(CoupledEstimator):
 
     def _likely(self, search: Search) -> Array:
         """Return the most probable model of the prior."""
-        structure, belief, problem = search.structure, search.belief, search.problem
-        assert belief is not None
+        structure, prior_errors, problem = search.structure, search.prior_errors, search.problem
+        assert prior_errors is not None
         z = np.zeros(problem.size(structure))
         z[: len(structure.terms)] = structure.begin(FIRST_GRIP * structure.bench.highest)
         for place, term in enumerate(structure.terms):
             if term.kind == "loads":
-                z[place] = 1.0 / belief.prior.sheet.area
+                z[place] = 1.0 / prior_errors.prior.sheet.area
             elif term[:2] == ("areas", 0):
-                z[place] = belief.prior.sheet.area
+                z[place] = prior_errors.prior.sheet.area
         alone = replace(search, problem=replace(problem, data=replace(problem.data, runs=())))
         return alone.descend(z, TOWARDS, Tracker())
 

@@ -73,12 +73,14 @@ def with_loads(
 def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:
     """Return data without runs that have neither motion nor measured force, and their names."""
     loaded = any(channel.unit in LOADS for channel in data.scheduled)
-    tells = [(loaded and not run.unmeasured) or not held(data, run) for run in data.runs]
-    if all(tells) or not any(tells):
+    informative = [(loaded and not run.unmeasured) or not held(data, run) for run in data.runs]
+    if all(informative) or not any(informative):
         return data, []
-    runs = tuple(run for run, told in zip(data.runs, tells, strict=True) if told)
+    runs = tuple(run for run, useful in zip(data.runs, informative, strict=True) if useful)
     return replace(data, runs=runs), list(
-        dict.fromkeys(run.name for run, told in zip(data.runs, tells, strict=True) if not told)
+        dict.fromkeys(
+            run.name for run, useful in zip(data.runs, informative, strict=True) if not useful
+        )
     )
 
 
@@ -167,7 +169,7 @@ def directions(data: TrainingData) -> Array:
     sizes = np.sqrt((moved**2).sum(axis=1))
     for k in np.flatnonzero(~(sizes > LEAST_MOVED * sizes.max())).tolist():
         raise DataError(
-            "it moves nothing",
+            "it has no effect",
             channel=data.inputs[k].name,
             remedy="leave it out, or record runs in which it moves the muscles",
         )

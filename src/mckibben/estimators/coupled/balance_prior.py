@@ -32,12 +32,12 @@ ZERO_STEPS = 6
 SHORTEST_LAG = 1.0
 """Smallest first time constant [s]."""
 
-Told = str | Path | Sheet | InstanceOf[Prior] | None
+PriorLike = str | Path | Sheet | InstanceOf[Prior] | None
 """Forms of a prior: a muscle's name, a file, a data sheet (also as a mapping), or a prior."""
 
 
 @dataclass(frozen=True)
-class Belief:
+class PriorErrors:
     """A prior as additional residuals.
 
     Parameters
@@ -93,7 +93,7 @@ class Belief:
         return far, np.concatenate([slopes, np.diag(curved)])
 
 
-def told_by(given: Any) -> Prior:
+def as_prior(given: Any) -> Prior:
     """Return a prior, or the one of a muscle's name, a file or a data sheet."""
     if isinstance(given, Prior):
         return given
@@ -114,9 +114,9 @@ def check_alone(data: TrainingData) -> None:
         )
 
 
-def believed(bench: Bench, given: Any) -> tuple[Bench, Belief]:
+def with_prior(bench: Bench, given: Any) -> tuple[Bench, PriorErrors]:
     """Return the set-up over the muscle's full range, recorded or not, and its prior."""
-    prior = told_by(given)
+    prior = as_prior(given)
     shortest, longest = bench.lag_range
     return replace(
         bench,
@@ -124,4 +124,4 @@ def believed(bench: Bench, given: Any) -> tuple[Bench, Belief]:
         highest=max(bench.highest, prior.sheet.max_pressure_bar),
         heaviest=max(bench.heaviest, prior.sheet.force),
         lag_range=(min(shortest, SHORTEST_LAG), max(longest, TIMES[-1])),
-    ), Belief(prior)
+    ), PriorErrors(prior)

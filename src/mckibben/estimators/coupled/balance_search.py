@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask
-from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, Belief
+from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, PriorErrors
 from mckibben.estimators.coupled.balance_problem import MOST_CUTS, Problem, bounded_least_squares
 from mckibben.estimators.coupled.balance_structure import Structure, Term
 from mckibben.estimators.coupled.constrained import constrained_least_squares
@@ -44,7 +44,7 @@ FIRST_DAMPING, LIGHTEST = 1e-3, 1e-7
 UNKNOWN = 1e-10
 """Effect of a parameter, relative to the largest, that counts as none."""
 
-FAR, APART = 0.5, 0.7
+FAR, LEAST_SEPARATION = 0.5, 0.7
 """Largest relative change per step; smallest difference of the logarithms of lags."""
 
 NO_GAIN = 1e-6
@@ -73,33 +73,35 @@ class Search:
     structure : Structure
     active : array of bool
         Which terms are free; others are what they begin with.
-    belief : Belief, optional
+    prior_errors : PriorErrors, optional
     """
 
     problem: Problem
     structure: Structure
     active: Mask
-    belief: Belief | None = None
+    prior_errors: PriorErrors | None = None
 
     def errors(self, z: Array, wanted: Mask | None = None) -> tuple[Array, Array]:
         """Return all residuals, and the requested derivatives; those of the prior last."""
         parts, slopes = self.problem.errors(self.structure, z, wanted)
         errors = np.concatenate(parts) if parts else np.zeros(0)
-        if self.belief is None:
+        if self.prior_errors is None:
             return errors, slopes
-        far, by = self.belief.errors(self.structure, z, wanted)
+        far, by = self.prior_errors.errors(self.structure, z, wanted)
         whole = np.zeros((len(by), slopes.shape[1]))
         whole[:, : by.shape[1]] = by
         return np.append(errors, far), np.concatenate([slopes, whole])
 
     def weighed(self, z: Array) -> Search:
         """Return the search with the prior weighted by the noise of independent errors."""
-        if self.belief is None:
+        if self.prior_errors is None:
             return self
         parts = self.problem.errors(self.structure, z)[0][: len(self.problem.runs)]
         model, count = autoregression(parts), sum(part.size for part in parts)
         noise = np.sqrt(model.variance * count / model.effective_sample_size(count))
-        return replace(self, belief=replace(self.belief, noise=max(float(noise), LEAST_NOISE)))
+        return replace(
+            self, prior_errors=replace(self.prior_errors, noise=max(float(noise), LEAST_NOISE))
+        )
 
     def cost(self, z: Array) -> float:
         """Return the root mean square error."""
@@ -218,7 +220,7 @@ class Search:
             starts,
             -starts,
         ]
-        asked = [least - sides @ structure.base, bounds, np.full(len(apart), APART)]
+        asked = [least - sides @ structure.base, bounds, np.full(len(apart), LEAST_SEPARATION)]
         asked.append(np.full(2 * len(starts), -1.0))
         return np.concatenate(every), np.concatenate(asked)
 
@@ -296,8 +298,8 @@ class Search:
     def _likely(self, z: Array, wanted: Mask) -> Array:
         """Return the products of the prior's derivatives and target."""
         table = np.zeros((1, z.size + 1))
-        if self.belief is not None:
-            far, by = self.belief.errors(self.structure, z, wanted)
+        if self.prior_errors is not None:
+            far, by = self.prior_errors.errors(self.structure, z, wanted)
             table = np.zeros((far.size, z.size + 1))
             table[:, : by.shape[1]] = by
             table[:, -1] = by @ z[: by.shape[1]] - far
@@ -349,7 +351,9 @@ class Search:
         for kind, which, muscle in terms:
             if kind not in ("relaxation", "line", "mass") or muscle is not None:
                 continue
-            if (kind, which) in on or (kind == "relaxation" and not self._apart(which, active, z)):
+            if (kind, which) in on or (
+                kind == "relaxation" and not self._is_distinct(which, active, z)
+            ):
                 continue
             lag = [Term("lags", which)] * (kind == "relaxation")
             yield group(*lag, *self._with_own(kind, (which,), own))
@@ -378,14 +382,14 @@ class Search:
                 whiches += [("areas", 0)] if "areas" in kinds else []
                 yield group(*(Term(*one, k) for one in whiches for k in range(1, self.structure.n)))
 
-    def _apart(self, which: int, active: Mask, z: Array) -> bool:
+    def _is_distinct(self, which: int, active: Mask, z: Array) -> bool:
         """Return whether a time constant is distinct from the free ones, and in order."""
         terms = self.structure.terms
         places = [place for place, term in enumerate(terms) if term.kind == "lags"]
         apart = (
             (z[i] - z[places[which]]) * np.sign(terms[i].which - which) for i in places if active[i]
         )
-        return all(one > APART for one in apart)
+        return all(one > LEAST_SEPARATION for one in apart)
 
     def _with_own(self, kind: str, whiches: range | tuple[int, ...], own: set[str]) -> list[Term]:
         """Return terms of a kind, with differences between muscles if they are free."""

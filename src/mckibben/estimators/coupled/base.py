@@ -126,8 +126,8 @@ class CoupledEstimator(Estimator):
         outputs: Sequence[str],
         scheduling: Sequence[str] | None = None,
     ) -> dict[str, Any]:
-        told = None if scheduling is None else tuple(scheduling)
-        return {"input": tuple(inputs), "output": tuple(outputs), "scheduling": told}
+        named = None if scheduling is None else tuple(scheduling)
+        return {"input": tuple(inputs), "output": tuple(outputs), "scheduling": named}
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None

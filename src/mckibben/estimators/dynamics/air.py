@@ -102,7 +102,7 @@ class AirEstimator(SeparableEstimator):
         return "it maps a command to a pressure" if given in MOVED or wanted != "pressure" else None
 
     @property
-    def n_beside(self) -> int:
+    def n_further(self) -> int:
         """The dead time."""
         return 1
 

@@ -18,7 +18,7 @@ from mckibben.blocks.parameters import Parametrised
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Grid, Initial, resting
-from mckibben.estimators.core.uncertainty import inverted, told_by_runs, unknown
+from mckibben.estimators.core.uncertainty import covariance_by_runs, inverted, unknown
 from mckibben.estimators.coupled.base import schedules
 from mckibben.estimators.dynamics.prediction_error import (
     Orders,
@@ -247,7 +247,7 @@ class PredictionErrorEstimator(Estimator):
         freedom = max(e.size - orders.size - orders.poles * len(runs), 1)
         self._covariance = float(e @ e) / freedom * inverse / np.outer(size, size)
         if orders.f and not orders.c + orders.d:
-            coloured = told_by_runs(slopes / size, e, runs)[1]
+            coloured = covariance_by_runs(slopes / size, e, runs)[1]
             self._covariance = coloured / np.outer(size, size)
         noise = (vector(p.c), vector(p.poles[0] if orders.a else p.d), deviation)
         self.noise_ = Noise(

@@ -177,7 +177,7 @@ class NarxEstimator(SearchEstimator):
         tracker.best_cost, chosen = min(tried, key=lambda item: item[0])
         if not stable(chosen, data):
             warnings.warn(
-                "the NARX model diverges when its input is held or goes on: do not run it free",
+                "the NARX model diverges for constant or continued input: do not simulate it",
                 ModelWarning,
                 stacklevel=4,
             )

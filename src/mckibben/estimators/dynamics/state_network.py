@@ -22,7 +22,7 @@ from mckibben.blocks.kernels import summing_kernel
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
-from mckibben.estimators.core.uncertainty import relative_sizes, told_by_runs
+from mckibben.estimators.core.uncertainty import covariance_by_runs, relative_sizes
 from mckibben.estimators.dynamics.linear_oscillator import (
     MOST_SUBSTEPS,
     Linear,
@@ -37,7 +37,7 @@ ANGLE = 1 / 3
 """Largest angle of the linear oscillator per substep [rad]."""
 
 SPRING, DAMPING, LAG = 0.5, 0.1, 0.3
-"""Initial values in units of the linear oscillator: stiffness beside lags of the velocity, damping,
+"""Initial values in units of the linear oscillator: stiffness with lags of the velocity, damping,
 and decay rate of the first lag.
 """
 
@@ -168,7 +168,7 @@ class StateNetworkEstimator(SearchEstimator):
         search = self.search(network, merged, Tracker())
         left = search.errors(network.pack())
         size = relative_sizes(network.pack())
-        condition, own = told_by_runs(search.slopes(network.pack()) * size, left, merged.runs)
+        condition, own = covariance_by_runs(search.slopes(network.pack()) * size, left, merged.runs)
         return condition, own * np.outer(size, size)
 
 

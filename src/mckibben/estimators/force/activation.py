@@ -66,7 +66,7 @@ class ActivationMemoryEstimator(SeparableEstimator):
     effort: ClassVar[float] = 1.0
     needs_time: ClassVar[bool] = True
     made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
-    told: ClassVar[tuple[str, ...]] = ("force",)
+    input_settings: ClassVar[tuple[str, ...]] = ("force",)
     rises: ClassVar[bool] = False
 
     input: str = "contraction"
@@ -166,7 +166,7 @@ class ActivationPressureEstimator(SearchEstimator):
     cannot = "No minor loops, one frequency: its hysteresis is a term in the rate."
     needs_time: ClassVar[bool] = True
     made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
-    told: ClassVar[tuple[str, ...]] = ("force",)
+    input_settings: ClassVar[tuple[str, ...]] = ("force",)
 
     input: str = "contraction"
     output: str = "pressure"
@@ -260,7 +260,7 @@ LOW, HIGH = 0.07, 0.975
 .391 MPa, of 0 to .4 MPa."""
 
 MARGIN, FARTHEST = 0.05, 3.0
-"""Least and greatest distance of a boundary from the extreme beside it: in contraction, relative to
+"""Smallest and largest distance of a boundary from the nearest extreme: in contraction, relative to
 the distance of the extremes (by Table 1, 0.2 to 1.4). The least holds for the pressures, too, relative
 to their range."""
 

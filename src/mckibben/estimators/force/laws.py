@@ -51,7 +51,7 @@ class PolynomialForceEstimator(SeparableEstimator):
     cannot = "No hysteresis."
     inverse_kind = "exact"
     made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
     rises: ClassVar[bool] = False
 
     input: str = "length"
@@ -113,7 +113,7 @@ class ChouHannafordEstimator(SeparableEstimator):
     inverse_kind = "exact"
     quick = True
     made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
     rises: ClassVar[bool] = False
 
     input: str = "length"
@@ -162,7 +162,7 @@ class TonduLopezEstimator(SeparableEstimator):
     can = "Static force of a cylinder with end and pressure corrections."
     cannot = "No hysteresis; bends less than data often do."
     made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
 

@@ -115,7 +115,7 @@ class MultistateEstimator(SeparableEstimator):
     n_refined: Annotated[int, Interval(ge=1)] = 8
 
     made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
     # where elements begin to slip makes corners in the cost, which take many short steps

@@ -49,8 +49,8 @@ FEWEST = 20
 """Smallest number of samples for testing that choice on later parts of runs."""
 
 UNDER_WAY = (
-    "creep was under way when the recordings began, and what was left of it was found: it goes on where "
-    "outputs are known, and elsewhere the muscle is taken to be settled"
+    "creep was in progress when the recordings began, and its state was estimated; without known "
+    "outputs, runs start without creep"
 )
 
 MOST_CREEP = 0.3
@@ -168,25 +168,27 @@ class CreepPIEstimator(SeparableEstimator):
         lower[0] = LEAST_REVERSIBLE
         return np.array(lower), np.array(upper)
 
-    def n_begun(self, data: TrainingData) -> int:
+    def n_initial(self, data: TrainingData) -> int:
         """Return the number of regressors of initial creep."""
         if self.settled is not False:
             return 0
         return self.n_creep * (1 + max(run.place for run in data.runs))
 
     def begun(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the decay of initial creep over a run's history, (n, n_begun).
+        """Return the decay of initial creep over a run's history, (n, n_initial).
 
         What an element was behind by, times its compliance, is one number an element and a run.
         """
-        columns = np.zeros((run.history.size, self.n_begun(data)))
+        columns = np.zeros((run.history.size, self.n_initial(data)))
         if columns.size:
             taus, _ = self.tail(theta)
             own = slice(run.place * self.n_creep, (1 + run.place) * self.n_creep)
             columns[:, own] = np.exp(-elapsed(run)[:, np.newaxis] / taus)
         return columns
 
-    def begun_moves(self, theta: Array, left: Array, run: Run, data: TrainingData) -> Array:
+    def initial_creep_slopes(
+        self, theta: Array, left: Array, run: Run, data: TrainingData
+    ) -> Array:
         """Return its derivatives by the logarithms of the time constants, (n, n_creep)."""
         taus, _ = self.tail(theta)
         columns = self.begun(theta, run, data) * left
@@ -269,7 +271,7 @@ class CreepPIEstimator(SeparableEstimator):
             given = pieces.pieces(x) @ linear
             moved = creep_moves(given, taus, compliances, run.sample_time)
             if left.size:
-                moved[:, : taus.size] += self.begun_moves(theta, left, run, data)
+                moved[:, : taus.size] += self.initial_creep_slopes(theta, left, run, data)
             return np.column_stack([crept, moved])
 
         return counting(data, of)

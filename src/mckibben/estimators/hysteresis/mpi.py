@@ -36,7 +36,7 @@ MOST_BY_RATE = 5.0
 MOST_STEPS = 150
 """Maximum number of evaluations of a refinement with identified thresholds."""
 
-RAISED, APART = 1e-7, 1e-9
+RAISED, LEAST_DISTANCE = 1e-7, 1e-9
 """Step of thresholds for derivatives, and their smallest distance, relative to the input range."""
 
 RATE_SHARE = 0.5
@@ -151,7 +151,7 @@ class MPIEstimator(SeparableEstimator):
         return self.thresholds == "identified"
 
     @property
-    def n_beside(self) -> int:
+    def n_further(self) -> int:
         """Number of identified thresholds."""
         return self.n_operators * self.identified
 
@@ -197,7 +197,7 @@ class MPIEstimator(SeparableEstimator):
             fading = np.exp(-3 * radii / (high - low))
             reversible = np.where(radii == 0, 1.0, 0.1)
             for guess in (weights / top, fading, reversible):
-                guesses.append(np.concatenate([guess, by_rate, share[: self.n_beside]]))
+                guesses.append(np.concatenate([guess, by_rate, share[: self.n_further]]))
         return guesses
 
     def _plays(self, radii: Array, data: TrainingData) -> Array:
@@ -299,7 +299,7 @@ class MPIEstimator(SeparableEstimator):
         weights = (scale * self.weights(theta)).reshape(-1, n)
         if self.identified:
             order, (low, high) = np.argsort(radii, kind="stable"), data.input_range
-            least = APART * (high - low) * np.arange(n)
+            least = LEAST_DISTANCE * (high - low) * np.arange(n)
             radii = np.maximum.accumulate(radii[order] - least) + least
             weights = weights[:, order]
         static, thresholds = vector(weights[0]), vector(radii)

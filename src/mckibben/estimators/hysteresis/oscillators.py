@@ -30,7 +30,7 @@ from mckibben.blocks.kernels import kernel
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
-from mckibben.estimators.core.uncertainty import relative_sizes, told_by_runs
+from mckibben.estimators.core.uncertainty import covariance_by_runs, relative_sizes
 from mckibben.estimators.dynamics.linear_oscillator import (
     MOST_SUBSTEPS,
     Path,
@@ -225,7 +225,7 @@ ELEMENTS = {
 class FreeRuns:
     """Errors of models of one structure on all runs, with derivatives.
 
-    A tracker counts evaluations, and is told of the best where ``told``.
+    A tracker counts evaluations, and is reports of the best where ``reports``.
     """
 
     def __init__(
@@ -235,10 +235,10 @@ class FreeRuns:
         paths: Sequence[Path],
         estimator: OscillatorEstimator,
         tracker: Tracker,
-        told: bool = False,
+        reports: bool = False,
     ) -> None:
         self.template, self.target, self.paths = template, data.target, paths
-        self.tracker, self.told = tracker, told
+        self.tracker, self.reports = tracker, reports
         element = ELEMENTS[estimator.element]
         self.n_positive, self.follows = element.n_positive, element.follows
         self.at_rest = estimator.at_rest
@@ -298,7 +298,7 @@ class FreeRuns:
             if not all(size < LARGEST for size in sizes):
                 found = np.full(self.target.size, np.inf)
         cost = float(np.sqrt(np.mean(found**2)))
-        if self.told:
+        if self.reports:
             self.tracker.saw(theta, cost)
         else:
             self.tracker.evaluations += 1
@@ -452,8 +452,8 @@ class OscillatorEstimator(SearchEstimator):
             if finer is None:
                 break
             model, _ = begun(finer)
-        for substeps, gain, told in ((coarse, FIRST_GAIN, False), (fine, LEAST_GAIN, True)):
-            search = self.search(model, merged, substeps, tracker, told)
+        for substeps, gain, reports in ((coarse, FIRST_GAIN, False), (fine, LEAST_GAIN, True)):
+            search = self.search(model, merged, substeps, tracker, reports)
             model, _ = search.descended(STEPS, gain)
         return model, data
 
@@ -463,12 +463,12 @@ class OscillatorEstimator(SearchEstimator):
         data: TrainingData,
         substeps: int,
         tracker: Tracker,
-        told: bool = False,
+        reports: bool = False,
     ) -> FreeRuns:
         """Return the errors of models of one structure on all runs."""
         warm = self._warm if self.periodic else None
         steps = paths(data, substeps, warm, self.at_rest)
-        return FreeRuns(model, data, steps, self, tracker, told)
+        return FreeRuns(model, data, steps, self, tracker, reports)
 
     @property
     def at_rest(self) -> bool:
@@ -495,13 +495,13 @@ class OscillatorEstimator(SearchEstimator):
         search.errors(theta)
         size = relative_sizes(block.pack())
         slopes = search.slopes(theta) / search.scale(block) * size
-        condition, own = told_by_runs(slopes, residual, data.runs)
+        condition, own = covariance_by_runs(slopes, residual, data.runs)
         return condition, own * np.outer(size, size)
 
 
 BOUC_WEN_OSCILLATOR = preset(
     OscillatorEstimator,
-    "Bouc-Wen oscillator by Gauss-Newton on free runs, begun with a linear one's stiffness shared.",
+    "Bouc-Wen oscillator by Gauss-Newton on free runs, started from a linear one.",
     title="Bouc–Wen oscillator",
     can=(
         "A mass, a damper and a spring with Bouc-Wen hysteresis inside the loop, from force "

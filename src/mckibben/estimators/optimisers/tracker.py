@@ -57,11 +57,11 @@ class Tracker:
         It keeps a best of its own.
         """
 
-        def told(share: float, best: float) -> None:
+        def report(share: float, best: float) -> None:
             if self.progress is not None:
                 self.progress(first + (last - first) * share, best)
 
-        return Tracker(progress=told, budget=self.budget)
+        return Tracker(progress=report, budget=self.budget)
 
     def saw_all(self, part: Tracker) -> None:
         """Register a finished part, without its best point."""

@@ -93,11 +93,11 @@ def emulate(block: Block, *, sample_time: float | None = None) -> Emulation:
     with tempfile.TemporaryDirectory() as place:
         write_texts(Path(place), texts)
         program, flash = built(Path(place))
-        told = _run(
+        output = _run(
             *(EMULATOR, *EMULATED, "-icount", "shift=6"),
             *("-serial", "none", "-kernel", str(program)),
         )
-    (empty, stack, ram), *lines = (line.split() for line in told.splitlines())
+    (empty, stack, ram), *lines = (line.split() for line in output.splitlines())
     ticks = np.array([int(line[0]) for line in lines])
     bits = np.array([[int(word, 16) for word in line[1:]] for line in lines], dtype=np.uint32)
     off = np.abs(bits.view(np.float32).astype(np.float64) - content["expected"])

@@ -193,7 +193,7 @@ def described(
         for each in wiring.steps
     ]
     calls = [each for each in steps if isinstance(each, dict)]
-    inputs, outputs = _told(block.inputs), _told(block.outputs)
+    inputs, outputs = _channel_entries(block.inputs), _channel_entries(block.outputs)
     cost, size, n_numbers = wiring.cost, 4 if single else 8, max(wiring.n_numbers, 1)
     constants = sum(call.coefficients.size for call in wiring.calls)
     return {
@@ -349,21 +349,21 @@ def _starts(calls: list[Call]) -> str:
     return " or ".join(dict.fromkeys(words or ["from its inputs"]))
 
 
-def _told(channels: tuple[Channel, ...]) -> list[dict[str, str]]:
+def _channel_entries(channels: tuple[Channel, ...]) -> list[dict[str, str]]:
     return [{"name": said(channel.name), "unit": said(channel.unit) or "1"} for channel in channels]
 
 
 def _constants(
     inputs: list[dict[str, str]], outputs: list[dict[str, str]], step: float | None
 ) -> list[tuple[str, str, str]]:
-    told: list[tuple[str, str, str]] = [
+    entries: list[tuple[str, str, str]] = [
         ("N_INPUTS", str(len(inputs)), ""),
         ("N_OUTPUTS", str(len(outputs)), ""),
     ]
     for way, channels in (("IN", inputs), ("OUT", outputs)):
         endings = macros([channel["name"] for channel in channels])
-        told += [
+        entries += [
             (f"{way}_{ending}", str(place), channels[place]["unit"])
             for place, ending in enumerate(endings)
         ]
-    return [*told, ("SAMPLE_TIME", repr(step), "s")] if step else told
+    return [*entries, ("SAMPLE_TIME", repr(step), "s")] if step else entries

@@ -141,24 +141,24 @@ def served(
         "inputs": [_port(channel, single) for channel in channels[: len(block.inputs)]],
         "outputs": [_port(channel, single) for channel in channels[len(block.inputs) :]],
     }
-    told = about | {
+    server = about | {
         "microseconds": round(1e6 * period),
         "channels": channels,
         "about": [],
         "fingerprint_bytes": "",
     }
-    full = {**content, "served": told}
+    full = {**content, "served": server}
     texts = [render("mckibben.export.c", file, full) for file in ("model.c.j2", "server.c.j2")]
     digest = hashlib.sha256("\n".join([*texts, json.dumps(about)]).encode()).digest()[:8]
     about["fingerprint"] = digest.hex()
-    told["fingerprint"], text = digest.hex(), json.dumps(about, separators=(",", ":"))
+    server["fingerprint"], text = digest.hex(), json.dumps(about, separators=(",", ":"))
     if len(text) > MOST_NUMBERS:
         raise ModelError(f"{n} channels are too many to describe", remedy="export fewer channels")
-    told["link.json"] = json.dumps(about, indent=2) + "\n"
-    told["about"] = [json.dumps(text[k : k + 80]) for k in range(0, len(text), 80)]
-    told["fingerprint_bytes"] = ", ".join(f"0x{byte:02X}" for byte in digest)
+    server["link.json"] = json.dumps(about, indent=2) + "\n"
+    server["about"] = [json.dumps(text[k : k + 80]) for k in range(0, len(text), 80)]
+    server["fingerprint_bytes"] = ", ".join(f"0x{byte:02X}" for byte in digest)
     return {
-        "served": told,
+        "served": server,
         "shared": [*content["shared"], *SERVER],
         "sources": [*content["sources"], SERVER[0].name, f"{content['name']}_server.c"],
     }
@@ -185,7 +185,7 @@ def _ticks(serving: Serving, period: float | None) -> int:
 
 def served_files(content: Mapping[str, Any]) -> dict[str, str]:
     """Return the files of the server, text by path, in addition to those of the model."""
-    name, told = content["name"], content["served"]
+    name, server = content["name"], content["served"]
     files = {
         f"src/{name}_server.h": "server.h.j2",
         f"src/{name}_server.c": "server.c.j2",
@@ -194,5 +194,5 @@ def served_files(content: Mapping[str, Any]) -> dict[str, str]:
     }
     return {
         **{path: render("mckibben.export.c", file, content) for path, file in files.items()},
-        "link.json": told["link.json"],
+        "link.json": server["link.json"],
     }

@@ -746,7 +746,7 @@ class _Translator:
         return arrays if isinstance(arrays, list) else known if hasattr(known, "py_func") else None
 
     def _call(self, node: ast.Call, pointers: Sequence[str] = ()) -> Value:
-        """Return a call, whose results behind the first go where pointers say, or nowhere."""
+        """Return a call, with pointers for results after the first."""
         callee = None if self._meaning(node.func) is accumulate else self._callee(node)
         if (callee is None or callee.written) and node is not self.alone:
             what = f"{ast.unparse(node.func)}(), which fills arrays, within another expression"

@@ -81,7 +81,7 @@ class Wiring:
             if not part.c_kernels:
                 raise ModelError(
                     f"{part.title!r} has no C",
-                    remedy="declare a start_kernel beside its kernel, as blocks of the package do",
+                    remedy="declare a start_kernel with its kernel, as blocks of the package do",
                 )
             state = step.state
             if state is None and not isinstance(part.start, str):

@@ -64,7 +64,7 @@ def methods() -> dict[str, tuple[str, dict[str, Any]]]:
     }
 
 
-class Tried(NamedTuple):
+class MethodResult(NamedTuple):
     """A method: its plain and matched model of the first successful seed; errors; reasons of failure.
 
     Errors have the shape (2, seeds, 4), plain first; the last axis is that of `FAILED`.
@@ -159,9 +159,9 @@ def matched(model: Block, recording: Recording) -> Series:
 
 def _tried(
     experiment: Experiment, train: Recording, test: Recording, seeds: range
-) -> dict[str, Tried]:
+) -> dict[str, MethodResult]:
     tell, every = experiment.within(0.05, 0.3), methods()
-    found: dict[str, Tried] = {}
+    found: dict[str, MethodResult] = {}
     for place, (name, (model, settings)) in enumerate(every.items()):
         models: list[tuple[Block, Series]] = []
         errors, failures = [], []
@@ -177,7 +177,7 @@ def _tried(
                 failures.append(str(error))
                 errors.append([FAILED, FAILED])
         first = models[0] if models else None
-        found[name] = Tried(first, np.array(errors).swapaxes(0, 1), failures)
+        found[name] = MethodResult(first, np.array(errors).swapaxes(0, 1), failures)
     return found
 
 
@@ -194,7 +194,7 @@ def _errors(model: Block, *recordings: Recording) -> list[float]:
     return found
 
 
-def _errors_tables(experiment: Experiment, tried: Mapping[str, Tried]) -> None:
+def _errors_tables(experiment: Experiment, tried: Mapping[str, MethodResult]) -> None:
     columns = ("RMSE calibration [mm]", "fitness [%]", "RMSE test [mm]", "fitness [%] test")
     rows: dict[str, list[Cell]] = {}
     spread: list[list[Cell]] = []
@@ -213,7 +213,7 @@ def _errors_tables(experiment: Experiment, tried: Mapping[str, Tried]) -> None:
     experiment.table("seeds", ["match", *each, "seeds that worked"], spread, **experiment.facts)
 
 
-def _parameters(experiment: Experiment, tried: Mapping[str, Tried]) -> None:
+def _parameters(experiment: Experiment, tried: Mapping[str, MethodResult]) -> None:
     """Add Table 1, and the parameters of P2UZ, Box-Jenkins and PI with the printed ones."""
     models = {name: one.models for name, one in tried.items() if one.models is not None}
     match: dict[str, Any] = {name: both[1].parts[1] for name, both in models.items()}
@@ -272,7 +272,7 @@ def _inside(row: Mapping[str, Any], path: str, scale: float) -> Cell:
 
 
 def _summary(
-    experiment: Experiment, tried: Mapping[str, Tried], board: Leaderboard
+    experiment: Experiment, tried: Mapping[str, MethodResult], board: Leaderboard
 ) -> dict[str, Row]:
     """Set the summary's facts, and return the named models of the field."""
     worked = {name: low for name in PAPERS if (low := tried[name].lowest_test) is not None}
@@ -297,7 +297,7 @@ def _summary(
 def _figures(
     experiment: Experiment,
     runs: Mapping[str, Recording],
-    tried: Mapping[str, Tried],
+    tried: Mapping[str, MethodResult],
     shown: Mapping[str, Row],
 ) -> None:
     """Add signals, loops and responses; models far out of the measured range are left out."""

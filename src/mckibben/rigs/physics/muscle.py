@@ -92,7 +92,7 @@ MUSCLE_STATE = np.dtype(
     ],
     align=True,
 )
-"""What one muscle remembers."""
+"""State of one muscle."""
 
 
 @compiled

@@ -274,7 +274,7 @@ def results_in(
     lock, existed = place / "lock", folder.exists()
     with written(folder):
         if new.exists() and not lock.exists():  # which stays as long as there is a run to finish
-            problem = "it blocks unfinished results, and mckibben did not write it"
+            problem = "it blocks unfinished results, and was not written by mckibben"
             raise DataError(problem, file=new, remedy="move it away, or give another folder")
         place.mkdir(parents=True, exist_ok=True)
         held = FileLock(lock, timeout=0)

@@ -24,7 +24,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.planning import kept_to
+from mckibben.blocks.planning import clipped_to
 from mckibben.blocks.predictive import Predictive
 from mckibben.export.c.emulation import emulate, missing_tools
 from mckibben.export.c.project import export_c
@@ -67,7 +67,7 @@ def clipped(inverse: Block, references: Array, **limits: float) -> Array:
     held = np.concatenate([np.repeat(references[:1], HORIZON, axis=0), references])
     pressures = np.asarray(inverse.simulate(held, sample_time=STEP))
     pressures = pressures.reshape(-1, n)
-    kept_to(n, rows.ravel(), pressures.reshape(-1))
+    clipped_to(n, rows.ravel(), pressures.reshape(-1))
     start = block.initial_state(held[0])[: block.forward_model.n_states].tolist()
     driven = np.hstack([pressures, held[:, n:]])
     given = block.forward_model.simulate(driven, initial=start, sample_time=STEP)

@@ -1,4 +1,4 @@
-"""The array that the package computes with, and the narrowest range."""
+"""The array type of the package, and the narrowest range of a channel."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ Array = NDArray[np.float64]
 """Double-precision numbers, of any shape."""
 
 NARROWEST = 1e-30
-"""Least range of a channel that can be computed with, in its unit: products of less would vanish."""
+"""Smallest range of a channel, in its unit; products of smaller ranges would underflow."""
 
 
 def check_finite(
     values: Array, remedy: str = "leave those samples out", channel: str | None = None
 ) -> None:
-    """Refuse samples of which one is not finite, naming the first.
+    """Raise an error if a sample is not finite, naming the first.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Finished parts of long work, in the folder of its results: what was stopped goes on from there.
+"""Checkpoints: finished parts of long work, stored with its results, for resuming it.
 
 Each is a JSON file under a digest of all that it depends on: the data, settings, seed, and the program
 itself. What is under another digest is not used.
@@ -35,11 +35,11 @@ from mckibben.system.atomic import PART, write_text, written
 Result = TypeVar("Result")
 
 _NAMES = re.compile(rf"-[0-9a-f]{{16}}\.json$|^{re.escape(PART)}[0-9a-f]{{16}}\.part$")
-"""Of checkpoints, and of what was being written when the program was killed."""
+"""Names of checkpoints, and of temporary files left by a killed process."""
 
 
 class Checkpoints:
-    """Finished parts of some long work.
+    """Checkpoints of a long computation.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Checkpoints:
         self._digest = digest(program(), depends) if folder is not None else ""
 
     def get(self, name: str, kind: type[Result], *depends: object) -> Result | None:
-        """Return a part, a block or a dataclass, if it depends on the same; else None."""
+        """Return a stored part, a block or a dataclass, if its inputs are unchanged; else None."""
         path = self._path(name, depends)
         if path is None or not path.is_file():
             return None
@@ -65,7 +65,7 @@ class Checkpoints:
             return None
 
     def put(self, name: str, result: object, *depends: object) -> None:
-        """Write a part; where that fails, the work goes on without."""
+        """Write a part; on failure, work continues without it."""
         path = self._path(name, depends)
         if path is not None:
             text = json.dumps(_to_json(result)) + "\n"
@@ -79,7 +79,7 @@ class Checkpoints:
     def once(
         self, name: str, kind: type[Result], compute: Callable[[], Result], *depends: object
     ) -> Result:
-        """Return a part, computed where it is not there yet."""
+        """Return a part, computed if it is not stored yet."""
         found = self.get(name, kind, *depends)
         if found is None:
             found = compute()
@@ -87,11 +87,11 @@ class Checkpoints:
         return found
 
     def inside(self, name: str) -> Path | None:
-        """Return a folder for a part that has parts of its own, or None to write nothing."""
+        """Return a folder for nested parts, or None without checkpoints."""
         return None if self._folder is None else self._folder / name
 
     def clear(self) -> None:
-        """Remove all parts; what somebody else put there stays."""
+        """Remove all parts, but no other files."""
         if self._folder is None or self._folder.is_symlink():
             return
         for place, _, names in os.walk(self._folder, topdown=False):
@@ -141,7 +141,7 @@ def digest(*what: object) -> str:
 
 @cache
 def program() -> str:
-    """Return a digest of the package's own files, and of what it computes with."""
+    """Return a digest of the package's files, and of its numerical libraries."""
     home = Path(mckibben.__file__).parent
     files = [p for p in sorted(home.rglob("*")) if p.is_file() and "__pycache__" not in p.parts]
     libraries = {name: version(name) for name in ("numpy", "scipy", "numba")}
@@ -149,7 +149,7 @@ def program() -> str:
 
 
 def source(plugin: Any) -> str:
-    """Return a digest of the file that defines an estimator, and of its settings as a preset."""
+    """Return a digest of an estimator's source file, and of its preset settings."""
     path = getsourcefile(unwrap(plugin))
     own = str(plugin) if isinstance(plugin, Chosen) else ""
     return "" if path is None else digest(Path(path).read_bytes(), own)

@@ -1,4 +1,4 @@
-"""Gymnasium environments: follow a reference with a virtual rig, or with a model of one's own muscle.
+"""Gymnasium environments: tracking with a virtual rig, or with a model of one's own muscle.
 
 Importing this module registers ``mckibben/RIG-vVERSION`` for every published rig that measures
 displacement (Towers et al., "Gymnasium: A Standard Interface for Reinforcement Learning
@@ -44,17 +44,19 @@ FASTEST = 0.3
 """Highest frequency of the commands behind a reference [Hz]."""
 
 SLOWEST = 0.03
-"""Lowest frequency of them, so that an episode sees several turns [Hz]."""
+"""Lowest frequency of the commands behind a reference [Hz], so that an episode has several
+reversals.
+"""
 
 FARTHEST = 5.0
-"""Observations are clipped to this, far beyond what they reach."""
+"""Bound to which observations are clipped, well outside their usual range."""
 
 SPREAD_PARAMETERS = ("muscle.c10", "muscle.friction.contracting", "muscle.friction.extending")
-"""What ``spread`` varies from episode to episode."""
+"""Parameters that ``spread`` varies between episodes."""
 
 
 class Tracking(gymnasium.Env[Vector, Vector]):
-    """Make the displacement of a rig, or of a model, follow a reference.
+    """Track a reference with the displacement of a rig or a model.
 
     The reference is what the same rig did under hidden random commands, and so can be followed.
 
@@ -133,7 +135,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
                 control_time = max(0.02, chosen.sample_time)
             self._spreading = chosen if spread else None
         else:
-            _require(not spread, "spread", spread, "0 with a plant, whose band scatters")
+            _require(not spread, "spread", spread, "0 with a plant, which has its own scatter")
             _require(not load, "load", load, "0 with a plant, and held={'force': ...} to the plant")
             chosen = plant = _twin(plant)
             control_time = chosen.sample_time if control_time is None else control_time
@@ -200,7 +202,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Vector, dict[str, Any]]:
-        """Start an episode: a new reference, a rig at rest, and, with ``spread``, another muscle."""
+        """Start an episode: a new reference, a rig at rest, and, with ``spread``, a varied muscle."""
         super().reset(seed=seed)
         del options
         self._now = self._varied()
@@ -283,7 +285,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         return rig.changed(settings)
 
     def _hidden_run(self, plant: Rig | Twin) -> Array:
-        """Return what a rig does under hidden commands [mm], shape (samples, displacements)."""
+        """Return a rig's response to random commands [mm], shape (samples, displacements)."""
         from mckibben.signals import irregular_triangle, random_wave, sine
 
         n = len(self._wanted)
@@ -339,7 +341,7 @@ def register() -> None:
 
 
 def _twin(plant: object) -> Twin:
-    """Return a twin of what is given: itself, a model, or a model's file."""
+    """Return a twin: as given, or of a model or its file."""
     from mckibben.blocks.base import Block
     from mckibben.blocks.saving import load
     from mckibben.control import Twin

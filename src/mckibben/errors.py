@@ -1,4 +1,4 @@
-"""Errors that a person can act on: what is wrong, where, and what to do about it.
+"""Errors with problem, place and remedy.
 
 A remedy names parameters and operations in backquotes, and whoever shows it renders them in its own
 terms: Python as arguments, the command line as options, the workbench as controls.
@@ -24,18 +24,18 @@ _NAMED = re.compile(r"`(\w+)(\(\)|\[([^`\]]*)\])?(?:=([^`]*))?`")
 """A parameter or an operation in a remedy."""
 
 Parameter = Callable[[str, str | None, str | None], str]
-"""Renders a parameter by its name, the key in it and its value, where there are any."""
+"""Renders a parameter from its name, its key and its value; the latter two may be None."""
 
 
 class MckibbenError(Exception):
-    """Base of every error that this package raises on purpose.
+    """Base class of all errors that this package raises intentionally.
 
     Parameters
     ----------
     problem : str
         What is wrong, as a phrase without a final stop.
     remedy : str
-        What to do about it, as a phrase without a final stop. Parameters and operations stand in
+        What to do about it, as a phrase without a final stop. Parameters and operations are in
         backquotes, see `mckibben.errors`.
     file : path, optional
         The file it was found in.
@@ -67,7 +67,7 @@ class MckibbenError(Exception):
         super().__init__(problem)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how it is made again in another process."""
+        """Return how to recreate it in another process."""
         return type(self), (self.problem,), self.__dict__
 
     def __str__(self) -> str:
@@ -101,7 +101,7 @@ def in_terms_of(
     parameter: Parameter = python_parameter,
     operation: Callable[[str], str] = python_operation,
 ) -> str:
-    """Return a remedy with its parameters and operations in the terms of one face.
+    """Return a remedy with its parameters and operations in the terms of one interface.
 
     >>> in_terms_of("give `gaps=split`, or use `track()`")
     "give gaps='split', or use track()"
@@ -119,7 +119,7 @@ def rendered(
     parameter: Parameter = python_parameter,
     operation: Callable[[str], str] = python_operation,
 ) -> str:
-    """Return an error as one paragraph: place, problem and remedy, in the terms of one face."""
+    """Return an error as one paragraph: place, problem and remedy, in the terms of one interface."""
     where = [] if error.file is None else [str(error.file)]
     if error.parameter is not None:
         where.append(parameter(error.parameter, None, None))
@@ -135,7 +135,7 @@ def rendered(
 
 
 def _short(given: object, most: int = 1000) -> str:
-    """Return a text without its middle where it is too long to be read, as one from a file can be."""
+    """Return a long text with its middle left out."""
     text = str(given)  # whatever was given for a name
     half = most // 2
     return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
@@ -146,15 +146,15 @@ class DataError(MckibbenError):
 
 
 class TooLargeError(DataError):
-    """A file that holds more than is read: however it is read, that does not help."""
+    """A file that exceeds the size limit."""
 
 
 class ModelError(MckibbenError):
-    """A model, or a file with one, that cannot do what was asked."""
+    """A model, or a file with one, that cannot do what is requested."""
 
 
 class ContractError(ModelError):
-    """A block or a rig that breaks a law of its contract."""
+    """A block or a rig that violates its contract."""
 
 
 class KernelError(ModelError):
@@ -171,7 +171,7 @@ class KernelError(ModelError):
         self.construct, self.instead = construct, instead
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how it is made again in another process."""
+        """Return how to recreate it in another process."""
         return type(self), (str(self.file), self.row, self.construct, self.instead)
 
 
@@ -183,11 +183,11 @@ class MckibbenWarning(UserWarning):
 
 
 class DataWarning(MckibbenWarning):
-    """Something assumed or mended while reading a recording."""
+    """An assumption or correction made while reading a recording."""
 
 
 class ModelWarning(MckibbenWarning):
-    """Something a model did that its user should know, such as clipping a reference."""
+    """An event in a model's run, such as clipping of a reference."""
 
 
 class CacheWarning(UserWarning):
@@ -201,7 +201,7 @@ def require(
     wanted: str,
     kind: Callable[..., MckibbenError] = ModelError,
 ) -> None:
-    """Refuse the value of a parameter unless a condition holds.
+    """Raise an error for a parameter unless a condition holds.
 
     Parameters
     ----------
@@ -220,8 +220,8 @@ def require(
 
 
 def unforeseen(error: Exception) -> MckibbenError:
-    """Return what nobody has foreseen, as an error: it is a fault of the program."""
+    """Return an unexpected exception as an internal error."""
     return MckibbenError(
-        f"this is a fault of the program, not of the data ({type(error).__name__}: {error})",
+        f"internal error, not an error in the data ({type(error).__name__}: {error})",
         remedy="try other settings or another model, and report it",
     )

@@ -1,4 +1,4 @@
-"""How far a model is from the measurement, and how wide a loop is."""
+"""Error measures of models, and measures of loops."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def score(measured: ArrayLike, modelled: ArrayLike) -> Scores:
 
 
 def mean_scores(found: Sequence[Scores]) -> Scores:
-    """Return the errors of several outputs as one: means, and the largest of the largest errors."""
+    """Return the combined errors of several outputs: means, and the overall largest error."""
     means = {
         name: float(np.mean([getattr(one, name) for one in found]))
         for name in ("rmse", "mae", "r2", "nrmse", "err")
@@ -80,7 +80,7 @@ def mean_scores(found: Sequence[Scores]) -> Scores:
 
 
 def rmse(measured: ArrayLike, modelled: ArrayLike) -> float:
-    """Return the root of the mean squared error, in the unit of the output."""
+    """Return the root mean square error, in the unit of the output."""
     y, model = _pair(measured, modelled)
     return float(np.sqrt(np.mean((y - model) ** 2)))
 

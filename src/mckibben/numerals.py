@@ -1,4 +1,4 @@
-"""Numbers as people read them: the same digits on a terminal, in a report, and in the workbench."""
+"""Formatting of numbers, the same on a terminal, in a report, and in the workbench."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 
 
 def numeral(value: float | None, digits: int = 3) -> str:
-    """Return a number to so many significant digits, without an exponent where that is readable.
+    """Return a number with so many significant digits, without exponent if readable.
 
     Counts are whole, and nothing is a dash.
 
@@ -26,7 +26,7 @@ def numeral(value: float | None, digits: int = 3) -> str:
 
 
 def typeset_within(sentence: str) -> str:
-    """Return a sentence with its numbers as they are printed; hyphens in words stay.
+    """Return a sentence with typeset numbers; hyphens in words are unchanged.
 
     >>> typeset_within("A closed-loop from -20 to 1.5e-12, and -.5")
     'A closed-loop from −20 to 1.5e−12, and −.5'
@@ -35,7 +35,7 @@ def typeset_within(sentence: str) -> str:
 
 
 def typeset(text: str) -> str:
-    """Return a number as it is printed: a minus for a hyphen, and a dash for nothing.
+    """Return a number for print: with a minus sign for a hyphen, and a dash for nothing.
 
     >>> typeset("-1.5e-12"), typeset("-")
     ('−1.5e−12', '–')
@@ -44,11 +44,11 @@ def typeset(text: str) -> str:
 
 
 ROUNDING = 1e-9
-"""Share that is rounding, and shown as none."""
+"""Relative size below which a number is shown as 0."""
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Return a number to so many significant digits, as it is printed.
+    """Return a number with so many significant digits, for print.
 
     >>> number(-12345.6), number(None)
     ('−12346', '–')
@@ -69,7 +69,7 @@ def percent(value: float | None, digits: int = 2) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Return a time left in words, rounded.
+    """Return a remaining time in words, rounded.
 
     >>> duration(3.2), duration(41.0), duration(200.0)
     ('5 s', '40 s', '3 min')
@@ -80,7 +80,7 @@ def duration(seconds: float) -> str:
 
 
 def counted(count: int, what: str) -> str:
-    """Return a count with its noun, in the plural where it is not one.
+    """Return a count with its noun, in the plural unless it is 1.
 
     >>> counted(1, "part"), counted(3, "part")
     ('1 part', '3 parts')

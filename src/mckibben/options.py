@@ -1,4 +1,4 @@
-"""What an option of an operation is, for whoever asks a person for it.
+"""Options of operations, for the command line, the workbench and Python.
 
 The options of an operation are a dataclass. Its fields are annotated with an `Option`; the command line
 makes its flags from them, and forms their controls.
@@ -19,14 +19,14 @@ Options = TypeVar("Options")
 
 @dataclass(frozen=True)
 class Option:
-    """How a person is asked for a value.
+    """Declaration of an option: help, metavariable, flag and parser.
 
     Parameters
     ----------
     help : str
         What it is, in a line.
     metavar : str
-        What stands for the value in a help text, such as ``HZ``.
+        Placeholder of the value in a help text, such as ``HZ``.
     flag : str
         The flag of the command line; default ``--`` and the name of the field.
     parse : callable, optional
@@ -45,7 +45,7 @@ def given_options(
     given: Mapping[str, Any],
     others: Sequence[str] = (),
 ) -> Options:
-    """Return options with some fields given by name; ``others`` are names beside, for the remedy.
+    """Return options with some fields given by name; ``others`` are further names for the remedy.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def given_options(
 
 
 def parsed(option: Option, text: str, name: str) -> Any:
-    """Return what an option makes of a text.
+    """Return the value of an option from a text.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def pair(text: str) -> tuple[str, str]:
 
 
 def setting(text: str) -> tuple[str, Any]:
-    """Return name and value of ``NAME=VALUE``, the value as JSON where it is that.
+    """Return name and value of ``NAME=VALUE``, the value parsed as JSON if possible.
 
     >>> setting("n-operators=4"), setting("initial=rest")
     (('n_operators', 4), ('initial', 'rest'))
@@ -140,7 +140,7 @@ def calibration(text: str) -> tuple[str, tuple[str, float, float, str]]:
 
 
 def span(text: str) -> tuple[float, float]:
-    """Return the two numbers of ``START:END``, infinite where they are left out."""
+    """Return the two numbers of ``START:END``, infinite where left out."""
     start, end = text.split(":")
     return float(start or "-inf"), float(end or "inf")
 
@@ -154,7 +154,7 @@ def size(text: str) -> float:
 
 
 def limits(text: str) -> tuple[str, tuple[float | None, ...]]:
-    """Return channel and limits of ``CHANNEL=LOW:HIGH[:RATE]``, None where they are left out.
+    """Return channel and limits of ``CHANNEL=LOW:HIGH[:RATE]``, None where left out.
 
     >>> limits("pressure=1:5.5"), limits("force=::20")
     (('pressure', (1.0, 5.5)), ('force', (None, None, 20.0)))
@@ -264,7 +264,7 @@ class ReadOptions:
     ] = None
     zero: Annotated[
         tuple[str, ...],
-        Option("Channel that counts from where the input is lowest; repeatable.", "CHANNEL"),
+        Option("Channel set to 0 where the input is lowest; repeatable.", "CHANNEL"),
     ] = ()
 
     def arguments(self) -> dict[str, Any]:
@@ -307,19 +307,19 @@ class FitOptions:
     target: Annotated[
         Literal["mjcf"] | None,
         Option(
-            "Fit what a format can carry, and compare the error without its limits.", flag="--for"
+            "Fit what an export format supports; report the error without that limit.", flag="--for"
         ),
     ] = None
     settings: Settings = field(default_factory=dict)
     validation: Annotated[
-        tuple[Path, ...], Option("Recording that stops a search; repeatable.", "FILE")
+        tuple[Path, ...], Option("Validation recording for early stopping; repeatable.", "FILE")
     ] = ()
     seed: Seed = 0
 
 
 @dataclass(frozen=True)
 class CompareOptions:
-    """Options of `compare` and `study`: data, models, and how to work."""
+    """Options of `compare` and `study`: data, models and processes."""
 
     inputs: Inputs = None
     outputs: Outputs = None
@@ -340,16 +340,16 @@ class CompareOptions:
         Option("Most samples to fit to: longer recordings are thinned.", "N", "--samples"),
     ] = None
     allow_shared: Annotated[
-        bool, Option("Test on data fitted to, and state so in every result.")
+        bool, Option("Allow test data that were fitted; every result states it.")
     ] = False
-    allow_early: Annotated[bool, Option("Compare although the output moves before its input.")] = (
+    allow_early: Annotated[bool, Option("Compare even if the output moves before its input.")] = (
         False
     )
 
 
 @dataclass(frozen=True)
 class StudyOptions(CompareOptions):
-    """Options of `study`: those of `compare`, and what a loop's log and a closed loop need."""
+    """Options of `study`: those of `compare`, and those of a log and a closed loop."""
 
     rig: Annotated[str | None, Option("Several muscles: rig to close a loop on.")] = None
     compensator: Annotated[
@@ -365,15 +365,15 @@ class StudyOptions(CompareOptions):
 class TrackOptions:
     """Options of `track`: the plant, the controller, and imperfections of the loop."""
 
-    rig: Annotated[Any, Option("Virtual rig to try it on; see rig list.", "NAME|FILE")] = None
+    rig: Annotated[Any, Option("Virtual rig to test it on; see rig list.", "NAME|FILE")] = None
     plant: Annotated[
         Path | Any | None,
-        Option("Model of your own muscle to try it on (JSON); with a band, it scatters.", "MODEL"),
+        Option("Model of your own muscle to test it on (JSON); a band adds scatter.", "MODEL"),
     ] = None
     limits: Annotated[
         Mapping[str, tuple[float | None, ...]],
         Option(
-            "Of the plant, where its model has none, as pressure=0:6; repeatable.",
+            "Limits of the plant, if its model has none, as pressure=0:6; repeatable.",
             "CHANNEL=LOW:HIGH",
             parse=limits,
         ),
@@ -383,15 +383,15 @@ class TrackOptions:
     ] = "feedforward"
     approach: Annotated[float, Option("Time to reach the first reference [s].", "S")] = 20.0
     settle: Annotated[float, Option("Time after that not scored [s].", "S")] = 0.0
-    noise: Annotated[float, Option("Added to what is measured [mm or N].", "X")] = 0.0
-    delay: Annotated[int, Option("Steps by which measurements are late.", "N")] = 0
+    noise: Annotated[float, Option("Standard deviation of measurement noise [mm or N].", "X")] = 0.0
+    delay: Annotated[int, Option("Delay of measurements, in steps.", "N")] = 0
     slew: Annotated[float | None, Option("Fastest pressure change [bar/s].", "X")] = None
     preview: Annotated[
         float | None,
-        Option("Time by which the reference is known ahead [s].  [default: dead time]", "S"),
+        Option("Preview time of the reference [s].  [default: dead time]", "S"),
     ] = None
     pressure_loop: Annotated[
-        bool, Option("Feed measured pressures back inside, as regulators do.")
+        bool, Option("Correct pressures by measured ones, as regulators do.")
     ] = True
     fields: Fields = field(default_factory=dict)
     seed: Seed = 0
@@ -399,7 +399,7 @@ class TrackOptions:
 
 @dataclass(frozen=True)
 class InvertOptions:
-    """Options of `invert`: what the compensator is for, and whether it learns or looks ahead."""
+    """Options of `invert`: purpose of the compensator, adaptation, and prediction."""
 
     wanted: Annotated[
         Literal["input", "force"],
@@ -408,39 +408,41 @@ class InvertOptions:
     ] = "input"  # fmt: skip
     adaptive: Annotated[bool, Option("Learn the model's parameters from measurements.")] = False
     time: Annotated[
-        float | None, Option("Of adaptive: how long it takes to learn [s].  [default: 60]", "S")
+        float | None, Option("With --adaptive: adaptation time [s].  [default: 60]", "S")
     ] = None
     noise: Annotated[
-        float | None, Option("Of adaptive: standard deviation of the measured output.", "X")
+        float | None, Option("With --adaptive: standard deviation of the measured output.", "X")
     ] = None
-    predictive: Annotated[bool, Option("Look ahead, so that limits cost less.")] = False
+    predictive: Annotated[bool, Option("Optimise pressures over a horizon, within limits.")] = False
     horizon: Annotated[
-        int | None, Option("Of predictive: samples it looks ahead.  [default: 20]", "N")
+        int | None, Option("With --predictive: samples of the horizon.  [default: 20]", "N")
     ] = None
     rate_limit: Annotated[
-        float | None, Option("Of predictive: fastest change of a pressure [bar/s].", "X")
+        float | None, Option("With --predictive: fastest change of a pressure [bar/s].", "X")
     ] = None
     pressures: Annotated[
         tuple[float, float] | None,
-        Option("Of predictive: lowest and highest pressure [bar].", "LOW HIGH"),
+        Option("With --predictive: lowest and highest pressure [bar].", "LOW HIGH"),
     ] = None
     total_limit: Annotated[
-        float | None, Option("Of predictive: highest sum of pressures [bar].", "X")
+        float | None, Option("With --predictive: highest sum of pressures [bar].", "X")
     ] = None
     flow_limit: Annotated[
-        float | None, Option("Of predictive: fastest rise of all pressures together [bar/s].", "X")
+        float | None,
+        Option("With --predictive: fastest rise of the sum of pressures [bar/s].", "X"),
     ] = None
     learned: Annotated[
         tuple[Path, ...],
         Option(
-            "Of sdchm: train an inverse network on recordings, as the paper; repeatable.", "FILE"
+            "For sdchm: train an inverse network on recordings, as in the paper; repeatable.",
+            "FILE",
         ),
     ] = ()
     fields: Fields = field(default_factory=dict)
     seed: Seed = 0
 
     def check(self) -> None:
-        """Refuse options that exclude each other, or lack what they are of."""
+        """Raise an error for options that exclude each other, or need another option."""
         ways = {
             "adaptive": self.adaptive,
             "predictive": self.predictive,
@@ -473,7 +475,7 @@ PREDICTIVE = ("horizon", "rate_limit", "pressures", "total_limit", "flow_limit")
 
 @dataclass(frozen=True)
 class PlanOptions:
-    """Options of `plan`: what is driven, how long, within what limits."""
+    """Options of `plan`: driven channels, duration and limits."""
 
     rig: Annotated[Any, Option("Rig that is driven: channels and limits.", "NAME|FILE")] = None
     muscle: Annotated[
@@ -481,13 +483,13 @@ class PlanOptions:
     ] = None
     model: Annotated[
         Any,
-        Option("Model of the standard errors, to fit, or saved (.json). Default: by the channels.",
+        Option("Model whose standard errors are planned: its name or file (.json).",
                "NAME|FILE"),
     ] = None  # fmt: skip
     minutes: Annotated[float, Option("How long to record.", "X")] = 3.0
     limits: Annotated[
         Mapping[str, tuple[float | None, ...]],
-        Option("Commands, and how fast they change a second; repeatable.",
+        Option("Limits of a command, and its rate per second; repeatable.",
                "CHANNEL=LOW:HIGH[:RATE]", parse=limits),
     ] = field(default_factory=dict)  # fmt: skip
     seed: Seed = 0
@@ -501,11 +503,13 @@ class ExportOptions:
         str | None, Option("Name of functions and files. Default: the file's name.", "NAME")
     ] = None
     sample_time: Annotated[
-        float | None, Option("Time between steps, where it matters.", "SECONDS")
+        float | None, Option("Sample time [s], if the model needs one.", "SECONDS")
     ] = None
     inverse: Annotated[bool, Option("Export the model's inverse.")] = False
     fields: Fields = field(default_factory=dict)
-    force: Annotated[bool, Option("Replace files of yours, too; never what is read.")] = False
+    force: Annotated[bool, Option("Replace files that mckibben did not write, except inputs.")] = (
+        False
+    )
 
 
 @dataclass(frozen=True)
@@ -520,15 +524,19 @@ class COptions(ExportOptions):
     link: Annotated[bool, Option("Add a server that answers over a serial line.")] = False
     limits: Annotated[
         Mapping[str, tuple[float, float]],
-        Option("Of link: limits of a channel; repeatable.", "NAME=LOW:HIGH", "--limit", limits),
+        Option("With --link: limits of a channel; repeatable.", "NAME=LOW:HIGH", "--limit", limits),
     ] = field(default_factory=dict)
     safe: Annotated[
         Mapping[str, float],
-        Option("Of link: an output while no host leads; repeatable.", "NAME=VALUE", parse=number),
+        Option(
+            "With --link: safe value of an output without a host; repeatable.",
+            "NAME=VALUE",
+            parse=number,
+        ),
     ] = field(default_factory=dict)
     watchdog: Annotated[
         float | None,
-        Option("Of link: silence after which outputs are safe [s]. Default: 0.5.", "S"),
+        Option("With --link: silence until outputs take safe values [s]. Default: 0.5.", "S"),
     ] = None
 
 
@@ -556,7 +564,9 @@ class MJCFOptions:
     name: Annotated[str | None, Option("Name of the actuator. Default: of the file.", "NAME")] = (
         None
     )
-    force: Annotated[bool, Option("Replace files of yours, too; never what is read.")] = False
+    force: Annotated[bool, Option("Replace files that mckibben did not write, except inputs.")] = (
+        False
+    )
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What a run writes: beside the earlier results, swapped in when complete, and never over the user's.
+"""Output files of a run: replaced together when complete, and never overwriting the user's.
 
 In a folder of results, ``run.json`` lists the files of the last complete run with their digests. A run
 writes into ``unfinished/new``. When it is complete, it writes a journal of what goes where, and renames
@@ -23,32 +23,32 @@ from mckibben.system import ordinary
 from mckibben.system.atomic import demand_room, digest, write_json, write_text, written
 
 RUN = "run.json"
-"""Lists the files of the last complete run of a folder."""
+"""File that lists the files of the last complete run in a folder."""
 
 UNFINISHED = "unfinished"
-"""In a folder of results: the files of a run that is not complete, and its checkpoints."""
+"""Folder, in a folder of results, with the files and checkpoints of an incomplete run."""
 
 JOURNAL = "journal.json"
-"""In that folder: what goes where, from when a run is complete until all of it is there."""
+"""File in that folder that lists the moves of a complete run until all are done."""
 
 FORMAT = "mckibben-run"
 
 MAKER = "drawn by mckibben"
-"""In the metadata of figures."""
+"""Creator in the metadata of figures."""
 
 FIGURES = (".png", ".svg", ".pdf")
 
 LARGEST = 2**28
-"""Bytes of a file that is looked at; a larger one counts as the user's."""
+"""Largest file that is inspected [bytes]; a larger one counts as the user's."""
 
 
 def unfinished(folder: Path) -> Path:
-    """Return where the files of a run are until it is complete."""
+    """Return the folder of a run's files until it is complete."""
     return folder / UNFINISHED / "new"
 
 
 def claim(path: str | Path, *, inputs: Iterable[str | Path] = (), force: bool = False) -> None:
-    """Refuse, before any work, an output that would replace what is not to be lost.
+    """Raise an error, before any work, for an output that would overwrite a user's file or an input.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def _claim(path: Path, inputs: Iterable[str | Path], force: bool, ours: bool) ->
 
 
 def is_ours(path: Path) -> bool:
-    """Return whether a file was written by this package, and is as it was; models may be edited."""
+    """Return whether a file was written by this package and is unchanged; models may be edited."""
     from mckibben.files.own import is_own
 
     listed = _listed(path.parent)
@@ -109,14 +109,14 @@ def is_ours(path: Path) -> bool:
 
 
 def marked(text: bytes) -> bytes:
-    """Return an XML file with its digest in a comment before it, by which it is known as it was."""
+    """Return an XML file with its digest in a leading comment."""
     return b"<!-- mckibben %s -->\n" % hashlib.sha256(text).hexdigest().encode() + text
 
 
 def claim_recording(
     path: str | Path, *, inputs: Iterable[str | Path] = (), force: bool = False
 ) -> None:
-    """Refuse a recording likewise, and an ending that is no format."""
+    """Raise an error for an output recording likewise, or of an unknown format."""
     from mckibben.files.formats import writer
 
     writer(Path(path))
@@ -124,7 +124,7 @@ def claim_recording(
 
 
 def refuse_inputs(path: str | Path, inputs: Iterable[str | Path]) -> None:
-    """Refuse an output that is an input, part of one, or the description beside one, by any name.
+    """Raise an error for an output that is an input, part of one, or its description.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def _same(one: Path, other: Path) -> bool:
 
 
 class Results:
-    """The files of a run, in a folder that no other process writes to; see `results_in`.
+    """The files of a run, in a locked folder; see `results_in`.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ class Results:
                 shutil.rmtree(self.new)
 
     def claim(self, names: Iterable[str]) -> None:
-        """Refuse now what could not be written later: files by their path in the folder.
+        """Raise an error now for files that could not be written later, by path in the folder.
 
         Only what is listed in ``run.json``, and was not changed since, is replaced without ``force``.
         """
@@ -193,7 +193,7 @@ class Results:
             path = _inside(self.folder, name)
             nearest = next(each for each in path.parents if os.path.lexists(each))
             if not nearest.is_dir():
-                problem = "there is a file where a folder will be"
+                problem = "the output folder has the name of a file"
                 raise DataError(
                     problem, file=nearest, remedy="move it away, or give another folder"
                 )
@@ -202,7 +202,7 @@ class Results:
                 _claim(path, self._inputs, self._force, own)
 
     def write_text(self, name: str, text: str) -> None:
-        """Write a file in UTF-8, beside the earlier ones, by its path in the folder."""
+        """Write a file in UTF-8 for the run, by its path in the folder."""
         path = _inside(self.new, name)
         with written(path):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -210,7 +210,7 @@ class Results:
         self._digests[name] = digest(text.encode())
 
     def commit(self) -> None:
-        """Put the files in their places, and remove others of the earlier run that were not changed.
+        """Move the files to their places, and remove unchanged files of the earlier run.
 
         Raises
         ------
@@ -230,7 +230,7 @@ class Results:
         self._digests = {}
 
     def _removable(self, name: str) -> bool:
-        """Return whether a file that is listed is in the folder, and is no input."""
+        """Return whether a listed file is in the folder, and is not an input."""
         with suppress(DataError):
             refuse_inputs(_inside(self.folder, name), self._inputs)
             return True
@@ -246,7 +246,7 @@ def results_in(
     force: bool = False,
     kind: str = "",
 ) -> Iterator[Results | None]:
-    """Open a folder of results, made where it is missing, to which this process alone writes.
+    """Open a folder of results, created if missing, locked for this process.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ def results_in(
     lock, existed = place / "lock", folder.exists()
     with written(folder):
         if new.exists() and not lock.exists():  # which stays as long as there is a run to finish
-            problem = "this is in the way of unfinished results, and is not this program's"
+            problem = "it blocks unfinished results, and was not written by mckibben"
             raise DataError(problem, file=new, remedy="move it away, or give another folder")
         place.mkdir(parents=True, exist_ok=True)
         held = FileLock(lock, timeout=0)
@@ -299,7 +299,7 @@ def results_in(
 
 
 def _finish(folder: Path) -> None:
-    """Finish what is in a journal, if there is one: the process that wrote it may have been killed."""
+    """Complete the moves of a journal, if its process was killed."""
     place, new = folder / UNFINISHED / JOURNAL, unfinished(folder)
     if not os.path.lexists(place):
         return
@@ -307,7 +307,7 @@ def _finish(folder: Path) -> None:
         journal = json.loads(ordinary.read_text(place, most=ordinary.DESCRIPTION))
         files, removed = list(journal["files"]), dict(journal["removed"])
     except (ValueError, TypeError, KeyError):
-        remedy = "move it away, and look at the files in the folder 'new' beside it"
+        remedy = "move it away, and look at the files in the folder 'new' next to it"
         raise DataError("the journal is damaged", file=place, remedy=remedy) from None
     for name, old in removed.items():
         path = _inside(folder, name)
@@ -335,13 +335,13 @@ def _prune(folder: Path) -> None:
 
 
 def _listed(folder: Path) -> Mapping[str, str]:
-    """Return the digests by file that the last run noted; none where it is absent or damaged."""
+    """Return the digests by file of the last run; empty if missing or damaged."""
     found = _noted(folder).get("files")
     return found if isinstance(found, dict) else {}
 
 
 def _noted(folder: Path) -> Mapping[str, Any]:
-    """Return what the last run noted; nothing where it is absent or damaged."""
+    """Return the record of the last run; empty if missing or damaged."""
     try:
         found = json.loads(ordinary.read_text(folder / RUN, most=ordinary.DESCRIPTION))
         return dict(found) if found["format"] == FORMAT else {}
@@ -360,7 +360,7 @@ def _holds(path: Path, expected: str | None) -> bool:
 
 
 def _inside(folder: Path, name: str) -> Path:
-    """Return a file of a folder; refuse it where links or the name lead out of it."""
+    """Return a file of a folder; raise an error if links or the name lead outside."""
     path = folder / name
     if not path.parent.resolve().is_relative_to(folder.resolve()):
         problem = "its folder is a link that leads elsewhere"

@@ -1,4 +1,4 @@
-"""A class with some of its settings chosen, under a name of its own.
+"""Presets: a class with some of its settings fixed, under a separate name.
 
 A published variant, or a structure, is a choice of settings and no class: ``preset(...)`` stands for it
 beside the class, and a line of the registry, or an entry point of another package, leads there.
@@ -16,7 +16,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Preset:
-    """A class, what it is with these settings, and the settings; see `preset`."""
+    """A class, its description with these settings, and the settings; see `preset`."""
 
     of: type
     about: str
@@ -24,7 +24,7 @@ class Preset:
 
 
 def preset(of: type, about: str, **chosen: Any) -> Preset:
-    """Return a class with some of its settings chosen.
+    """Return a class with some of its settings fixed.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def preset(of: type, about: str, **chosen: Any) -> Preset:
 
 
 class Chosen:
-    """A preset with its class: called as the class is, it makes an object of the class.
+    """A preset with its class: calling it creates an object of the class.
 
     What else it is asked for is the class's own; class methods see the preset for their class.
 

@@ -1,4 +1,4 @@
-"""Recordings from files, read and prepared as an operation is asked to."""
+"""Recordings from files, read and prepared for an operation."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def prepared(recordings: list[Recording], reading: ReadOptions) -> list[Recordin
 
 
 def items(data: Any) -> list[Recording | Path]:
-    """Return data as a list of recordings and files; data frames are made recordings.
+    """Return data as a list of recordings and files; data frames are converted to recordings.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def files_of(data: Data) -> list[Path]:
 
 
 def loaded(data: Data) -> list[Recording]:
-    """Return the recordings among data that are no files."""
+    """Return the recordings among data."""
     return [one for one in items(data) if isinstance(one, Recording)]
 
 
@@ -75,7 +75,7 @@ def read_files(
     *,
     informative: bool = False,
 ) -> list[Recording]:
-    """Return the recordings in files and folders, which must have some channels; recordings as they are.
+    """Return the recordings in files and folders, which must have some channels; recordings unchanged.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def read_sides(
     load: str | None = None,
     reading: ReadOptions | None = None,
 ) -> list[list[Recording]]:
-    """Return the recordings of several lists of files, with the channels that models are fitted to.
+    """Return the recordings of several lists of files, with the channels for models.
 
     Channels that are not named are recognised, as `compare` does. What is wrong with a column that no
     model needs is a note.
@@ -128,7 +128,7 @@ def read_sides(
 
 
 def _warn_again(caught: Iterable[warnings.WarningMessage]) -> None:
-    """Issue warnings that were held back until it was known that files are not read again."""
+    """Issue warnings that were deferred until it was clear that files are not read again."""
     for one in caught:
         warnings.warn(one.message, one.category, stacklevel=2)
 
@@ -140,7 +140,7 @@ def read_pair(
     reading: ReadOptions | None = None,
     others: Sequence[str] = (),
 ) -> tuple[list[Recording], str, str]:
-    """Return recordings of one muscle, its input and its output: as named, the usual, or recognised.
+    """Return recordings of one muscle, its input and its output: as named, default, or recognised.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def read_pair(
 
 @dataclass(frozen=True)
 class Contents:
-    """What files contain.
+    """Contents of files.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def look(
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
 ) -> Contents:
-    """Return what files contain, and what the recordings in them cannot identify.
+    """Return the contents of files, and the data gaps of the recordings in them.
 
     Raises
     ------

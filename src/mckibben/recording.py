@@ -1,4 +1,4 @@
-"""A recording: named channels with units on one uniform time grid, and what is known about them."""
+"""A recording: named channels with units on one uniform time grid, with metadata."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
 
 
 REST_LENGTH = 'the rest length (`rest_length=MM`, or meta["rest_length"] in Python)'
-"""How the length at which a displacement is 0 is stated."""
+"""Remedy that states the rest length."""
 
 PROVENANCE = ("file", "sha256")
-"""Entries of ``meta`` that say where a recording was read from; recordings are equal without them."""
+"""Entries of ``meta`` on the file of a recording; recordings are compared without them."""
 
 
 def standard_unit(channel: str) -> str | None:
-    """Return the unit that a channel of this name has throughout the package, or None.
+    """Return the package's unit of a channel of this name, or None.
 
     >>> standard_unit("pressure_extensor"), standard_unit("displacement_model")
     ('bar', 'mm')
@@ -50,7 +50,7 @@ def standard_unit(channel: str) -> str | None:
 
 
 def conversion(wanted: str, given: str, rest_length: float | None) -> tuple[float, float] | None:
-    """Return gain and offset that make a channel of another, or None where nothing does.
+    """Return gain and offset that convert a channel to another, or None.
 
     A displacement is a contraction times the rest length [mm], and a length is that less a displacement.
 
@@ -157,7 +157,7 @@ class Recording(DrawsItself):
         object.__setattr__(self, "meta", MappingProxyType(dict(self.meta)))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Rebuild from plain dicts, so that worker processes can be handed recordings."""
+        """Return how to rebuild it from plain dicts, for worker processes."""
         plain = (dict(self.channels), self.sample_time, dict(self.units))
         return Recording, (*plain, self.start_time, dict(self.meta))
 
@@ -179,7 +179,7 @@ class Recording(DrawsItself):
         )
 
     def _known(self) -> dict[str, Any]:
-        """Return what is known of the run itself, not of the file it was read from."""
+        """Return the metadata of the run itself, without those of its file."""
         return {key: value for key, value in self.meta.items() if key not in PROVENANCE}
 
     __hash__ = None  # type: ignore[assignment]  # equal by content, and content is too large to hash
@@ -210,7 +210,7 @@ class Recording(DrawsItself):
 
     @property
     def time(self) -> Array:
-        """Time of every sample [s], shape (n,); sample numbers where the recording has no time."""
+        """Time of every sample [s], shape (n,); sample numbers if the recording has no time."""
         step = 1.0 if self.sample_time is None else self.sample_time
         return self.start_time + step * np.arange(self.n_samples, dtype=np.float64)
 
@@ -227,7 +227,7 @@ class Recording(DrawsItself):
 
     @property
     def origin(self) -> str:
-        """What its samples are called: a virtual rig's are not measured."""
+        """Label of its samples: "measured", unless a virtual rig's."""
         return "simulated" if "(virtual)" in str(self.meta.get("rig", "")) else "measured"
 
     @property
@@ -240,20 +240,20 @@ class Recording(DrawsItself):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was assumed or mended when it was read, as ``meta["notes"]`` has it."""
+        """Assumptions and corrections made in reading it, from ``meta["notes"]``."""
         given = self.meta.get("notes")
         several = given if isinstance(given, list | tuple) else () if given is None else (given,)
         return tuple(map(str, several))
 
     @property
     def rest_length(self) -> float | None:
-        """Length of the muscle where its displacement is 0 [mm], as ``meta["rest_length"]`` has it."""
+        """Length of the muscle at displacement 0 [mm], from ``meta["rest_length"]``."""
         given = self.meta.get("rest_length")
         return float(given) if isinstance(given, int | float) and 0 < given < np.inf else None
 
     @property
     def bridged(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Which samples were interpolated over a gap when it was read, shape (n,)."""
+        """Which samples were interpolated over a gap in reading, shape (n,)."""
         time, within = self.time, 1e-6 * (self.sample_time or 1.0)
         found = np.zeros(time.size, dtype=np.bool_)
         for start, stop in self.meta.get("bridged", ()):
@@ -282,7 +282,7 @@ class Recording(DrawsItself):
         units: Mapping[str, str] | None = None,
         **meta: Any,
     ) -> Recording:
-        """Return a data frame of pandas as a recording.
+        """Convert a data frame of pandas to a recording.
 
         Parameters
         ----------
@@ -316,7 +316,7 @@ class Recording(DrawsItself):
         return cls(channels, sample_time, units, start, known.get("meta", {}) | meta)
 
     def to_frame(self) -> Any:
-        """Return the channels as a data frame of pandas over time [s]; `from_frame` undoes it."""
+        """Return the channels as a data frame of pandas over time [s]; the inverse of `from_frame`."""
         import pandas as pd
 
         index = None if self.sample_time is None else pd.Index(self.time, name="time")
@@ -345,7 +345,7 @@ class Recording(DrawsItself):
         return found
 
     def with_derived(self, channels: Iterable[str]) -> Recording:
-        """Return a recording with channels added that others and the rest length give."""
+        """Return a recording with channels added that can be derived by the rest length."""
         found: dict[str, Array] = {}
         for wanted in channels:
             if wanted not in self.channels and self.rest_length is not None:
@@ -375,7 +375,7 @@ class Recording(DrawsItself):
             raise DataError(
                 f"samples {start}:{stop} are not within 0:{self.n_samples}",
                 file=self.source,
-                remedy="cut inside the recording",
+                remedy="give a range inside the recording",
             )
         return replace(
             self,
@@ -384,7 +384,7 @@ class Recording(DrawsItself):
         )
 
     def continues(self, other: Recording) -> bool:
-        """Tell whether this recording begins one sample time after ``other`` ends."""
+        """Return whether this recording begins one sample time after ``other`` ends."""
         step = self.sample_time
         if step is None or other.sample_time is None:
             return False
@@ -397,7 +397,7 @@ def sample_time_of(
     purpose: str,
     remedy: str = "read it with a column of times, or give `rate`",
 ) -> float:
-    """Return the sample time of a recording, which it cannot be used without.
+    """Return the sample time of a recording; raise an error if it has none.
 
     Parameters
     ----------
@@ -427,7 +427,7 @@ def _frozen(name: str, samples: ArrayLike) -> Array:
         values = np.array(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise DataError(
-            f"these are no samples ({error})", channel=name, remedy="give real numbers"
+            f"the samples are not numbers ({error})", channel=name, remedy="give real numbers"
         ) from None
     if values.ndim != 1:
         raise DataError(
@@ -440,7 +440,7 @@ def _frozen(name: str, samples: ArrayLike) -> Array:
 
 
 def notes_by_file(recordings: Iterable[Recording]) -> dict[str, list[str]]:
-    """Return what was assumed or mended in every file that recordings come from, if anything was."""
+    """Return the reading notes of every file of recordings, if there are any."""
     found: dict[str, list[str]] = {}
     for recording in recordings:
         known = found.setdefault(recording.source or recording.name, [])
@@ -455,7 +455,7 @@ def reading_notes(recordings: Iterable[Recording]) -> tuple[str, ...]:
 
 
 def _grid(time: Array, step: float = 0.0, start: float = 0.0) -> tuple[float, float]:
-    """Return the sample time and the start of uniform times: those given, where they are exact."""
+    """Return sample time and start of uniform times: the given ones, if they are exact."""
     if step and np.array_equal(start + step * np.arange(time.size), time):
         return step, start
     steps = np.diff(time)
@@ -472,12 +472,12 @@ def _grid(time: Array, step: float = 0.0, start: float = 0.0) -> tuple[float, fl
 
 
 def is_frame(given: object) -> bool:
-    """Return whether something is a data frame."""
+    """Return whether an object is a data frame."""
     return hasattr(given, "columns") and hasattr(given, "to_numpy")
 
 
 def listed(recordings: Any) -> list[Recording]:
-    """Return recordings as a list, be it one; data frames as recordings.
+    """Return recordings as a list, also a single one; data frames as recordings.
 
     Raises
     ------

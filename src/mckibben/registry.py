@@ -1,4 +1,4 @@
-"""Every plug-in of the package, one line each: group, name, and where it lives.
+"""Registry of plug-ins, one line each: group, name, and location.
 
 A plug-in is imported when it is first asked for, never before. Packages outside this one join by
 entry points in the groups ``mckibben.blocks``, ``mckibben.estimators`` and so on.

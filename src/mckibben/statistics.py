@@ -1,4 +1,4 @@
-"""Residual statistics: what can be said of errors whose neighbours are alike.
+"""Statistics of autocorrelated residuals.
 
 Intervals and tests of time series count dependent samples by these functions. Pieces of a series
 (one per recording) are pooled, and nothing crosses from one into the next.
@@ -16,10 +16,10 @@ from mckibben.arrays import Array
 from mckibben.signals.checking import generator
 
 RESAMPLES = 1000
-"""Of a bootstrap."""
+"""Number of resamples of a bootstrap."""
 
 UNCORRELATED = 0.05
-"""Autocorrelation up to which samples count as independent."""
+"""Autocorrelation below which samples count as independent."""
 
 MOST_TERMS = 40
 """Largest order of an autoregression of residuals."""
@@ -98,7 +98,7 @@ class Autoregression:
         return np.asarray(self.innovation * solve_banded((0, len(bands) - 1), bands, slopes))
 
     def effective_sample_size(self, n: int) -> float:
-        """Return how many independent samples determine the mean as well as n of these."""
+        """Return the number of independent samples that determine the mean as well as n of these."""
         if self.variance <= 0:
             return float(n)
         return float(np.clip(n / max(self.long_run_variance / self.variance, 1e-12), 1.0, n))
@@ -135,7 +135,7 @@ def autoregression(series: Sequence[Array]) -> Autoregression:
 
 
 def hats(x: Array, n_knots: int) -> Array:
-    """Return piecewise-linear functions of samples (n,) between knots with as many samples between.
+    """Return piecewise-linear basis functions of samples (n,), with equal numbers between knots.
 
     Their sum is 1, shape (n, knots).
     """
@@ -144,7 +144,7 @@ def hats(x: Array, n_knots: int) -> Array:
 
 
 def dependence(columns: Array) -> Array:
-    """Return the share of the sum of squares of columns (n, k) that the others explain (R²), (k,)."""
+    """Return the R² of each column (n, k) regressed on the others, shape (k,)."""
     size = np.linalg.norm(columns, axis=0)
     scaled = columns / np.where(size > 0, size, 1.0)
     gram = scaled.T @ scaled + 1e-9 * np.eye(size.size)
@@ -166,7 +166,7 @@ def block_length(n: int, correlation: float = 1.0) -> int:
 
 
 class BlockBootstrap:
-    """Circular moving-block bootstrap: the same resamples for every model, so that they are paired.
+    """Circular moving-block bootstrap, with common resamples for all models (paired).
 
     Where there are few blocks, resamples are spread as Student's t is wider than a normal distribution.
 
@@ -219,13 +219,13 @@ class BlockBootstrap:
 
 
 def interval(samples: Array) -> tuple[float, float]:
-    """Return the central 95 % of resampled figures."""
+    """Return the central 95 % of resampled values."""
     low, high = np.quantile(samples, [0.025, 0.975])
     return float(low), float(high)
 
 
 def differences(samples: Array, values: Array, chosen: int) -> list[tuple[float, float]]:
-    """Return simultaneous 95 % intervals of the differences of figures to a chosen one.
+    """Return simultaneous 95 % intervals of the differences of values to a chosen one.
 
     Half widths are one multiple of each difference's standard deviation (single-step max-t).
 

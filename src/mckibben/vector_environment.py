@@ -1,9 +1,10 @@
 """Many copies of a muscled joint in MuJoCo, stepped together, to learn a controller on.
 
->>> from mckibben.vector_environment import JointTracking
->>> env = JointTracking("joint.xml", 128)  # from `mckibben export mjcf ... --example joint`
->>> observations, info = env.reset(seed=1)
->>> observations, rewards, terminated, truncated, info = env.step(env.action_space.sample())
+    from mckibben.vector_environment import JointTracking
+
+    env = JointTracking("joint.xml", 128)  # of `mckibben export mjcf ... --example joint`
+    observations, info = env.reset(seed=1)
+    observations, rewards, terminated, truncated, info = env.step(env.action_space.sample())
 
 The interface is that of `gymnasium.vector.VectorEnv` (Towers et al., "Gymnasium: A Standard Interface
 for Reinforcement Learning Environments").

@@ -1,4 +1,4 @@
-"""What a person does with the package: fit, study, track, invert, check, plan, review, export.
+"""Operations of users: fit, study, track, invert, check, plan, review, export.
 
 The command line, the workbench and Python call these. Each takes recordings, or files with some, and
 returns a result that has numbers as ``to_dict()``. Parameters that they have in common:
@@ -154,13 +154,13 @@ def _force_error(model: Block, runs: Sequence[Recording]) -> float:
 
 
 def _residuals(base: Block, estimator: Any, runs: list[Recording]) -> list[Recording]:
-    """Return recordings with the output less what a model gives."""
+    """Return recordings with a model's output subtracted."""
     from mckibben.estimators.force.multistate import extract_hysteresis
 
     names = [channel.name for channel in base.outputs]
     if names != [estimator.output]:
         raise ModelError(
-            f"the model gives {', '.join(names)}, and {estimator.output} is fitted",
+            f"the model gives {', '.join(names)}, but {estimator.output} is fitted",
             parameter="residual_of",
             remedy="name a model of the same output, or `output=NAME`",
         )
@@ -181,9 +181,9 @@ def compare(
 ) -> Leaderboard:
     """Fit models, choose by cross-validation, and test on data used for neither; all free-running.
 
-    Recordings in a folder with a ``protocol.json`` have their roles there; ``validation`` is what to
-    choose by, in place of cross-validation. An interrupted comparison returns what is finished; with
-    ``out``, the same call goes on from there.
+    Recordings in a folder with a ``protocol.json`` have the roles stated there; ``validation``
+    replaces cross-validation in the choice. An interrupted comparison returns the finished models;
+    with ``out``, the same call resumes it.
     """
     from mckibben.comparison.ranking import compare as rank
     from mckibben.report.results_folder import LEADERBOARD, write_leaderboard
@@ -252,7 +252,7 @@ def study(
 
 
 def _complete(results: Results) -> None:
-    """Swap the files of a comparison in, and remove its checkpoints."""
+    """Move the files of a comparison to their places, and remove its checkpoints."""
     from mckibben.checkpoints import Checkpoints
 
     results.commit()
@@ -260,7 +260,7 @@ def _complete(results: Results) -> None:
 
 
 def _standing(progress: Progress) -> Any:
-    """Return a progress callback that takes the standing of a comparison."""
+    """Return a progress callback for the progress of a comparison."""
     if not callable(progress):
         return progress
     return lambda standing: progress(standing.share, str(standing))
@@ -277,7 +277,7 @@ def _compared(
     force: bool,
     written: Callable[[Sequence[str]], Sequence[str]],
 ) -> Iterator[tuple[dict[str, Any], Results | None]]:
-    """Claim the files that a comparison will write, read its recordings, and return its arguments."""
+    """Claim the output files of a comparison, read its recordings, and return its arguments."""
     from mckibben.comparison.backends import on_cluster
     from mckibben.estimators.catalogue import settings_of_all
     from mckibben.files.sources import expanded
@@ -319,7 +319,7 @@ def track(
     progress: Progress = None,
     **given: Any,
 ) -> Tracking:
-    """Let a compensator, or a controller with it, follow a reference on a virtual rig or on a model.
+    """Track a reference with a compensator or a controller on a virtual rig or on a model.
 
     ``out`` is the recording of the run, ``controller_out`` the controller, for `export`.
     """
@@ -342,9 +342,9 @@ def track(
     if not any(drives(channel) or channel.name.startswith(COMMAND) for channel in block.outputs):
         gives = ", ".join(channel.name for channel in block.outputs)
         raise ModelError(
-            f"it gives {gives}, and a compensator gives pressures or commands",
+            f"its outputs are {gives}, but a compensator's are pressures or commands",
             parameter="compensator",
-            remedy="give what `invert()` makes of the model",
+            remedy="give the result of `invert()`",
         )
     (run, *_) = read_files(reference, None, reading)
     wanted = asked(plant, run, block)
@@ -394,7 +394,7 @@ def _half(tell: Tell | None, start: float) -> Callable[[float], None] | None:
 
 
 def _plant(chosen: TrackOptions, reading: ReadOptions | None) -> Any:
-    """Return what a loop is closed on: a rig, or a model as a twin of the user's muscle."""
+    """Return the plant of a loop: a rig, or a model as a twin of the user's muscle."""
     from mckibben.control import Twin
     from mckibben.rigs import Rig, load_rig
 
@@ -429,7 +429,7 @@ def invert(
     progress: Progress = None,
     **given: Any,
 ) -> Inverse:
-    """Return the compensator of a model: desired output in, input out; or its estimate of force."""
+    """Return the compensator of a model, from desired output to input; or its force estimator."""
     chosen, reading = _chosen(InvertOptions, options, reading, given)
     chosen.check()
     file = _claim(out, _paths(model, chosen.learned), force)
@@ -484,7 +484,7 @@ def check(
     progress: Progress = None,
     **given: Any,
 ) -> Validation:
-    """Test whether a model is right on recordings, and what it misses; see `mckibben.diagnosis.check`.
+    """Check a model on recordings, and its residuals' causes; see `mckibben.diagnosis.check`.
 
     With ``out``, a folder, ``validation.json`` and ``report.html`` are written.
     """
@@ -518,7 +518,7 @@ def plan(
     force: bool = False,
     **given: Any,
 ) -> Plan:
-    """Return what to record next: random motion within limits, and what closes data gaps.
+    """Return a plan of the next recording: random motion within limits, and runs that close data gaps.
 
     With ``out``, its commands are written as a recording.
     """
@@ -547,7 +547,7 @@ def review(
     reading: ReadOptions | None = None,
     **given: Any,
 ) -> Review:
-    """Return how a logged loop followed its reference, and why no better; see `diagnosis.review`.
+    """Return the review of a loop's log: tracking error and its causes; see `diagnosis.review`.
 
     The log has a reference, such as ``reference_displacement``; one of model and compensator is enough.
     """
@@ -649,13 +649,15 @@ def _contents(path: Path) -> list[str]:
 
 
 def _serving(chosen: COptions) -> Any:
-    """Return how exported code is served over a serial line, where it is."""
+    """Return the settings of the serial server of exported code, if it has one."""
     from mckibben.export.c.serving import Serving
 
     if not chosen.link:
         for name in ("limits", "safe", "watchdog"):
             if getattr(chosen, name):
-                raise ModelError("it is of served code", parameter=name, remedy="add `link`")
+                raise ModelError(
+                    "it applies to code with a serial link", parameter=name, remedy="add `link`"
+                )
         return None
     watchdog = 0.5 if chosen.watchdog is None else chosen.watchdog
     return Serving(chosen.limits, chosen.safe, watchdog)
@@ -676,7 +678,7 @@ def _chosen(
 
 
 def saved(model: Any, settings: Mapping[str, Any] | None = None) -> Any:
-    """Return a model, also of a file or of `fit` or `invert`, with some of its fields set."""
+    """Return a model, also from a file or a result of `fit` or `invert`, with some fields set."""
     from mckibben.blocks.saving import load
     from mckibben.blocks.setting import with_fields
 
@@ -688,7 +690,7 @@ def saved(model: Any, settings: Mapping[str, Any] | None = None) -> Any:
 
 
 def _paths(*given: Any) -> list[Path]:
-    """Return the files among what is given, in lists too."""
+    """Return the files among arguments, also in lists."""
     found: list[Path] = []
     for one in given:
         if isinstance(one, str | Path):
@@ -701,7 +703,7 @@ def _paths(*given: Any) -> list[Path]:
 def _claim(
     out: str | Path | None, read: Sequence[Path], force: bool, *, recording: bool = False
 ) -> Path | None:
-    """Refuse to write over what is read or the user's, before any work; return the path."""
+    """Raise an error for a path that is an input or a user's file, before any work; return the path."""
     from mckibben.outputs import claim, claim_recording
 
     if out is None:

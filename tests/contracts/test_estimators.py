@@ -135,7 +135,7 @@ def test_what_is_fixed_is_no_parameter_and_all_else_follows_the_data(name: str, 
     still = np.all([pack == first for pack in same], axis=0)
     fixed = list(fits[0].fixed(fits[0].model_))
     at_bounds = list(fits[0].diagnostics_.at_bounds)
-    assert fits[0].diagnostics_.n_free == first.size - len(fixed) + fits[0].n_beside
+    assert fits[0].diagnostics_.n_free == first.size - len(fixed) + fits[0].n_further
     if len(same) > 1:
         free = np.delete(np.arange(first.size), fixed + at_bounds)
         names = {fits[0].model_.parameter_names[k] for k in free[still[free]]}

@@ -1,1 +1,1 @@
-"""What runs: immutable parameter sets with dynamics, one file per model family."""
+"""Blocks: immutable parameter sets with dynamics, one file per model family."""

@@ -1,4 +1,4 @@
-"""An inverse that learns from what is measured, and stays exact.
+"""Adaptive inverses, which estimate parameters from measurements and remain exact.
 
 Inputs are those of the inverse, then what is measured of the references; outputs are the inverse's. With
 every measured sample the parameters of the model follow, see `mckibben.blocks.learning`; the
@@ -66,27 +66,28 @@ from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError, require
 
 TRUSTED = 1 / 3
-"""Standard deviations of the fitted parameters at the start, by those of changes to be expected."""
+"""Initial standard deviations of the fitted parameters, relative to those of the expected changes.
+"""
 
 TIMES = 1e-3, 1e9
-"""Shortest and longest time to learn in [s]."""
+"""Shortest and longest adaptation time [s]."""
 NOISES = 1e-9, 1e3
-"""Least and most noise, by the width of what is reached."""
+"""Smallest and largest noise, relative to the reachable range."""
 
 FARTHEST = 1e6
-"""Scales, and variances expected, that no parameter goes beyond."""
+"""Bounds of scales and variances of all parameters."""
 MOST = 1e12
-"""Beyond what memory of an inverse is, and samples are counted."""
+"""Bound of the inverse's state and of sample counts."""
 
 FALSE_ALARMS = 1e-3
-"""An hour, where nothing drifts."""
+"""Expected false alarms per hour without drift."""
 FIT_ERROR = 0.01
-"""Standard error of a fit itself, of every group."""
+"""Assumed standard error of the fit itself, by group."""
 
 
 @plain_dataclass(frozen=True)
 class Drift:
-    """What has changed since the fit, by groups of parameters.
+    """Changes of the model since the fit, by groups of parameters.
 
     Parameters
     ----------
@@ -114,12 +115,12 @@ class Drift:
 
     @property
     def alarms(self) -> tuple[bool, ...]:
-        """Whether a group has changed by more than chance."""
+        """Whether the change of each group is significant."""
         return tuple(abs(size) > self.limit for size in self.by_errors)
 
     @property
     def alarm(self) -> bool:
-        """Whether any has."""
+        """Whether any change is significant."""
         return any(self.alarms)
 
     def __str__(self) -> str:
@@ -134,12 +135,12 @@ class Drift:
                 same.append(group.name)
         if not changed:
             return f"{' and '.join(same)} unchanged since the day of the fit"
-        told = f"{', '.join(changed)} than on the day of the fit"
-        return f"{told}; {', '.join(same)} unchanged" if same else told
+        text = f"{', '.join(changed)} than on the day of the fit"
+        return f"{text}; {', '.join(same)} unchanged" if same else text
 
 
 def alarm_limit(time: float, n_groups: int, rate: float = FALSE_ALARMS) -> float:
-    """Return the standard errors at which alarms are false at a rate [1/h].
+    """Return the threshold, in standard errors, for a rate of false alarms [1/h].
 
     Looks are independent of each other after the ``time`` to learn in [s].
     """
@@ -148,14 +149,14 @@ def alarm_limit(time: float, n_groups: int, rate: float = FALSE_ALARMS) -> float
 
 
 def learnable_of(block: Block) -> Learnable | None:
-    """Return what is learnt while a block is undone, as it or its inverse declares; None if nothing."""
+    """Return the adaptive parameters of a block, as it or its inverse declares; None if it has none."""
     inner = block.forward if isinstance(block, Inverse) else block
     found = inner.learnable if isinstance(inner, Invertible) else None
     return found if found and found.compensates == isinstance(block, Inverse) else None
 
 
 def learning_part(model: Block) -> tuple[tuple[Block, ...], Block, tuple[Block, ...]]:
-    """Return what of a model is before the one part that learns, that part, and what is behind it.
+    """Return the parts of a model before its adaptive part, that part, and the parts after it.
 
     Raises
     ------
@@ -166,14 +167,14 @@ def learning_part(model: Block) -> tuple[tuple[Block, ...], Block, tuple[Block, 
     places = [k for k, part in enumerate(parts) if learnable_of(part) is not None]
     if len(places) != 1:
         raise ModelError(
-            f"{len(places)} parts of {model.title!r} can learn while it runs",
-            remedy="adapt a pi, gpi, mpi, cpi or balance model, of one part that learns",
+            f"{len(places)} parts of {model.title!r} can adapt",
+            remedy="adapt a pi, gpi, mpi, cpi or balance model with one adaptive part",
         )
     return parts[: places[0]], parts[places[0]], parts[places[0] + 1 :]
 
 
 def width_of(parts: Sequence[Block]) -> float:
-    """Return the widest range that a part reaches, or else was fitted on, behind other parts."""
+    """Return the largest output range of a part, or its fitted range, after other parts."""
     low, high = parts[0].reachable()
     learnable = learnable_of(parts[0])
     if learnable and learnable.known is not None and not np.isfinite([*low, *high]).all():
@@ -185,7 +186,7 @@ def width_of(parts: Sequence[Block]) -> float:
 
 @step
 def prompt_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Correct a measurement; the state is past references, latest first."""
+    """Correct a measurement for dead time; the state is past references, latest first."""
     late = int(coefficients[0])
     outputs[0] = inputs[1] + state[0] - state[late]
     remember(inputs[0], state[: late + 1])
@@ -193,13 +194,13 @@ def prompt_step(coefficients: Array, state: Array, inputs: Array, outputs: Array
 
 @kernel
 def prompt_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start as if the first reference had been there all along."""
+    """Start as if the first reference had always been applied."""
     state[:] = inputs[0]
 
 
 @dataclass(frozen=True, config=STRICT)
 class Prompt(Block):
-    """What is measured, as if it came at once: moved on as the reference has since.
+    """Correction of measurements for dead time: shifted by the reference's change meanwhile.
 
     Parameters
     ----------
@@ -226,7 +227,7 @@ class Prompt(Block):
     measured: ChannelField
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the dead time in samples, but the one for which a command was held."""
+        """Return the dead time in samples, less the one of the sample hold."""
         late = round(self.late / needs_sample_time(self.kind, sample_time)) - 1
         return np.array([float(min(max(late, 0), LONGEST_DELAY))])
 
@@ -237,7 +238,7 @@ class Prompt(Block):
 
 @dataclass(frozen=True, config=STRICT)
 class Adaptive(Block):
-    """The inverse of a block, which learns the block's linear parameters while it runs.
+    """Inverse of a block that adapts the block's linear parameters while it runs.
 
     Parameters
     ----------
@@ -247,7 +248,8 @@ class Adaptive(Block):
     time : float
         How long it takes to learn what the motion shows [s]; positive.
     noise : float
-        Standard deviation of what is measured [unit of the output]; errors below are not told apart.
+        Standard deviation of what is measured [unit of the output]; smaller errors are not
+        distinguished.
     memory : sequence of float, optional
         State to go on from, or what is learnt of it, as `resumed` keeps it; default is to start from
         the fit.
@@ -282,7 +284,7 @@ class Adaptive(Block):
             self._check_memory(np.array(self.memory))
 
     def _check_settings(self) -> None:
-        """Refuse a time and a noise that nothing is measured with."""
+        """Raise an error for an invalid adaptation time or noise."""
         shortest, longest = TIMES
         wanted = f"{shortest:g} to {longest:g} s"
         require(shortest <= self.time <= longest, "time", self.time, wanted)
@@ -293,7 +295,7 @@ class Adaptive(Block):
         require(low <= self.noise <= high, "noise", self.noise, wanted)
 
     def _check_memory(self, state: Array) -> None:
-        """Refuse a state, or what is learnt of one, that learning never comes to."""
+        """Raise an error for a state that adaptation cannot have reached."""
         if self.parts and len(state) == self.n_states:
             for part, share in self.shares(state):
                 if part is self.core:
@@ -320,7 +322,7 @@ class Adaptive(Block):
         for name, found in wrong.items():
             if found:
                 raise ModelError(
-                    f"the {name} in the memory of {self.kind!r} cannot have come from running it",
+                    f"the {name} in the memory of {self.kind!r} cannot result from running it",
                     remedy="save the model afresh, or resume what was saved unchanged",
                 )
         for parameters in (theta, used):
@@ -333,7 +335,7 @@ class Adaptive(Block):
 
     @cached_property
     def core(self) -> Adaptive:
-        """What learns: this itself, or a part of a series, its noise by the mean slope behind it."""
+        """The adaptive core: this block, or a part of a series with the noise scaled by later parts."""
         if not isinstance(self.forward, Series):
             return self
         _, part, behind = learning_part(self.forward)
@@ -344,14 +346,14 @@ class Adaptive(Block):
 
     @cached_property
     def _around(self) -> tuple[Block | None, Block | None]:
-        """What undoes the parts behind the one that learns, and those before it, where there are any."""
+        """Return the inverses of the parts after the core, and of those before it."""
         before, _, behind = learning_part(self.forward)
         undo_behind = Series(behind).inverse() if behind else None
         return undo_behind, Series(before).inverse() if before else None
 
     @cached_property
     def parts(self) -> tuple[Block, ...]:
-        """Of a series: dead times, parts behind undone on both sides, the core, those before."""
+        """Parts in a series: dead-time corrections, inverses of later parts, core, of earlier parts."""
         if self.core is self:
             return ()
         behind, before = self._around
@@ -360,21 +362,21 @@ class Adaptive(Block):
 
     @cached_property
     def _prompt(self) -> tuple[Prompt, ...]:
-        """What makes up for a dead time, of every measurement."""
+        """Return the dead-time correction of every measurement."""
         late = self.forward.dead_time
         pairs = zip(self.forward.outputs, self.measured, strict=True)
         return tuple(Prompt(late, *pair) for pair in pairs) if late > 0 else ()
 
     @cached_property
     def learnable(self) -> Learnable:
-        """What is learnt."""
+        """The adaptive parameters."""
         found = learnable_of(self.core.forward)
         assert found is not None
         return found
 
     @cached_property
     def fixed(self) -> Block:
-        """The inverse that does not learn."""
+        """The inverse without adaptation."""
         return self.forward.inverse()
 
     @property
@@ -384,22 +386,22 @@ class Adaptive(Block):
 
     @property
     def measured(self) -> tuple[Channel, ...]:
-        """What is measured of the references."""
+        """Measured channels of the references."""
         return tuple(Channel(f"{c.name}{MEASURED}", c.unit) for c in self.forward.outputs)
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
-        """References, what schedules the forward block, measurements."""
+        """References, scheduling inputs of the forward block, and measurements."""
         return (*self.fixed.inputs, *self.measured)
 
     @property
     def scheduling(self) -> tuple[str, ...]:
-        """What schedules the forward block, and measurements."""
+        """Scheduling inputs of the forward block, and measurements."""
         return (*self.forward.scheduling, *(channel.name for channel in self.measured))
 
     @property
     def n_missable(self) -> int:
-        """Measurements: the inverse goes on without, where nothing behind remembers them."""
+        """Number of measurements that may be missing, if later parts have no memory."""
         behind = self._around[0]
         return len(self.measured) if behind is None or behind.n_states == 0 else 0
 
@@ -407,20 +409,20 @@ class Adaptive(Block):
 
     @cached_property
     def n_learnt(self) -> int:
-        """Numbers of the state that are learnt: theta, used, root, senses."""
+        """Number of adaptive states: theta, used, root, senses."""
         p = self.learnable.fitted.size
         return 2 * p + (p * (p + 1)) // 2 + SENSES * len(self.core.forward.outputs)
 
     @property
     def n_states(self) -> int:
-        """The inverse's, what more learning wants of the last sample, and what is learnt."""
+        """States of the inverse, auxiliary states of the last sample, and adaptive states."""
         if self.parts:
             return super().n_states
         return self.fixed.n_states + self.learnable.n_more_states + self.n_learnt
 
     @property
     def n_scratch(self) -> int:
-        """Three numbers a parameter, what more the family wants, and those of the inverse."""
+        """Scratch: three numbers per parameter, that of the family, and that of the inverse."""
         if self.parts:
             return super().n_scratch
         more = self.learnable.n_more_scratch + self.fixed.n_scratch
@@ -428,13 +430,13 @@ class Adaptive(Block):
 
     @property
     def start(self) -> Initial:
-        """Memory to go on from, or the forward block's start; of a series, every part's own."""
+        """Saved state to resume from, or the forward block's start; for a series, each part's own."""
         if self.parts and (self.memory is None or len(self.memory) == self.n_learnt):
             return "first_sample"
         return self.forward.start if self.memory is None else self.memory
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the state before the first sample: the inverse's, and parameters as fitted.
+        """Return the initial state: that of the inverse, with the fitted parameters.
 
         An explicit state may be this block's own or, but of a series, the inverse's or the forward
         block's.
@@ -461,14 +463,14 @@ class Adaptive(Block):
         return next((own for part, own in self.shares(state) if part is self.core), state)
 
     def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Return what is not learnt of a state of the core, theta, used, root and senses, as views."""
+        """Return views of a state of the core: inverse state, theta, used, root and senses."""
         p = self.learnable.fitted.size
         sizes = [len(state) - self.n_learnt, p, p, (p * (p + 1)) // 2]
         own, theta, used, root, senses = np.split(state, np.cumsum(sizes))
         return own, theta, used, root, senses
 
     def resumed(self, state: Array, memory: bool = True) -> Self:
-        """Return this block, which goes on from a state when it is next started.
+        """Return this block with a given state as its initial state.
 
         Without ``memory`` of its hysteresis it keeps what is learnt alone: muscles were vented since.
         """
@@ -491,7 +493,7 @@ class Adaptive(Block):
         return None if self.parts else self.learnable.start
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what `mckibben.blocks.learning.family_at` names."""
+        """Return the coefficients described in `mckibben.blocks.learning.family_at`."""
         if self.parts:
             return super().coefficients(sample_time)
         step, learnable = needs_sample_time(self.kind, sample_time), self.learnable
@@ -508,7 +510,7 @@ class Adaptive(Block):
         )
 
     def cost(self, sample_time: float | None) -> Cost:
-        """Return that of the inverse, and three operations a number of the covariance."""
+        """Return the cost of the inverse, plus three operations per number of the covariance."""
         p = self.learnable.fitted.size
         learnt = 6 * p * p + 20 * p
         return self.fixed.cost(sample_time) + Cost(learnt, learnt)
@@ -518,7 +520,7 @@ class Adaptive(Block):
         return run(sample_time, state, inputs, outputs)
 
     def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
-        """Lay out the parts; those behind the core twice."""
+        """Lay out the parts; those after the core twice."""
         if not self.parts:
             return super().wired(board, taken)
         behind, before = self._around
@@ -553,13 +555,13 @@ class Adaptive(Block):
     # -- what is learnt ----------------------------------------------------------------------
 
     def present(self, state: Array) -> Block:
-        """Return the forward block that the inverse runs with in a state, shape (n_states,)."""
+        """Return the forward block with the parameters of a state, shape (n_states,)."""
         found = self.learnable.with_parameters(self._split(self._core_state(state))[2])
         before, _, behind = learning_part(self.forward)
         return Series((*before, found, *behind)) if isinstance(self.forward, Series) else found
 
     def drift(self, state: Array) -> Drift:
-        """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
+        """Return the change of the parameters since the fit, from a state, shape (n_states,)."""
         learnable, groups = self.learnable, self.learnable.groups
         limit = alarm_limit(self.time, len(groups))
         _, theta, _, root, senses = self._split(self._core_state(state))
@@ -577,7 +579,7 @@ class Adaptive(Block):
         return Drift(groups, vector(there), vector(errors), limit)
 
     def equations(self) -> tuple[str, ...]:
-        """Return what is undone, and how parameters follow."""
+        """Return the equations of the inverse and of the parameter update."""
         return (
             r"\hat{u}_t = P_{\theta_t}^{-1}[y]_t",
             r"\theta_t = \Pi\left(\theta_{t-1} + \frac{C \varphi}{1 + \varphi^T C \varphi}\, e_t"
@@ -592,12 +594,12 @@ class Adaptive(Block):
 
 
 def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive:
-    """Return the inverse of a model that learns while it runs.
+    """Return the adaptive inverse of a model.
 
     Parameters
     ----------
     model : Block
-        Of one part that can learn: pi, gpi, mpi, cpi, balance.
+        One with a single adaptive part: pi, gpi, mpi, cpi, balance.
     time : float
         How long it takes to learn what the motion shows [s].
     noise : float, optional
@@ -607,7 +609,7 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive:
     Raises
     ------
     ModelError
-        If nothing of the model can learn, or it has no inverse.
+        If no part of the model can adapt, or it has no inverse.
     """
     if isinstance(model, Adaptive):
         raise ModelError(

@@ -1,4 +1,4 @@
-"""Bands: how far off a model may be, and models that come with one.
+"""Prediction bands of model outputs, and models with a band.
 
     lower = y - q (1 + k |dy/dt|),   upper = y + q (1 + k |dy/dt|),
 
@@ -31,7 +31,7 @@ from mckibben.registry import load
 
 @step
 def band_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Give, for every modelled output, its value, its lower and its upper end.
+    """Return, for every modelled output, its value and the lower and upper end of its band.
 
     Coefficients are the half widths at rest, then how much each grows by a change from sample to sample.
     The state is the last outputs, then whether there were any.
@@ -50,13 +50,13 @@ def band_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) 
 
 @kernel
 def band_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start at rest: no output was before the first."""
+    """Start at rest, without a previous output."""
     state[:] = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)
 class Band(Block):
-    """From a model's outputs to these with their lower and upper ends.
+    """Band: from a model's outputs to the outputs with lower and upper ends.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class Band(Block):
 
     @property
     def outputs(self) -> tuple[Channel, ...]:
-        """Of every output of the model, itself, then its lower and its upper end."""
+        """For every output of the model: the output, its lower and its upper end."""
         return tuple(
             Channel(f"{channel.name}{end}", channel.unit)
             for channel in self.given
@@ -155,7 +155,7 @@ class Band(Block):
 
 
 def check_level(level: float, units: int, unit: str) -> None:
-    """Refuse a level that is none, or that so few exchangeable units do not allow.
+    """Raise an error for an invalid level, or one that the number of exchangeable units does not allow.
 
     A new one is as likely as each of them to be missed most, and nothing bounds by how much.
     """
@@ -164,14 +164,14 @@ def check_level(level: float, units: int, unit: str) -> None:
         most, needed = 100 * units / (units + 1), int(np.ceil(level / (1.0 - level) - 1e-9))
         raise ModelError(
             f"a band calibrated on {units} {unit}(s) holds at most {numeral(most, 3)} %, "
-            f"and {numeral(100 * level, 4)} % are asked for",
-            remedy=f"ask for less, or calibrate on at least {needed} {unit}s",
+            f"and {numeral(100 * level, 4)} % are requested",
+            remedy=f"request less, or calibrate on at least {needed} {unit}s",
         )
 
 
 @dataclass(frozen=True, config=STRICT)
 class Banded(Composition):
-    """A model whose every output comes with a lower and an upper end.
+    """A model whose outputs have lower and upper ends.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ class Banded(Composition):
         return (self.forward, self.band)
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the model's state, then that of a motion that begins at rest.
+        """Return the model's initial state, and that of the band at rest.
 
         An explicit state may be this block's own, or the model's.
         """
@@ -247,5 +247,5 @@ class Banded(Composition):
 
 
 def inside(model: Block) -> Block:
-    """Return the model of one with a band; any other as it is."""
+    """Return the model without its band; other blocks unchanged."""
     return model.forward if isinstance(model, Banded) else model

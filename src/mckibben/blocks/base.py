@@ -1,4 +1,4 @@
-"""What a block is: an immutable parameter set with dynamics.
+"""Base class of blocks: immutable parameter sets with dynamics.
 
 A block is one compiled kernel with its coefficients, or composes other blocks. Both kinds *bind*: given
 state, input and output arrays they return a function without arguments that runs them, and everything
@@ -39,23 +39,23 @@ Run = Callable[[], None]
 Start = Callable[..., None]
 
 VIRGIN = {"first_sample": False, "fitted": False, "virgin": True}
-"""Named starts, and whether a start kernel takes them as if nothing had happened before.
-
-"fitted" is "first_sample" where no outputs are known, see `mckibben.blocks.dynamics.starts`."""
+"""Named start states, and whether a start kernel computes them without past inputs. "fitted" is
+"first_sample" where no outputs are known, see `mckibben.blocks.dynamics.starts`.
+"""
 
 SHORT = Repr()
 SHORT.maxother = 100  # characters of a part in the `repr` of a block
 
 Ports = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
-"""Names of fields of channels: driven, scheduling, and given."""
+"""Names of the channel fields: driven, scheduling and output channels."""
 
 SEVERAL: Ports = ("driven",), ("scheduled",), ("given",)
-"""Of blocks of several channels."""
+"""Channel fields of blocks with several channels."""
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Arithmetic operations of a step, roughly: usual and at worst."""
+    """Approximate number of arithmetic operations of a step: typical and maximum."""
 
     usual: int
     worst: int
@@ -65,7 +65,7 @@ class Cost:
 
     @classmethod
     def of(cls, numbers: Array, n_states: int) -> Cost:
-        """Return the cost of one pass: about two operations a number, four a state."""
+        """Return the cost of one pass: about two operations per coefficient, four per state."""
         operations = 2 * numbers.size + 4 * n_states
         return cls(operations, operations)
 
@@ -73,21 +73,22 @@ class Cost:
 class Block(DrawsItself, Parametrised):
     """An immutable parameter set with dynamics.
 
-    Concrete blocks are frozen dataclasses, registered under `kind`. They know nothing of data or
-    fitting.
+    Concrete blocks are frozen dataclasses, registered under `kind`. They are independent of data
+    and fitting.
     """
 
     face: ClassVar[str] = "block"
 
     kernel: ClassVar[Step]
-    """Advances one sample, ``kernel(coefficients, state, inputs, outputs)``. One with a parameter
-    ``scratch`` behind the state is given `n_scratch` numbers to compute in."""
+    """Advances one sample, ``kernel(coefficients, state, inputs, outputs)``. A kernel with a
+    parameter ``scratch`` after the state receives `n_scratch` numbers of working memory.
+    """
 
     start_kernel: ClassVar[Start | None] = None
     """Fills the state, ``start_kernel(coefficients, state, first inputs, virgin)``, by a named rule."""
 
     ports: ClassVar[Ports] = ("input",), (), ("output",)
-    """Fields of the channels driven, of those that schedule, and of those given."""
+    """Fields of the driven channels, the scheduling channels and the outputs."""
 
     layout: ClassVar[tuple[str, ...]] = ()
     """Attributes whose numbers the kernel reads, in order; its parameters where none are named."""
@@ -96,52 +97,55 @@ class Block(DrawsItself, Parametrised):
     """Arguments of `example`."""
 
     rate_dependent: ClassVar[bool] = False
-    """Whether the sample time matters to any block of this class."""
+    """Whether the response of blocks of this class depends on the sample time."""
 
     path_dependent: ClassVar[bool] = False
-    """Whether it matters how an input goes from one turning point to the next, as where several
-    muscles find their equilibrium together."""
+    """Whether the path of an input between two turning points matters, as for coupled muscles in
+    equilibrium.
+    """
 
     of_local_rules: ClassVar[bool] = False
-    """Whether it is made of rules that each know a part of the inputs' joint range, so that nothing says
-    what it gives where none was shown any data."""
+    """Whether the model is a set of local rules, whose output is arbitrary in regions of the joint
+    input range without data.
+    """
 
     undoing: ClassVar[bool] = False
-    """Whether blocks of this class undo another, which `forward_model` gives."""
+    """Whether blocks of this class invert another block, see `forward_model`."""
 
     no_inverse: ClassVar[str] = "has no exact inverse"
-    """Why it cannot be undone, if it cannot: behind its kind, as an error."""
+    """Why there is no inverse, if there is none; in the error it follows the kind."""
 
     instead: ClassVar[str] = "invert a hysteresis model (pi, gpi, mpi, cpi)"
-    """What to do then: the remedy of that error."""
+    """The remedy of that error."""
 
     increasing: ClassVar[tuple[str, ...]] = ()
-    """Fields of numbers in increasing order, which single precision must not make one."""
+    """Fields that must be strictly increasing, also after rounding to single precision."""
 
     filters: ClassVar[bool] = False
-    """Whether it is linear with poles of its own, which may be too slow for single precision."""
+    """Whether the block is a linear filter, whose poles may be too slow for single precision."""
 
     settable: ClassVar[Mapping[str, str | None]] = {}
-    """Fields that are not identified and can be set on a saved model: each with the field that has the
-    lowest and highest value it was identified at, or None; see `mckibben.blocks.setting`."""
+    """Fields that are not identified and can be set on a saved model: each with the field of the
+    lowest and highest value in its identification, or None; see `mckibben.blocks.setting`.
+    """
 
     sample_time: float | None = None
-    """Time between samples that a discrete block is bound to [s]; None for any."""
+    """Sample time of a discrete block [s]; None if it has no fixed one."""
 
     samples_ahead: int = 0
-    """By how many samples it wants references before they are due, to plan with."""
+    """Preview of the reference that the block needs [samples]."""
 
     dead_time: float = 0.0
-    """By how long outputs come late, which its inverse leaves as it is [s]."""
+    """Delay of the outputs [s], which the inverse does not compensate."""
 
     @property
     def title(self) -> str:
-        """What the block is called among blocks: its kind, and of an inverse, of what."""
+        """Title of the block: its kind, and for an inverse also the kind of the inverted block."""
         return self.kind
 
     @property
     def needs_double(self) -> str:
-        """Why single precision will not do, as part of a sentence; empty where it does."""
+        """Why double precision is needed, as part of a sentence; empty if single precision suffices."""
         return ""
 
     # -- channels ----------------------------------------------------------------------------
@@ -151,7 +155,7 @@ class Block(DrawsItself, Parametrised):
         cls.__repr__ = Block.__repr__  # type: ignore[method-assign]  # not the long one of dataclasses
 
     def __repr__(self) -> str:
-        """Return the class and what is not at its default, cut to three lines of a terminal."""
+        """Return the class and all non-default fields, truncated to three lines."""
         values = [(f, getattr(self, f.name)) for f in dataclasses.fields(self)]  # type: ignore[arg-type]
         changed = [f"{f.name}={SHORT.repr(value)}" for f, value in values if value != f.default]
         return shorten(f"{type(self).__name__}({', '.join(changed)})", 240, placeholder=" ...)")
@@ -164,12 +168,12 @@ class Block(DrawsItself, Parametrised):
 
     @property
     def scheduling(self) -> tuple[str, ...]:
-        """Names of the inputs that schedule the block but are not driven through it."""
+        """Names of the scheduling inputs."""
         return tuple(channel.name for channel in self._channels(*self.ports[1]))
 
     @property
     def n_driven(self) -> int:
-        """How many inputs, the first ones, are driven through the block."""
+        """Number of driven inputs; these come first."""
         return len(self.inputs) - len(self.scheduling)
 
     @property
@@ -185,45 +189,45 @@ class Block(DrawsItself, Parametrised):
         return tuple(found)
 
     def check_channels(self) -> None:
-        """Refuse names that repeat, or no channels at all."""
+        """Raise an error for repeated channel names, or no channels."""
         for channels in (self.inputs, self.outputs):
             names = [channel.name for channel in channels]
             if not names or len(set(names)) < len(names):
                 raise ModelError(
                     f"channels of {self.kind!r} are: {', '.join(names) or 'none'}",
-                    remedy="give each a name of its own",
+                    remedy="give each a different name",
                 )
 
     @property
     def input_limits(self) -> tuple[float, float]:
-        """Lowest and highest input; infinite where the block has no field ``input_range``."""
+        """Lowest and highest input; infinite if the block has no field ``input_range``."""
         ends: tuple[float, float] | None = getattr(self, "input_range", None)
         return (-np.inf, np.inf) if ends is None else ends
 
     @property
     def n_missable(self) -> int:
-        """How many of the last inputs may be absent: NaN, in a stream, in C, and in arrays."""
+        """Number of trailing inputs that may be missing (NaN), in streams, C and arrays."""
         return 0
 
     # -- memory ------------------------------------------------------------------------------
 
     @property
     def n_states(self) -> int:
-        """Length of the state vector: of all parts, one after another."""
+        """Length of the state vector, over all parts."""
         return sum(part.n_states for part in getattr(self, "parts", ()))
 
     @property
     def n_fitted(self) -> int:
-        """How many states, the first ones, are solved for where its `initial` is "fitted"."""
+        """Number of leading states that are estimated if `initial` is "fitted"."""
         return 0
 
     @property
     def n_scratch(self) -> int:
-        """How many numbers a step computes in beside the state, for code that cannot allocate."""
+        """Length of the working memory of a step, for code that cannot allocate."""
         return sum(part.n_scratch for part in getattr(self, "parts", ()))
 
     def shares(self, state: Array) -> list[tuple[Any, Array]]:
-        """Return every part with its own of a state, as a view; nothing where there are no parts."""
+        """Return every part with its slice of a state, as a view; empty without parts."""
         shares = []
         for part in getattr(self, "parts", ()):
             own, state = np.split(state, [part.n_states])
@@ -232,7 +236,7 @@ class Block(DrawsItself, Parametrised):
 
     @property
     def start(self) -> Initial:
-        """Memory before the first sample that is used where none is given."""
+        """Default start state."""
         return getattr(self, "initial", "first_sample")
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
@@ -258,21 +262,21 @@ class Block(DrawsItself, Parametrised):
         return state
 
     def start_numbers(self) -> Array:
-        """Return the coefficients as starts read them, which no sample time changes."""
+        """Return the coefficients for start kernels, which do not depend on the sample time."""
         return self.coefficients(self.sample_time or 1.0)
 
     def state_at(self, first: Array, output: Array) -> Array | None:
-        """Return the state at rest at a first input and output; None where outputs are no part of it."""
+        """Return the equilibrium state for a first input and output; None if outputs do not matter."""
         return None
 
     def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
-        """Return the start to use on a recording, which some rules look at; by default as given."""
+        """Return the start to use on a recording; by default unchanged."""
         return initial
 
     # -- its kernel --------------------------------------------------------------------------
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the numbers that the kernel reads, one-dimensional; by default those of `layout`.
+        """Return the coefficients of the kernel, one-dimensional; by default those of `layout`.
 
         Raises
         ------
@@ -299,39 +303,39 @@ class Block(DrawsItself, Parametrised):
 
     @property
     def c_kernels(self) -> tuple[Callable[..., Any], ...]:
-        """Kernels of a step, and of the start if it has memory, which C is translated from."""
+        """Step and start kernels for translation to C."""
         step, start = getattr(self, "kernel", None), self.start_kernel
         if step is None or (self.n_states and start is None):
             return ()
         return (step, start) if self.n_states and start is not None else (step,)
 
     def cost(self, sample_time: float | None) -> Cost:
-        """Return what a step costs."""
+        """Return the cost of a step."""
         return Cost.of(self.coefficients(sample_time), self.n_states)
 
     def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Give the name and the numbers of every field that is `increasing`."""
+        """Yield name and values of every `increasing` field."""
         for name in self.increasing:
             yield name, getattr(self, name)
 
     def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
-        """Lay the block out on a board, run on signals, and return those that it gives."""
+        """Add the block to a layout of signals, and return its output signals."""
         return board.call(self, taken)
 
     def inverse(self) -> Block:
-        """Return the block that undoes this one; a `ModelError` says why there is none."""
+        """Return the inverse of this block; raise a `ModelError` if there is none."""
         raise ModelError(f"{self.kind!r} {self.no_inverse}", remedy=self.instead)
 
     @property
     def forward_model(self) -> Block | None:
-        """Of a compensator, the model that it undoes; None where it undoes none, as feedback alone."""
+        """The model that a compensator inverts; None if it inverts none, such as feedback alone."""
         try:
             return self.inverse()
         except ModelError:
             return None
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the lowest and highest outputs that can be reached whatever happened before.
+        """Return the lowest and highest outputs that are reachable from every state.
 
         Each has shape (n_outputs,); by default they are infinite.
         """
@@ -339,7 +343,7 @@ class Block(DrawsItself, Parametrised):
         return np.full(n, -np.inf), np.full(n, np.inf)
 
     def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return the outputs that can be reached where the inputs between two ends can be.
+        """Return the output range for an input range.
 
         A block without memory must be monotone; one with memory answers with its own `reachable`.
         """
@@ -351,7 +355,7 @@ class Block(DrawsItself, Parametrised):
     # -- linear blocks -----------------------------------------------------------------------
 
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return a linear block as a state-space system; its state is 0 at the operating point.
+        """Return a linear block as a state-space system about its operating point.
 
         The time between samples [s] is needed by blocks that are continuous in time.
         """
@@ -361,7 +365,7 @@ class Block(DrawsItself, Parametrised):
         )
 
     def continuous(self) -> Polynomials | None:
-        """Return the transfer function of what is continuous in time, without dead time; else None."""
+        """Return the continuous transfer function without dead time, or None."""
         return None
 
     to_scipy = as_scipy
@@ -369,7 +373,7 @@ class Block(DrawsItself, Parametrised):
 
     @classmethod
     def example(cls) -> Self:
-        """Return a small, typical block of this class, for documentation and contract tests."""
+        """Return a small typical block of this class, for documentation and contract tests."""
         return cls(*cls.typical)
 
     # -- running -----------------------------------------------------------------------------
@@ -391,7 +395,7 @@ class Block(DrawsItself, Parametrised):
         initial: Initial | None = None,
         sample_time: float | None = None,
     ) -> Recording | Array:
-        """Run free over a recording or an array of inputs.
+        """Simulate the block (free-running) on a recording or an array of inputs.
 
         Parameters
         ----------
@@ -431,13 +435,14 @@ class Block(DrawsItself, Parametrised):
             array = np.asarray(data, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise DataError(
-                f"these are no inputs ({error})", remedy="give a recording or an array of numbers"
+                f"the inputs cannot be used ({error})",
+                remedy="give a recording or an array of numbers",
             ) from None
         outputs = self._run(self._inputs_from_array(array), sample_time, initial)
         return outputs[:, 0] if array.ndim == 1 and outputs.shape[1] == 1 else outputs
 
     def stream(self, sample_time: float | None = None, *, initial: Initial | None = None) -> Stream:
-        """Return a stepper for use sample by sample, before the first sample; see `Stream`."""
+        """Return a stepper for sample-by-sample use; see `Stream`."""
         return Stream(self, sample_time, initial)
 
     def simulate_many(
@@ -448,7 +453,7 @@ class Block(DrawsItself, Parametrised):
         initial: Initial | None = None,
         sample_time: float | None = None,
     ) -> Array:
-        """Run many parameter sets of this structure over the same inputs, on all cores.
+        """Simulate many parameter sets of this structure on the same inputs, on all cores.
 
         Parameters
         ----------
@@ -469,7 +474,7 @@ class Block(DrawsItself, Parametrised):
         return outputs[:, :, 0] if outputs.shape[2] == 1 else outputs
 
     def final_state(self, data: Recording, *, initial: Initial | None = None) -> Array:
-        """Return the state after a recording, shape (n_states,): its memory, to start another with."""
+        """Return the state after a recording, shape (n_states,), to start the next one from."""
         inputs = self._inputs_from(data)
         state = self.initial_state(inputs[0], self.start_on(data, initial))
         self.bind(data.sample_time, state, inputs, np.empty((len(inputs), len(self.outputs))))()
@@ -485,17 +490,17 @@ class Block(DrawsItself, Parametrised):
         return outputs
 
     def check_time(self, sample_time: float | None) -> None:
-        """Warn where a sample time changes what the block is, or a part of it."""
+        """Warn if the sample time changes the model or one of its parts."""
         for part in getattr(self, "parts", ()):
             part.check_time(sample_time)
 
     def report(self, state: Array) -> None:
-        """Warn of what happened during a run that its user should know, read off the final state."""
+        """Warn about events of a run, such as clipping, recorded in its final state."""
         for part, own in self.shares(state):
             part.report(own)
 
     def n_clipped(self, state: Array) -> int:
-        """Return how many samples were clipped, or not solved, in a run that ended in a state."""
+        """Return the number of samples that were clipped, or not solved, from the final state."""
         return sum(part.n_clipped(own) for part, own in self.shares(state))
 
     def _inputs_from(self, recording: Recording) -> Array:
@@ -530,12 +535,12 @@ class Block(DrawsItself, Parametrised):
         return saving.to_dict(self)
 
     def save(self, path: str | Path) -> None:
-        """Write the block as JSON that a person can read; see `mckibben.load`."""
+        """Save the block as readable JSON; see `mckibben.load`."""
         saving.save(self, path)
 
 
 def one_per(field: str, more: int = 0) -> Any:
-    """Return a property: how many numbers a field has, and ``more``."""
+    """Return a property: the number of entries of a field, plus ``more``."""
 
     def size(block: Block) -> int:
         return len(getattr(block, field)) + more
@@ -544,7 +549,7 @@ def one_per(field: str, more: int = 0) -> Any:
 
 
 def check_units(recording: Recording, channels: Sequence[Channel]) -> None:
-    """Refuse a recording in which a channel of a model is absent, or in another unit."""
+    """Raise an error if a channel of a model is missing in a recording, or has another unit."""
     for channel in channels:
         recording[channel.name]  # refuses what is absent
         if (unit := recording.units[channel.name]) != channel.unit:
@@ -575,12 +580,12 @@ def explicit_state(block: Block, initial: Initial) -> Array:
 
 
 def scratch_of(kernel: Callable[..., Any], size: int) -> list[Array]:
-    """Return the scratch that a kernel computes in, as a list of one array, or of none."""
+    """Return the working memory of a kernel as a list of one array, or an empty list."""
     return [np.zeros(size)] if in_scratch(kernel) else []
 
 
 def needs_sample_time(kind: str, sample_time: float | None) -> float:
-    """Return the sample time, or say that a rate-dependent block cannot do without."""
+    """Return the sample time; raise an error if a rate-dependent block has none."""
     if sample_time is None or not sample_time > 0:
         raise ModelError(
             f"{kind!r} depends on rate and needs a sample time, but the data have no time",
@@ -590,13 +595,13 @@ def needs_sample_time(kind: str, sample_time: float | None) -> float:
 
 
 def rate_filter(time_constant: float, step: float) -> tuple[float, float]:
-    """Return what a first-order filter of a rate keeps over a step, and its gain of the change."""
+    """Return the decay per step of a first-order rate filter, and its gain on the change."""
     smoothing = math.exp(-step / time_constant) if time_constant > 0 else 0.0
     return smoothing, (1 - smoothing) / step
 
 
 def own_sample_time(kind: str, own: float, sample_time: float | None) -> float:
-    """Return the sample time of a discrete block, after checking that the data have the same."""
+    """Return the sample time of a discrete block after checking that the data have the same."""
     step = needs_sample_time(kind, sample_time)
     if abs(step - own) > 1e-3 * own:
         raise ModelError(

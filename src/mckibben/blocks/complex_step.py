@@ -22,7 +22,9 @@ from mckibben.errors import ModelError
 from mckibben.system.compiling import Deferred, deferred
 
 STEP = 1e-200
-"""h. Slopes up to 1e150 and down to 1e-100 are numbers with it, and its square is 0."""
+"""Complex step h: derivatives from 1e-100 to 1e150 are representable, and its square underflows to
+0.
+"""
 
 
 @deferred
@@ -85,7 +87,7 @@ def _improved(evaluate: Any, target: Any, u: Any, memory: Any) -> Any:
 
 
 def _carried(name: str, slope: Callable[[float, float], float]) -> Callable[[Any], complex]:
-    """Return a function of ``math`` that carries its derivative, ``slope(x, value)``, along."""
+    """Return a function of ``math`` that propagates its derivative, ``slope(x, value)``."""
     own, by = getattr(math, name), deferred(slope)
 
     def carried(x: Any) -> complex:
@@ -126,17 +128,17 @@ HELPERS: dict[str, Callable[..., Any]] = {
     "tan": _carried("tan", lambda _, value: 1.0 + value * value),
     "tanh": _carried("tanh", lambda _, value: 1.0 - value * value),
 }
-"""What stands in twins for functions of the kernel language, and, ``over``, for division."""
+"""Complex-step replacements of functions of the kernel language, and ``over`` for division."""
 
 BY_REAL_PART = ("ceil", "floor", "trunc", "isfinite", "isinf", "isnan")
-"""Functions of ``math`` that are constant, step by step."""
+"""Piecewise constant functions of ``math``, evaluated on real parts."""
 
 PREFIX = "_twin_"
-"""Before the names of helpers."""
+"""Prefix of the helpers' names."""
 
 
 class _Rewriting(ast.NodeTransformer):
-    """Turns the source of a kernel into that of its twin."""
+    """Rewrites the source of a kernel for complex numbers."""
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
         self.generic_visit(node)
@@ -180,7 +182,7 @@ def _helped(name: str, *given: Any) -> ast.Call:
 
 
 def _part(node: Any) -> Any:
-    """Return the real part of what is compared."""
+    """Return the real part of a compared value."""
     if isinstance(node, ast.Tuple):
         return ast.Tuple([_part(each) for each in node.elts], ast.Load())
     truth = ast.Compare | ast.BoolOp | ast.Constant
@@ -189,7 +191,7 @@ def _part(node: Any) -> Any:
 
 @cache
 def twin(kernel: Any) -> Any:
-    """Return a kernel for complex numbers, of a compiled one; it is compiled when it is called.
+    """Return the complex version of a compiled kernel, compiled at its first call.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Blocks made of blocks: in series, in parallel, and one to a channel.
+"""Compositions of blocks: in series, in parallel, and per channel.
 
 Each says once, in `wired`, which part runs on which signals. From that they run, stream and start here,
 have derivatives, and become C; the inverse of a series is the reversed series of the inverses.
@@ -28,15 +28,15 @@ from mckibben.registry import load
 from mckibben.system.compiling import in_turn
 
 DEEPEST, MOST_BLOCKS = 32, 1000
-"""Compositions in compositions, and blocks in all."""
+"""Maximum depth of nested compositions, and maximum number of blocks."""
 
 AT_REST = ("first_sample", "fitted")
-"""Rules by which a block starts at rest at its first input, where no output is known."""
+"""Start rules by which a block is at rest at its first input if no output is known."""
 
 
 @plain_dataclass
 class Call:
-    """A block that is no composition, or a sum if there is none, on signals; and those it gives."""
+    """Call of a block that is not a composition, or of a sum, on signals; and its output signals."""
 
     block: Block | None
     taken: list[int]
@@ -45,7 +45,7 @@ class Call:
 
 
 class Layout:
-    """What a composition does, in order, on signals that are numbered, the inputs first.
+    """Calls of a composition, in order, on numbered signals; inputs first.
 
     Parameters
     ----------
@@ -68,28 +68,28 @@ class Layout:
         return given
 
     def call(self, block: Block, taken: Sequence[int]) -> list[int]:
-        """Append a block, and return the signals that it gives."""
+        """Append a block, and return its output signals."""
         return self._append(block, taken, len(block.outputs))
 
     def add(self, terms: Sequence[int]) -> int:
-        """Append a sum, unless it is of one signal, and return the signal that it gives."""
+        """Append a sum, unless there is only one signal, and return its output signal."""
         if len(terms) == 1:
             return terms[0]
         return self._append(None, terms, 1)[0]
 
     def resume(self, state: Sequence[float] | Array) -> None:
-        """Start the blocks called last from a state of them all."""
+        """Set the start state of the blocks called last from their joint state."""
         left = np.array(state, dtype=np.float64)
         for call, block in reversed(list(self.calls())):
             if left.size:
                 left, call.state = np.split(left, [left.size - block.n_states])
 
     def calls(self) -> Iterator[tuple[Call, Block]]:
-        """Give the calls of blocks, in order."""
+        """Yield the calls of blocks, in order."""
         return ((step, step.block) for step in self.steps if step.block is not None)
 
     def initial_state(self, first: Array, initial: Initial | None) -> Array:
-        """Return the states of all blocks, each started from the first sample that reaches it."""
+        """Return the states of all blocks, each started from its first input sample."""
         signals = np.zeros(self.n_signals)
         signals[: self.n_inputs] = first
         passed_on: set[int] = set()
@@ -116,7 +116,7 @@ class Layout:
         return np.concatenate(states)
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that runs all blocks, as `Block.bind` says."""
+        """Return a function that runs all blocks, as in `Block.bind`."""
         tables = {tuple(range(self.n_inputs)): inputs}
         places = [(inputs, column) for column in range(self.n_inputs)]  # of signals
         runs: list[Run] = []
@@ -166,12 +166,12 @@ Parts = Annotated[tuple[InstanceOf[Block], ...], BeforeValidator(_parts)]
 
 
 def _of_any(name: str) -> Any:
-    """Return a property that is true where it is of any part."""
+    """Return a property that is true if it is true for any part."""
     return property(lambda composition: any(getattr(part, name) for part in composition.parts))
 
 
 class Composition(Block):
-    """What all compositions share: states and parameters are those of the parts, one after another."""
+    """Base class of compositions: states and parameters are those of the parts in order."""
 
     parameters: ClassVar[tuple[str, ...]] = ("parts",)
     together: ClassVar[Callable[[Iterable[float]], float]] = max  # of dead times side by side
@@ -182,10 +182,10 @@ class Composition(Block):
 
     @abstractmethod
     def joined(self, parts: Sequence[str]) -> str:
-        """Return in LaTeX what the parts, of these names, make together."""
+        """Return the LaTeX expression of the composition, from the names of the parts."""
 
     def equations(self) -> tuple[str, ...]:
-        """Return how the parts come together: ``y`` of them all, ``u`` going into each."""
+        """Return the equations of the composition."""
         marks = [f"{self.letter}_{{{place + 1}}}" for place in range(len(self.parts))]
         return (self.joined(marks),)
 
@@ -199,16 +199,16 @@ class Composition(Block):
 
     @property
     def depth(self) -> int:
-        """How many compositions are in each other, this one included."""
+        """Nesting depth of compositions, including this one."""
         return 1 + max(getattr(part, "depth", 0) for part in self.parts)
 
     @property
     def n_blocks(self) -> int:
-        """How many blocks it is made of, compositions included."""
+        """Number of blocks, including compositions."""
         return 1 + sum(getattr(part, "n_blocks", 1) for part in self.parts)
 
     def check_parts(self) -> None:
-        """Refuse no parts at all, and more, or more deeply nested ones, than a model is made of."""
+        """Raise an error for no parts, or for more or more deeply nested parts than allowed."""
         if not self.parts:
             raise ModelError(f"{self.kind!r} has no parts", remedy="give at least one block")
         if self.depth > DEEPEST or self.n_blocks > MOST_BLOCKS:
@@ -219,7 +219,7 @@ class Composition(Block):
 
     @cached_property
     def wiring(self) -> Layout:
-        """What the parts do, in order."""
+        """The calls of the parts, in order."""
         return Layout(self)
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
@@ -231,7 +231,7 @@ class Composition(Block):
 
 @dataclass(frozen=True, config=STRICT)
 class Series(Composition):
-    """One block after another: the outputs of each drive the next.
+    """Series connection: the outputs of each block drive the next.
 
     Scheduling inputs of later parts become inputs of the series.
 
@@ -252,14 +252,14 @@ class Series(Composition):
             driven = after.n_driven
             if len(before.outputs) != driven:
                 raise ModelError(
-                    f"{before.kind!r} gives {len(before.outputs)} output(s), "
-                    f"{after.kind!r} behind it wants {driven}",
-                    remedy="connect blocks that fit",
+                    f"{before.kind!r} has {len(before.outputs)} output(s), "
+                    f"{after.kind!r} after it takes {driven}",
+                    remedy="connect blocks with matching channels",
                 )
 
     @cached_property  # asked for at every level of a nested model
     def inputs(self) -> tuple[Channel, ...]:
-        """Those of the first part, then scheduling inputs of later parts."""
+        """Inputs of the first part, then scheduling inputs of later parts."""
         channels = {channel.name: channel for channel in self.parts[0].inputs}
         for part in self.parts[1:]:
             for channel in part.inputs[part.n_driven :]:
@@ -284,9 +284,8 @@ class Series(Composition):
             at_rest = not part.rate_dependent or part.start in AT_REST
             if board.from_rest and number < len(self.parts) - 1 and not at_rest:
                 raise ModelError(
-                    f"{part.kind!r} starts from a memory of its own and depends on the "
-                    "rate, so parts behind it would start from another sample than in "
-                    "Python",
+                    f"{part.kind!r} has a saved start state and depends on the rate, so "
+                    "parts after it would start from another sample than in Python",
                     remedy="start it from 'first_sample'",
                 )
             driven = signals[: part.n_driven]
@@ -297,7 +296,7 @@ class Series(Composition):
         return Series(tuple(part.inverse() for part in reversed(self.parts)))
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the outputs that can be reached whatever happened before.
+        """Return the outputs that are reachable from every state.
 
         Those of the first part, followed through the rest, which must be monotone.
         """
@@ -310,7 +309,7 @@ class Series(Composition):
         return reduce(LinearSystem.then, [part.linear_system(sample_time) for part in self.parts])
 
     def joined(self, parts: Sequence[str]) -> str:
-        """Return what one gives going into the next."""
+        """Return the nested expression of the series."""
         return rf"y = {'['.join(reversed(parts))}[u{']' * len(parts)}"
 
     @classmethod
@@ -321,7 +320,7 @@ class Series(Composition):
 
 @dataclass(frozen=True, config=STRICT)
 class Parallel(Composition):
-    """Blocks side by side, whose outputs of the same name are added.
+    """Parallel connection: outputs of the same name are added.
 
     Parameters
     ----------
@@ -347,7 +346,7 @@ class Parallel(Composition):
 
     @cached_property
     def inputs(self) -> tuple[Channel, ...]:
-        """Those that drive any part, then those that only schedule."""
+        """Driving inputs of any part, then inputs that only schedule."""
         every = {channel.name: channel for part in self.parts for channel in part.inputs}
         return tuple(sorted(every.values(), key=lambda channel: channel.name not in self._driving))
 
@@ -365,7 +364,7 @@ class Parallel(Composition):
         return tuple({c.name: c for part in self.parts for c in part.outputs}.values())
 
     def _places(self, part: Block) -> tuple[list[int], list[int]]:
-        """Return where the inputs and outputs of a part are among those of all."""
+        """Return the indices of a part's inputs and outputs among those of the composition."""
         names = [channel.name for channel in self.inputs]
         given = [channel.name for channel in self.outputs]
         taken = [names.index(channel.name) for channel in part.inputs]
@@ -399,7 +398,7 @@ class Parallel(Composition):
 
 @dataclass(frozen=True, config=STRICT)
 class PerChannel(Composition):
-    """One block to every channel: block k drives output k from input k.
+    """One block per channel: block k drives output k from input k.
 
     Parameters
     ----------
@@ -443,12 +442,12 @@ class PerChannel(Composition):
         return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
 
     def joined(self, parts: Sequence[str]) -> str:
-        """Return each on its own."""
+        """Return the expressions of the parts, separately."""
         return r",\quad ".join(f"y_{{{k}}} = {part}[u_{{{k}}}]" for k, part in enumerate(parts, 1))
 
     @classmethod
     def example(cls) -> Self:
-        """Return two muscles with models of their own."""
+        """Return two muscles with separate models."""
         pressures = [Channel(f"pressure_{number}", "bar") for number in (1, 2)]
         displacements = [Channel(f"displacement_{number}", "mm") for number in (1, 2)]
         first = replace(load("blocks", "pi").example(), input=pressures[0], output=displacements[0])

@@ -1,4 +1,4 @@
-"""Models on paper: their equations with their numbers, and the quantities in their parameter vectors."""
+"""Equations of models with their numbers, and the meaning of their parameters."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Units = dict[str, str]
 
 @dataclass(frozen=True)
 class Quantity:
-    """One number of a parameter vector.
+    """Meaning of one entry of a parameter vector.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Quantity:
 
 
 def quantities(block: Block) -> tuple[Quantity, ...]:
-    """Return what every number of ``block.pack()`` is, in its order."""
+    """Return the meanings of the entries of ``block.pack()``, in order."""
     found = list(_quantities(block, "", channel_units(block)))
     alike = Counter(one.name for _, one in found)
     return tuple(
@@ -64,7 +64,7 @@ def quantities(block: Block) -> tuple[Quantity, ...]:
 
 
 def channel_units(part: Parametrised) -> Units:
-    """Return the units that those of a part's numbers are made of; none of what has no channels."""
+    """Return the channel units of a part, from which units of parameters are derived."""
     if not hasattr(part, "inputs"):
         return {}
     block: Any = part
@@ -77,7 +77,7 @@ def channel_units(part: Parametrised) -> Units:
 
 
 def unit_of(part: Parametrised, field: str, index: tuple[int, ...], units: Units) -> str | None:
-    """Return the unit of a number of a field; None where nothing is declared."""
+    """Return the unit of a parameter of a field; None if undeclared."""
     own = part.unit_of(field, index)
     if own is None:
         return None
@@ -91,7 +91,7 @@ def unit_of(part: Parametrised, field: str, index: tuple[int, ...], units: Units
 
 
 def _quantities(part: Parametrised, prefix: str, units: Units) -> Iterator[tuple[str, Quantity]]:
-    """Give every number, each behind the names of the parts that it is in."""
+    """Yield every parameter with the names of the parts that contain it."""
     units = channel_units(part) or units
     names = iter(part.parameter_names)
     if not part.parameters:
@@ -124,7 +124,7 @@ def _quantities(part: Parametrised, prefix: str, units: Units) -> Iterator[tuple
 
 
 def written(part: Parametrised, title: str = "", units: Units | None = None) -> Written:
-    """Return a block, or a part of one, on paper.
+    """Return the equations of a block, or of a part of one.
 
     A muscle's model that is solved from a law, as a balance of forces, is that law with its letters.
 
@@ -152,7 +152,7 @@ def written(part: Parametrised, title: str = "", units: Units | None = None) -> 
         if isinstance(value, Parametrised)
     ]
     numbers = (*part.worked(), *_channels(part), *_numbers(part, units))
-    remark = f"More than {MANY} numbers are not written out: the model file holds them."
+    remark = f"More than {MANY} numbers are not listed here; see the model file."
     large = any(r"\mathbb{R}" in line for line in numbers)
     equations = part.equations()
     return Written(title or _title(part), equations, numbers, remark * large, tuple(inner))
@@ -170,7 +170,7 @@ def _title(part: Parametrised, called: str = "") -> str:
 
 
 def _channels(part: Any) -> Iterator[str]:
-    """Give what the letters of channels stand for, which are u, x and y where nothing is declared."""
+    """Yield the meanings of the channel letters u, x and y."""
     if not hasattr(part, "ports") or not part.notation.equations:
         return
     ports = zip("uxy", part.ports, strict=True)
@@ -185,7 +185,7 @@ def _channels(part: Any) -> Iterator[str]:
 
 
 def _numbers(part: Parametrised, units: Units) -> Iterator[str]:
-    """Give what every number is: one by one, as vectors in lines, or in tables side by side."""
+    """Yield the values of parameters: as scalars, row vectors, or tables."""
 
     def unit(field: str, *index: int) -> str:
         return unit_of(part, field, index, units) or ""

@@ -1,4 +1,4 @@
-"""Feedback as blocks, so that it is saved, streamed and exported like a compensator.
+"""Feedback controllers as blocks, saved, streamed and exported like compensators.
 
 u = base + kp e + integral - kd rate,  e = reference - measured,
 
@@ -30,17 +30,17 @@ from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
 MEASURED = "_measured"
-"""What the name of a reference ends with where it is measured."""
+"""Suffix of the name of a measured channel."""
 
 BASE = "_base"
-"""What the name of a command ends with that feedback is added to."""
+"""Suffix of the name of the command that feedback is added to."""
 
 
 @step
 def pid_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Run the loops; the state is [integrals, rates, last measurements, last references].
+    """Advance the loops; the state is [integrals, rates, last measurements, last references].
 
     Coefficients are [sample time, share of the filter, lowest, highest, whether there is a base,
     whether references are late, kp, ki, kd]; inputs are references, measurements, bases.
@@ -68,7 +68,7 @@ def pid_step(
 def pid_start(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
 ) -> None:
-    """Start with empty integrals and rates, at the first measurements."""
+    """Start with zero integrals and rates, at the first measurements."""
     n = state.size // 4
     state[: 2 * n] = 0.0
     for k in range(n):
@@ -152,7 +152,7 @@ class PIDFeedback(Block):
 
     @property
     def n_scratch(self) -> int:
-        """What single precision loses of the integrals."""
+        """Scratch: rounding errors of the integrals in single precision."""
         return len(self.driven)
 
     def coefficients(self, sample_time: float | None) -> Array:
@@ -174,7 +174,7 @@ class PIDFeedback(Block):
         limits: tuple[float, float],
         filter_time: float = 0.1,
     ) -> Self:
-        """Return feedback by itself, from references and what is measured of them to outputs.
+        """Return feedback alone, from references and their measurements to outputs.
 
         Parameters are those of the class; without kd the derivative is left out.
         """
@@ -182,7 +182,7 @@ class PIDFeedback(Block):
         return cls(*gains, limits, filter_time, references, _called(references, MEASURED), outputs)
 
     def behind(self, compensator: Block) -> Self:
-        """Return the same feedback on top of what a compensator gives, matched by name and unit.
+        """Return the same feedback added to a compensator's outputs, matched by name and unit.
 
         Raises
         ------
@@ -220,12 +220,12 @@ class PIDFeedback(Block):
 
 
 def _called(channels: Channels, ending: str) -> Channels:
-    """Return channels whose names have an ending."""
+    """Return the channels whose names have a suffix."""
     return tuple(Channel(f"{channel.name}{ending}", channel.unit) for channel in channels)
 
 
 def _sent(channel: Channel) -> tuple[str, str]:
-    """Return name and unit of a command, whether it was recorded as one or not."""
+    """Return name and unit of a command, whether or not it was recorded as one."""
     return channel.name.removeprefix("command_"), channel.unit
 
 
@@ -235,7 +235,7 @@ def _listed(channels: Channels) -> str:
 
 @dataclass(frozen=True, config=STRICT)
 class FeedforwardFeedback(Composition):
-    """Outputs of a compensator, corrected by what is measured.
+    """Compensator with feedback correction.
 
     Inputs are the references, what is measured, and what schedules the compensator.
 
@@ -272,7 +272,7 @@ class FeedforwardFeedback(Composition):
 
     @classmethod
     def of(cls, compensator: Block, feedback: PIDFeedback) -> Self:
-        """Return a compensator with feedback, which may have stood by itself, on top."""
+        """Return a compensator with feedback added to its outputs."""
         return cls(compensator, feedback.behind(compensator))
 
     @property
@@ -281,12 +281,12 @@ class FeedforwardFeedback(Composition):
 
     @property
     def measured(self) -> tuple[Channel, ...]:
-        """What is measured."""
+        """The measured channels."""
         return self.feedback.scheduled[: len(self.feedback.driven)]
 
     @cached_property
     def inputs(self) -> tuple[Channel, ...]:
-        """References, measurements, and what else the compensator takes, which may learn from these."""
+        """References, measurements, and further inputs of the compensator."""
         n = len(self.feedback.driven)
         others = (c for c in self.compensator.inputs[n:] if c not in self.measured)
         return (*self.compensator.inputs[:n], *self.measured, *others)
@@ -304,7 +304,7 @@ class FeedforwardFeedback(Composition):
         return [found[self.feedback.given.index(channel)] for channel in self.outputs]
 
     def joined(self, parts: Sequence[str]) -> str:
-        """Return the sum of what both give, the feedback from the compensator's references."""
+        """Return the sum of the outputs of both."""
         return f"p = {parts[0]}[r] + {parts[1]}[r, y]"
 
     @classmethod

@@ -1,4 +1,4 @@
-"""Fields of blocks: numbers, channels and starting memories, validated and kept as plain data."""
+"""Fields of blocks: validated numbers, channels and start states, stored as plain data."""
 
 from __future__ import annotations
 
@@ -15,35 +15,37 @@ from mckibben.arrays import NARROWEST, Array
 from mckibben.errors import ModelError
 
 Rule = Literal["first_sample", "virgin", "fitted"]
-"""Name of a starting memory."""
+"""Name of a start state."""
 
 Initial = Rule | Sequence[float] | Array
-"""Memory before the first sample."""
+"""State before the first sample."""
 
 
 def plain_sequence(values: Any) -> Any:
-    """Return a list or an array as the tuple that a field keeps; anything else as it is."""
+    """Convert a list or an array to a tuple; return other values unchanged."""
     values = values.tolist() if isinstance(values, np.ndarray) else values
     return tuple(values) if isinstance(values, list) else values
 
 
 MOST_NUMBERS, MOST_COEFFICIENTS = 1_000_000, 1000
-"""That a field may hold; polynomials, whose roots are sought, have fewer."""
+"""Maximum number of entries of a field, and of coefficients of a polynomial, whose roots are
+computed.
+"""
 
 Vector = Annotated[tuple[FiniteFloat, ...], MaxLen(MOST_NUMBERS), BeforeValidator(plain_sequence)]
-"""Finite numbers; arrays and lists are accepted and kept as a tuple."""
+"""Finite numbers; arrays and lists are converted to a tuple."""
 
 Coefficients = Annotated[
     tuple[FiniteFloat, ...], MaxLen(MOST_COEFFICIENTS), BeforeValidator(plain_sequence)
 ]
-"""Those of a polynomial."""
+"""Coefficients of a polynomial."""
 
 PolynomialField = Annotated[Coefficients, MinLen(1)]
-"""A polynomial's ascending coefficients, at least one."""
+"""Ascending coefficients of a polynomial, at least one."""
 
 
 def rows(value: Any) -> Any:
-    """Return a table of numbers as a field of a block holds it."""
+    """Return a table of numbers as the value of a field."""
     listed = plain_sequence(value)
     return tuple(map(plain_sequence, listed)) if isinstance(listed, tuple) else listed
 
@@ -52,7 +54,7 @@ Rows = Annotated[tuple[Vector, ...], BeforeValidator(rows)]
 """Rows of finite numbers."""
 
 LONGEST_DELAY = 254
-"""Samples by which an output may come late."""
+"""Largest delay of an output [samples]."""
 
 Positive = Annotated[FiniteFloat, Gt(0)]
 NotNegative = Annotated[FiniteFloat, Ge(0)]
@@ -63,14 +65,14 @@ PositiveVector = Annotated[
 PositiveRows = Annotated[tuple[PositiveVector, ...], BeforeValidator(rows)]
 
 Scale = tuple[FiniteFloat, Positive]
-"""Centre of a quantity, and half its range."""
+"""Centre and half range of a quantity."""
 
 NARROWEST_SHARE = 1e-9
-"""Least width of an input range as a share of the sizes of its ends."""
+"""Smallest width of an input range, relative to the magnitude of its ends."""
 
 
 def wide(ends: tuple[float, float]) -> tuple[float, float]:
-    """Refuse an input range that is empty, or that steps through it could not be told apart in."""
+    """Raise an error for an input range that is empty or too narrow to resolve."""
     low, high = ends
     width = high - low
     if NARROWEST <= width < np.inf and width >= NARROWEST_SHARE * (abs(low) + abs(high)):
@@ -93,7 +95,7 @@ FittedInitial = Literal["first_sample", "virgin", "fitted"] | Vector
 
 
 def vector(values: ArrayLike) -> tuple[float, ...]:
-    """Return numbers as a field of a block holds them."""
+    """Return numbers as the value of a field."""
     return tuple(np.asarray(values, dtype=np.float64).tolist())
 
 

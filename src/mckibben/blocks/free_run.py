@@ -1,4 +1,4 @@
-"""Free-running outputs of a model on recordings, with an honest start of its memory."""
+"""Free-running outputs of a model on recordings, with a consistent start state."""
 
 from __future__ import annotations
 
@@ -18,13 +18,15 @@ from mckibben.recording import Recording
 Mask = NDArray[np.bool_]
 
 PERIODIC = "periodic"
-"""In the ``meta`` of a recording that is one period of a motion which repeats itself."""
+"""Key in the ``meta`` of a recording that is one period of a periodic motion."""
 
 AWAY = 1e3
-"""Ranges of the measured output by which a model that is off has run away."""
+"""Error, in ranges of the measured output, above which a model has diverged."""
 
 SETTLING = 256
-"""Samples for which the first input is held after the peak before it, so that rates die away."""
+"""Number of samples for which the first input is held after the preceding peak, so that rates
+decay.
+"""
 
 
 def run_free(
@@ -74,12 +76,12 @@ def run_free(
 
 
 def predecessor(recording: Recording, others: Sequence[Recording]) -> Recording | None:
-    """Return the recording among others that this one continues, or None."""
+    """Return the recording that this one continues, or None."""
     return next((other for other in others if recording.continues(other)), None)
 
 
 def refuse_runaway(block: Block, recording: Recording, modelled: Array, measured: Array) -> None:
-    """Raise a `ModelError` where a model's outputs (n, k) run away from what is measured."""
+    """Raise a `ModelError` if a model's outputs (n, k) diverge from the measured ones."""
     if not (np.abs(modelled - measured) <= AWAY * np.ptp(measured, axis=0)).all():
         far, wide = float(np.abs(modelled).max()), float(np.ptp(measured, axis=0).max())
         raise ModelError(
@@ -91,7 +93,7 @@ def refuse_runaway(block: Block, recording: Recording, modelled: Array, measured
 
 
 def _repeated(block: Block, recording: Recording, outputs: Sequence[str]) -> Array:
-    """Return the response to a period that comes again and again: at least the second."""
+    """Return the periodic response to a repeated period: at least the second."""
     if hasattr(block, "steady_state"):
         return block.steady_state(recording).matrix(outputs)
     names = [channel.name for channel in block.inputs]
@@ -104,7 +106,7 @@ def _repeated(block: Block, recording: Recording, outputs: Sequence[str]) -> Arr
 def known_start(
     block: Block, recording: Recording, outputs: Sequence[str], rows: Mask | None = None
 ) -> Array:
-    """Return the state of least squared error where the start is fitted; else `measured_start`."""
+    """Return the least-squares state if the start is fitted; otherwise `measured_start`."""
     if block.start == "fitted" or fitted_places(block):
         inputs = recording.matrix(channel.name for channel in block.inputs)
         return fitted_state(block, inputs, recording[outputs[0]], recording.sample_time, rows)
@@ -112,7 +114,7 @@ def known_start(
 
 
 def _begins(recording: Recording, known: Recording) -> bool:
-    """Tell whether a known recording is this one, or its beginning."""
+    """Return whether a known recording is this one, or its beginning."""
     n = len(known)
     return known is recording or (
         known.start_time == recording.start_time

@@ -1,4 +1,4 @@
-"""Blocks that undo others: one class for all, which runs what the block undone declares.
+"""Inverses of blocks: one class for all, which runs the declared inverse kernel.
 
 An inverse takes the outputs of its field ``forward``, then what schedules that one, and gives its
 driven inputs. Its state begins with the forward block's, unless it is shorter.
@@ -27,20 +27,21 @@ if TYPE_CHECKING:
     from mckibben.blocks.learning import Learnable
 
 USUAL_TRIALS, MOST_TRIALS = 12, 600
-"""In a step of an inverse that is solved for: on smooth references, and at worst."""
+"""Trials per step of an inverse without a closed form: typical on smooth references, and maximum.
+"""
 
 COMMANDS = ("pressure", "voltage")
-"""How channels that drive a muscle are called."""
+"""Names of channels that drive a muscle."""
 
 
 @kernel
 def nothing_clipped(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start with no samples clipped, where the inverse has no other memory."""
+    """Start with a clip count of 0, for an inverse without other states."""
     state[0] = 0.0
 
 
 class Invertible(Block):
-    """A block that declares its inverse: a kernel, what that reads, and how it starts.
+    """A block that declares its inverse: a kernel, its coefficients, and its start.
 
     By default its output rises with its one input, within its field ``input_range``, and the inverse
     clips references beyond what that can reach. The inverse's state is then this block's, what the
@@ -54,23 +55,23 @@ class Invertible(Block):
     """Fills the inverse's state, as `start_kernel` fills the block's."""
 
     inverse_path_dependent: ClassVar[bool] = False
-    """Whether it matters how a reference goes from one turning point to the next."""
+    """Whether the path of a reference between two turning points matters."""
 
     inverse_remembers: ClassVar[Literal["input", "output"] | None] = None
-    """What the inverse knows of the last sample beside this block's state."""
+    """What the inverse stores of the last sample in addition to this block's state."""
 
     counts_clipped: ClassVar[bool] = True
-    """Whether the last of the inverse's state counts the samples that `inverse_complaint` is about."""
+    """Whether the last number of the inverse's state counts the samples of `inverse_complaint`."""
 
     solved: ClassVar[bool] = False
-    """Whether the inverse is solved for by trials in every sample, having no closed form."""
+    """Whether the inverse is solved iteratively in every sample, having no closed form."""
 
     def inverse(self) -> Block:
-        """Return the block that undoes this one; refused where `check_invertible` does."""
+        """Return the inverse of this block; raise an error if `check_invertible` does."""
         return Inverse(self)
 
     def check_invertible(self) -> None:
-        """Refuse to be undone where a condition fails, saying which and what to do.
+        """Raise an error if there is no inverse, naming the condition and a remedy.
 
         By default, of one input solved for: a range of it, over which the output rises.
         """
@@ -99,16 +100,16 @@ class Invertible(Block):
 
     @property
     def n_inverse_states(self) -> int:
-        """Length of the inverse's state."""
+        """Number of states of the inverse."""
         return self.n_states + (self.inverse_remembers is not None) + self.counts_clipped
 
     @property
     def n_inverse_scratch(self) -> int:
-        """As `n_scratch`, of the inverse; the same by default."""
+        """`n_scratch` of the inverse; by default the same."""
         return self.n_scratch
 
     def inverse_state(self, state: Array) -> Array:
-        """Return the inverse's state that matches a state of this block, where that tells it."""
+        """Return the state of the inverse for a state of this block, if it is determined."""
         found = np.array([*state, *self.remembered(state), *([0.0] if self.counts_clipped else [])])
         if found.size != self.n_inverse_states:
             raise ModelError(
@@ -118,16 +119,16 @@ class Invertible(Block):
         return found
 
     def remembered(self, state: Array) -> tuple[float, ...]:
-        """Return what the inverse remembers, as a state of this block tells it."""
+        """Return the additional states of the inverse for a state of this block."""
         return (float(state[-1]),) if self.inverse_remembers == "input" else ()
 
     @property
     def learnable(self) -> Learnable | None:
-        """What of it is learnt while its inverse runs; None where nothing is."""
+        """Adaptive parameters of the inverse; None if it has none."""
         return None
 
     def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return what a step of the inverse costs; by default one pass, or trials."""
+        """Return the cost of a step of the inverse; by default one pass, or several trials."""
         if self.solved:
             once = self.cost(sample_time).usual
             return Cost(USUAL_TRIALS * once, MOST_TRIALS * once)
@@ -135,7 +136,7 @@ class Invertible(Block):
         return Cost.of(numbers, self.n_inverse_states)
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the lowest and highest outputs that can be reached whatever happened before.
+        """Return the lowest and highest outputs that are reachable from every state.
 
         How far the output falls at the lowest input depends on the highest peak before: the least
         favourable one counts.
@@ -151,11 +152,11 @@ class Invertible(Block):
         return np.array([max(last(low, peak, low) for peak in peaks)]), np.array([last(low, high)])
 
     def peaks(self) -> Array:
-        """Return the peaks at which one operator more keeps a memory; none without operators."""
+        """Return the peaks at which one more operator has memory; empty without operators."""
         return np.empty(0)
 
     def inverse_complaint(self, state: Array) -> str:
-        """Return what is to be said of a run of the inverse in which samples were counted."""
+        """Return the warning about counted samples in a run of the inverse."""
         low, high = self.reachable()
         wanted, given = self.outputs[0], self.inputs[0]
         return (
@@ -167,7 +168,7 @@ class Invertible(Block):
 
 @dataclass(frozen=True, config=STRICT)
 class Inverse(Block):
-    """The block that undoes another.
+    """Inverse of another block.
 
     Parameters
     ----------
@@ -201,7 +202,7 @@ class Inverse(Block):
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
-        """The forward block's outputs, then what schedules it."""
+        """The forward block's outputs, then its scheduling inputs."""
         return (*self.forward.outputs, *self.forward.inputs[self.forward.n_driven :])
 
     @property
@@ -212,7 +213,7 @@ class Inverse(Block):
         return self.forward.inverse_numbers(self.forward.start_numbers())
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the state before the first sample that matches the forward block's.
+        """Return the initial state that corresponds to the forward block's.
 
         An explicit state may be this block's own, or the forward block's.
         """
@@ -231,7 +232,7 @@ class Inverse(Block):
         return self.forward.inverse_numbers(self.forward.coefficients(sample_time))
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the lowest and highest inputs of the forward block that are given."""
+        """Return the range of the forward block's inputs."""
         if len(self.outputs) == 1:
             low, high = self.forward.input_limits
             return np.array([low]), np.array([high])
@@ -241,7 +242,7 @@ class Inverse(Block):
         return self.forward
 
     def report(self, state: Array) -> None:
-        """Warn of what the forward block complains of, as references clipped."""
+        """Warn about counted samples, such as clipped references."""
         if self.n_clipped(state):
             warnings.warn(self.forward.inverse_complaint(state), ModelWarning, stacklevel=4)
 
@@ -249,11 +250,11 @@ class Inverse(Block):
         return int(state[-1]) if self.forward.counts_clipped and state[-1] > 0 else 0
 
     def equations(self) -> tuple[str, ...]:
-        """Return that it solves the equations of the block undone, which follow."""
+        """Return the equation of the inverse; those of the forward block follow."""
         return (r"\hat{u} = P^{-1}[y] \quad\text{such that}\quad P[\hat{u}] = y",)
 
     def worked(self) -> tuple[str, ...]:
-        """Return which channels go in and come out; P is the block that follows."""
+        """Return the channels of the inverse; P is the forward block."""
         letters = lettered("y", self.forward.outputs) + lettered(r"\hat{u}", self.outputs)
         return (r",\quad ".join([*letters, r"P\text{: the model below}"]),)
 
@@ -263,12 +264,12 @@ class Inverse(Block):
 
 
 def drives(channel: Channel) -> bool:
-    """Tell whether a channel is what drives a muscle, by its name or unit."""
+    """Return whether a channel drives a muscle, by its name or unit."""
     return channel.name.startswith(COMMANDS) or channel.unit in ("bar", "V")
 
 
 def commands(block: Block) -> bool:
-    """Tell whether a block undoes another and gives what drives a muscle.
+    """Return whether a block is an inverse whose outputs drive a muscle.
 
     Not every inverse does: a forward model solved from a law of forces is one, and gives a displacement.
     """

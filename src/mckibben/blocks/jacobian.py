@@ -1,4 +1,4 @@
-"""Derivatives of free runs by parameters: one way for every block, exact to rounding.
+"""Derivatives of free runs by parameters, for every block, exact to rounding.
 
 What a block does is laid out as kernels in order, as for an export. Their coefficients depend smoothly
 on the parameters, by arithmetic of a few numbers: central differences of eighth order give that to
@@ -31,29 +31,29 @@ from mckibben.system.threads import cores
 Complex = NDArray[np.complex128]
 
 CHANGES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
-"""Of a parameter, relative, between the places of a central difference of its coefficients."""
+"""Relative steps of a parameter in the central difference of its coefficients."""
 
 AGREEING = 1e-11
 """Relative difference of derivatives of coefficients that is rounding."""
 
 WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
-"""Of such a difference of eighth order, from the nearest places on."""
+"""Weights of the eighth-order central difference, nearest points first."""
 
 
 def _laid_out(block: Block) -> Layout:
-    """Return what a block does, of blocks that all have derivatives."""
+    """Return the layout of a block, if all its blocks have derivatives."""
     layout = Layout(block, from_rest=True)
     for _, each in layout.calls():
         if not each.c_kernels:
             raise ModelError(
                 f"{each.title!r} has no derivatives: it is not one kernel with a start kernel",
-                remedy="declare a start_kernel beside its kernel, or compose it of such blocks",
+                remedy="declare a start_kernel with its kernel, or compose it of such blocks",
             )
     return layout
 
 
 def _moved(value: Any, numbers: Iterator[float]) -> Any:
-    """Return the value of a field with other numbers, be they within bounds or a little outside."""
+    """Return the value of a field with other numbers, which may be slightly out of bounds."""
     if type(value) is float:
         return next(numbers)
     if type(value) is tuple:
@@ -70,7 +70,7 @@ def _moved(value: Any, numbers: Iterator[float]) -> Any:
 
 
 class Tangents:
-    """Free runs of a block with their derivatives by its parameters, stretch by stretch.
+    """Free runs of a block with derivatives by its parameters, segment by segment.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class Tangents:
         self._scratch = [np.zeros(each.n_scratch, np.complex128) for each in blocks]
 
     def start(self, first: Array, initial: Initial | None = None) -> Complex:
-        """Return the states before a first input, with derivatives, shape (k or 1, n_states).
+        """Return the initial states for a first input, with derivatives, shape (k or 1, n_states).
 
         Parameters are those of `Block.initial_state`.
         """
@@ -119,7 +119,7 @@ class Tangents:
     def _started(
         self, numbers: list[Complex], state: Complex, first: Array, rule: str | None
     ) -> None:
-        """Start blocks from the first samples that reach them."""
+        """Start blocks from their first input samples."""
 
         def begin(index: int, inputs: Complex) -> Complex:
             call, block = calls[index]
@@ -139,7 +139,7 @@ class Tangents:
         self._follow(numbers, begin, first[np.newaxis])
 
     def over(self, inputs: Array, states: Complex) -> tuple[Array, Array]:
-        """Return outputs, (n, m), and their derivatives, (n, m, k), over a stretch; states go on.
+        """Return outputs (n, m) and their derivatives (n, m, k) over a segment; states continue.
 
         Parameters
         ----------
@@ -161,7 +161,7 @@ class Tangents:
     def _follow(
         self, numbers: list[Complex], memory: Callable[[int, Complex], Complex], inputs: Array
     ) -> Complex:
-        """Run all blocks over inputs, each from its memory, ``memory(number, its inputs)``."""
+        """Run all blocks over inputs, each from its state, ``memory(number, its inputs)``."""
         signals = np.zeros((len(inputs), self._layout.n_signals), np.complex128)
         signals[:, : inputs.shape[1]] = inputs
         index = 0

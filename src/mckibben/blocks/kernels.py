@@ -1,4 +1,4 @@
-"""How kernels are compiled.
+"""Compilation of kernels.
 
 A kernel is a numba function ``kernel(coefficients, state, inputs, outputs)`` on float64 arrays: it
 advances one sample, the state changed in place, nothing allocated, nothing global; the loop over samples
@@ -19,22 +19,23 @@ from mckibben.system.compiling import deferred
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 SUMS = {"reassoc", "contract"}
-"""Freedom of the compiler in weighted sums."""
+"""Fast-math flags of the compiler in weighted sums."""
 
 
 ROUNDING, BRACKET, SLACK = 1e-12, 1e-15, 1e-9
-"""Relative differences: of rounding, of closed brackets, and by which limits may be passed."""
+"""Relative tolerances: rounding, width of a closed bracket, and violation of limits."""
 
 NOTHING = 1e-300
-"""Weights below do not count."""
+"""Weight below which an operator is ignored."""
 
 SINGLE = {"ROUNDING": 1e-6, "BRACKET": 1e-7, "SLACK": 1e-4, "NOTHING": 1e-37}
-"""What constants are in single precision, where they are of double precision in Python. A module with
-constants of its own of this kind has a table of its own."""
+"""Constants with a different value in single precision. A module with such constants of its own has
+its own table.
+"""
 
 
 def kernel(function: Function) -> Function:
-    """Compile with exact arithmetic, for everything but weighted sums.
+    """Compile with exact arithmetic; for everything but weighted sums.
 
     Here and in what follows arrays are not reference-counted, which would take longer than a short
     kernel; so none is made, and a copy of one is a loop.
@@ -43,12 +44,12 @@ def kernel(function: Function) -> Function:
 
 
 def short_kernel(function: Function) -> Function:
-    """Compile a `kernel` into all that call it: one that takes no longer than to pass it its arrays."""
+    """Compile a `kernel` inlined into its callers; for very short kernels."""
     return deferred(function, _nrt=False, forceinline=True)
 
 
 def summing_kernel(function: Function) -> Function:
-    """Compile with the terms of weighted sums free to be reordered, which lets them vectorise.
+    """Compile with reassociation in weighted sums, so that they vectorise.
 
     Minima, maxima, NaN and infinity keep their meaning.
     """
@@ -56,13 +57,13 @@ def summing_kernel(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """Compile into each kernel that calls it, for functions that take functions."""
+    """Compile inlined into every calling kernel, for functions that take functions."""
     return deferred(function, inline="always", _nrt=False)
 
 
 @kernel
 def accumulate(total: float, change: float, lost: Array, place: int) -> float:
-    """Return a sum after a change. C of single precision carries what rounding loses, in ``lost``.
+    """Return a sum after an increment; in single-precision C, ``lost`` carries the rounding error.
 
     For sums that go on from sample to sample: a million small changes would drift there.
     """
@@ -71,7 +72,7 @@ def accumulate(total: float, change: float, lost: Array, place: int) -> float:
 
 @kernel
 def remember(latest: float, past: Array) -> None:
-    """Put a number before past ones, of which the last is forgotten."""
+    """Shift a number into the past ones; the last is dropped."""
     for k in range(past.size - 1, 0, -1):
         past[k] = past[k - 1]
     if past.size > 0:
@@ -86,13 +87,14 @@ def fill(to: Array, numbers: Array) -> None:
 
 
 DERIVED = False
-"""Whether derivatives are taken: true in the twins of `mckibben.blocks.complex_step` alone. What
-``if DERIVED:`` guards is neither compiled nor translated to C."""
+"""Whether derivatives are taken: true only in the complex-step versions of
+`mckibben.blocks.complex_step`. Code under ``if DERIVED:`` is neither compiled nor translated to C.
+"""
 
 
 @inlined
 def improved(evaluate: Any, target: float, u: float, memory: Any) -> float:
-    """Return a root of ``evaluate(u, memory) == target``, in twins with its derivative.
+    """Return a root of ``evaluate(u, memory) == target``; in complex versions with its derivative.
 
     A search ends on the root to rounding, but not on its derivative, which is that of the last step.
     """
@@ -113,11 +115,11 @@ class Step(Protocol):
     batch: Callable[..., None]
 
     def __call__(self, coefficients: Array, state: Array, *arrays: Array) -> None:
-        """Take the inputs of a sample, and fill its outputs, each of shape (n,)."""
+        """Compute the outputs of a sample in place, each of shape (n,)."""
 
 
 def step(function: Callable[..., None], **options: Any) -> Step:
-    """Compile a kernel that advances one sample, and make the loop over samples from it."""
+    """Compile a kernel that advances one sample, and the loop over samples."""
     options["_nrt"] = False
     one: Any = deferred(function, inline="always", **options)
 
@@ -137,11 +139,11 @@ def step(function: Callable[..., None], **options: Any) -> Step:
 
 
 def summing_step(function: Callable[..., None]) -> Step:
-    """Compile a `step` with the freedom of a `summing_kernel`."""
+    """Compile a `step` with the options of a `summing_kernel`."""
     return step(function, fastmath=SUMS)
 
 
 @cache
 def in_scratch(kernel: Callable[..., Any]) -> bool:
-    """Return whether a step or a start computes in scratch that is passed in."""
+    """Return whether a step or start kernel takes a working memory."""
     return "scratch" in signature(kernel).parameters

@@ -1,4 +1,4 @@
-"""The contract of a block as laws, to which the author of a new one can put it.
+"""Contract tests of blocks, for authors of new ones.
 
 Every law is tried on random inputs that wander with minor loops and holds.
 """
@@ -23,17 +23,17 @@ from mckibben.recording import Recording, standard_unit
 from mckibben.registry import load, names
 
 DEFAULT_LIMITS = (0.0, 5.0)
-"""Inputs to try where a block names no input range of its own."""
+"""Test inputs of a block without an input range."""
 
 MARGIN = 0.02
-"""Share of a range left out at both ends, so that rounding does not decide what is reachable."""
+"""Share of a range excluded at both ends, so that rounding does not decide what is reachable."""
 
 EXACT = 1e-9
 """Largest error of an inverse, relative to the range of the output."""
 
 
 def check_block(block: Block, *, sample_time: float = 0.01, seed: int = 0) -> None:
-    """Put a block to the laws that every block must obey.
+    """Test a block against all laws of blocks.
 
     Sizes agree with what is declared; simulating is repeatable and leaves its arguments alone; a
     stream, `Block.simulate_many` and a saved copy agree with `Block.simulate` to the last bit; a
@@ -68,7 +68,7 @@ def check_block(block: Block, *, sample_time: float = 0.01, seed: int = 0) -> No
 
 
 def examples() -> dict[str, Block]:
-    """Return the examples of all registered blocks and their inverses, by title, in its order."""
+    """Return the examples of all registered blocks and their inverses, by title."""
     blocks: list[Block] = [load("blocks", kind).example() for kind in names("blocks")]
     blocks += [block.inverse() for block in blocks if isinstance(block, Invertible)]
     found = {block.title: block for block in blocks}
@@ -80,7 +80,7 @@ def examples() -> dict[str, Block]:
 
 @dataclass
 class Trial:
-    """A block, inputs to try it on, shape (n, n_inputs), and its outputs.
+    """A block, test inputs, shape (n, n_inputs), and its outputs.
 
     Turning points of inputs are ``pace`` samples from each other, on average.
     """
@@ -101,7 +101,7 @@ class Trial:
 
     @classmethod
     def of(cls, block: Block, sample_time: float, seed: int, n_turns: int = 24) -> Trial:
-        """Return a trial on random inputs, slower where the rate matters."""
+        """Return a trial on random inputs, slower for rate-dependent blocks."""
         rng = np.random.default_rng(seed)
         pace = 200 if block.rate_dependent else 12
         inputs = wander(*input_limits(block), rng, pace, n_turns)
@@ -114,7 +114,7 @@ class Trial:
         return (block or self.block).simulate(inputs, initial=initial, sample_time=self.sample_time)
 
     def demand(self, holds: bool, law: str) -> None:
-        """Raise a `ContractError` that names the law, unless it holds."""
+        """Raise a `ContractError` that names the law, unless it is fulfilled."""
         if not holds:
             raise ContractError(
                 f"{self.block.kind!r} breaks the contract of blocks: {law}",
@@ -122,11 +122,11 @@ class Trial:
             )
 
     def same(self, outputs: Array, references: Array, law: str) -> None:
-        """Demand outputs that are equal to the last bit."""
+        """Require outputs that are equal to the last bit."""
         self.demand(np.array_equal(outputs, references), f"{law} to the last bit")
 
     def agree(self, outputs: Array, references: Array, tolerance: float, law: str) -> None:
-        """Demand outputs near references, relative to the range of the block's outputs."""
+        """Require outputs close to references, relative to the range of the block's outputs."""
         error = np.abs(outputs - references)
         holds = bool((error <= tolerance * self.span).all())
         self.demand(holds, f"{law} (the error is {error.max():.3g})")
@@ -134,7 +134,7 @@ class Trial:
     def refused(
         self, kind: type[Exception], about: str, attempt: Callable[..., object], *given: object
     ) -> None:
-        """Demand that an attempt raises an error of a kind whose text names what it is about."""
+        """Require an attempt to raise an error of a kind whose text names its cause."""
         try:
             attempt(*given)
         except kind as error:
@@ -145,7 +145,7 @@ class Trial:
 
 
 def input_limits(block: Block) -> tuple[Array, Array]:
-    """Return the lowest and highest of every input to try a block on, each of shape (n_inputs,)."""
+    """Return the lowest and highest test value of every input, each of shape (n_inputs,)."""
     lowest, highest = (np.full(len(block.inputs), end) for end in DEFAULT_LIMITS)
     driven = slice(0, block.n_driven)
     if hasattr(block, "input_range"):
@@ -171,13 +171,13 @@ def narrowed(lowest: Array, highest: Array) -> tuple[Array, Array]:
 def wander(
     lowest: Array, highest: Array, rng: np.random.Generator, pace: int, n_turns: int = 24
 ) -> Array:
-    """Return a path between random turning points in a range, shape (n, n_channels), holding at each."""
+    """Return a path between random turning points in a range, shape (n, n_channels), with holds."""
     turns = rng.uniform(lowest, highest, (n_turns, lowest.size))
     return through(turns, rng.integers(pace // 2, pace * 3 // 2 + 1, n_turns - 1))
 
 
 def through(turns: Array, samples: NDArray[np.int64]) -> Array:
-    """Return straight lines through turning points, so many samples each, with a hold at each."""
+    """Return straight lines through turning points, with a hold at each."""
     corners = np.concatenate([[0], np.cumsum(samples + 1)])
     places = np.sort(np.concatenate([corners, corners[1:-1] + 1]))
     values = np.insert(turns, np.arange(1, len(turns) - 1), turns[1:-1], axis=0)
@@ -192,8 +192,8 @@ def _sizes_agree(trial: Trial) -> None:
     block, packed = trial.block, trial.block.pack()
     state = block.initial_state(trial.inputs[0])
     sized = packed.shape == (block.n_parameters,)
-    trial.demand(sized, "pack gives n_parameters numbers in one vector")
-    trial.demand(state.shape == (block.n_states,), "initial_state gives n_states numbers")
+    trial.demand(sized, "pack returns n_parameters numbers in one vector")
+    trial.demand(state.shape == (block.n_states,), "initial_state returns n_states numbers")
     trial.demand(block.unpack(packed) == block, "unpack(pack()) equals the block")
     trial.refused(ModelError, "", block.unpack, np.append(packed, 0.0))
     if block.n_states:
@@ -209,11 +209,11 @@ def _simulates(trial: Trial) -> None:
     kept = list(state)
     outputs = trial.run(given, state)
     shape = (len(given), len(trial.block.outputs))
-    trial.demand(trial.outputs.shape == shape, "simulate gives one column to every output")
+    trial.demand(trial.outputs.shape == shape, "simulate returns one column per output")
     trial.demand(bool(np.isfinite(trial.outputs).all()), "outputs are finite")
-    trial.demand(np.array_equal(given, trial.inputs), "simulate leaves its inputs alone")
-    trial.demand(state == kept, "simulate leaves the state it is given alone")
-    law = "simulating again, from the state that initial_state gives, gives the same"
+    trial.demand(np.array_equal(given, trial.inputs), "simulate does not change its inputs")
+    trial.demand(state == kept, "simulate does not change its initial state")
+    law = "simulating again, from the state of initial_state, returns the same"
     trial.same(outputs, trial.outputs, law)
 
 
@@ -248,7 +248,7 @@ def _saves(trial: Trial) -> None:
     copy = saving.from_dict(content)
     trial.demand(copy == trial.block, "a saved and loaded copy equals the block")
     trial.demand(copy.to_dict() == trial.block.to_dict(), "a copy saves as the block does")
-    trial.same(trial.run(trial.inputs, block=copy), trial.outputs, "a copy gives the same")
+    trial.same(trial.run(trial.inputs, block=copy), trial.outputs, "a copy simulates the same")
     trial.refused(ModelError, "surplus", saving.from_dict, {**content, "surplus": 1})
 
 
@@ -258,9 +258,9 @@ def _takes_recordings(trial: Trial) -> None:
     columns = dict(zip(units, trial.inputs.T, strict=True))
     modelled = block.simulate(Recording(columns, trial.sample_time, units))
     for index, channel in enumerate(block.outputs):
-        law = "a recording gives the outputs that an array gives"
+        law = "a recording and an array have the same outputs"
         trial.same(modelled[channel.name], trial.outputs[:, index], law)
-        trial.demand(modelled.units[channel.name] == channel.unit, "outputs carry their units")
+        trial.demand(modelled.units[channel.name] == channel.unit, "outputs have their units")
     half = len(trial.inputs) // 2
     first = {name: samples[:half] for name, samples in columns.items()}
     state = block.final_state(Recording(first, trial.sample_time, units))
@@ -295,7 +295,7 @@ def _knows_its_time(trial: Trial) -> None:
         return
     for sample_time in (None, 7.0):
         outputs = block.simulate(trial.inputs, sample_time=sample_time)
-        law = "a rate-independent block at any sample time gives the same"
+        law = "a rate-independent block returns the same at any sample time"
         trial.same(outputs, trial.outputs, law)
     for moving in range(trial.inputs.shape[1]):
         path = np.tile(trial.inputs[0], (len(trial.inputs), 1))
@@ -314,7 +314,7 @@ def _knows_its_time(trial: Trial) -> None:
 
 
 def _inverts(trial: Trial) -> None:
-    """Demand an inverse that is exact, or an error that ends with a remedy."""
+    """Require an exact inverse, or an error that ends with a remedy."""
     block = trial.block
     try:
         inverse = block.inverse()
@@ -323,8 +323,8 @@ def _inverts(trial: Trial) -> None:
         return
     swapped = (*block.outputs, *block.inputs[trial.n_driven :])
     driven = block.inputs[: trial.n_driven]
-    trial.demand(inverse.inputs == swapped, "an inverse takes the outputs, then what schedules")
-    trial.demand(inverse.outputs == driven, "an inverse gives the driven inputs")
+    trial.demand(inverse.inputs == swapped, "an inverse takes the outputs, then scheduling inputs")
+    trial.demand(inverse.outputs == driven, "an inverse returns the driven inputs")
     again = trial.run(trial.inputs, block=inverse.inverse())
     trial.agree(again, trial.outputs, 1e-12, "the inverse of the inverse is the block")
     _tracks(trial, inverse, trial.outputs)
@@ -336,7 +336,7 @@ def _inverts(trial: Trial) -> None:
 
 
 def _tracks(trial: Trial, inverse: Block, references: Array) -> None:
-    """Demand exact tracking from the first sample, and from states carried over at half-time.
+    """Require exact tracking from the first sample, and from states carried over at half-time.
 
     What a dead time makes late is compared with what was due then.
     """
@@ -346,9 +346,7 @@ def _tracks(trial: Trial, inverse: Block, references: Array) -> None:
     given = np.column_stack([trial.run(wanted, block=inverse), scheduling])
     late = _late(trial, inverse)
     due = references[: n - late]
-    law = (
-        "forward of inverse gives the reference, after the dead time, to 1e-9 of the output's range"
-    )
+    law = "forward of inverse returns the reference, after the dead time, to 1e-9 of the output's range"
     trial.agree(trial.run(given)[late:], due, EXACT, law)
     half = n // 2
     forward_state = _state_after(trial.block, given[:half], trial.sample_time)
@@ -361,7 +359,7 @@ def _tracks(trial: Trial, inverse: Block, references: Array) -> None:
 
 
 def _recovers(trial: Trial, inverse: Block, low: Array, high: Array) -> None:
-    """Demand that references out of reach are clipped with a warning, and harm nothing after."""
+    """Require that references out of reach are clipped with a warning, without later effects."""
     middle, span = (low + high) / 2, high - low
     turns = trial.rng.uniform(low, high, (19, low.size))
     turns[6], turns[12] = high + span / 2, low - span / 2
@@ -380,7 +378,7 @@ def _recovers(trial: Trial, inverse: Block, low: Array, high: Array) -> None:
 
 
 def _late(trial: Trial, inverse: Block) -> int:
-    """Return by how many samples outputs follow references late."""
+    """Return the delay of outputs after references in samples."""
     return round((trial.block.dead_time + inverse.dead_time) / trial.sample_time)
 
 
@@ -401,4 +399,4 @@ LAWS: tuple[Callable[[Trial], None], ...] = (
     _knows_its_time,
     _inverts,
 )
-"""Each raises a `ContractError` where it is broken."""
+"""Contract checks; each raises a `ContractError` on violation."""

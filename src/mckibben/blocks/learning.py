@@ -1,4 +1,4 @@
-"""What of a block is learnt while its inverse runs, and how: recursive least squares.
+"""Online estimation of a block's parameters in its inverse: recursive least squares.
 
 With slopes phi of a measured output over the parameters, each in its scale and by the scatter of errors,
 and P the parameters' covariance,
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Group:
-    """Parameters that drift together: their name, and how more and less of it are called."""
+    """Parameters that drift together: their name, and the names of an increase and a decrease."""
 
     name: str
     more: str = "higher"
@@ -56,7 +56,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Learnable:
-    """The linear parameters of a block that are learnt while its inverse runs.
+    """Linear parameters of a block that are adapted while its inverse runs.
 
     Parameters
     ----------
@@ -109,36 +109,40 @@ class Learnable:
 
 
 SENSES = 12
-"""How many numbers are remembered of a sensor: whether it was read, usual error, surprise, last
-measured, what was predicted when that changed, product and square of errors, last error, ignored,
-square of the scatter that the covariance stands by, what the fit lacks times what is made up for, and
-the square of that."""
+"""Number of stored values per sensor: whether it was read, usual error, surprise, last measurement,
+the prediction when that changed, product and square of errors, last error, whether ignored, squared
+scatter of the covariance, product of misfit and correction, and square of the correction.
+"""
 
 READY, USUAL, SURPRISE, LAST, THEN, RELATED, SQUARED, BEFORE, IGNORED, STOOD = range(10)
 HELPED, APART = 10, 11
 
 GATE = 3.0
-"""Usual errors beyond which an error teaches no more."""
+"""Innovation, in usual errors, above which a measurement is rejected."""
 QUARTILE = 0.6745
-"""Median of the sizes of errors of unit variance."""
+"""Median absolute error of a unit-variance normal distribution."""
 SINGLE = {"ABSURD": 1e-6, "STILL": 1e-9, "UNMOVED": 1e-12}
-"""Here the same in single precision."""
+"""Constants with a different value in single precision."""
 NEAR = 0.1
-"""How near to it an error counts for less: single precision is to go the same way."""
+"""Width of the transition at the gate, so that single and double precision decide alike."""
 ABSURD = 1e-6
-"""Weight of an error too large to be one."""
+"""Weight of an error too large to be plausible."""
 ALIKE, MOST_ALIKE = 0.98, 0.9995
-"""Correlation of errors that follow one another: until it is known, and at most."""
+"""Correlation of successive errors: initial value, and maximum."""
 LARGEST = 1e9
-"""Usual error, by the noise."""
+"""Largest usual error, relative to the noise."""
 NEVER = 1e30
-"""What no output is."""
+"""Value that no output takes."""
 STILL, UNMOVED = 1e-9, 1e-12
-"""What is added to what is known, and squares of slopes by the noise, below which nothing changes."""
+"""Smallest information, and squared slope relative to the noise, below which parameters do not
+change.
+"""
 LATE = 3.0
-"""Of errors that what is used goes by: those of a third of the time."""
+"""Recent errors are averaged over the adaptation time divided by this."""
 SURPRISED = 5.0
-"""Mean square of errors, cut at the gate, by the usual one, beyond which all is learnt afresh."""
+"""Mean squared error (clipped at the gate), relative to the usual one, above which adaptation
+restarts.
+"""
 
 
 @kernel
@@ -153,7 +157,7 @@ def learn(
     asked: float,
     fitted: float,
 ) -> bool:
-    """Correct the parameters by one measured output; return whether they were changed.
+    """Update the parameters by one measured output; return whether they changed.
 
     Parameters
     ----------
@@ -230,7 +234,7 @@ def learn(
 
 @kernel
 def _stand_by(square: float, share: float, part: float, diagonal: Array, sense: Array) -> None:
-    """Scale the covariance with the scatter, at once where that grows: slow drift is followed."""
+    """Scale the covariance with the scatter, at once if that grows, to follow slow drift."""
     stood = sense[STOOD]
     stands = square if square > stood else stood + share * (square - stood)
     grows = 1.0 + part * (stands / stood - 1.0)
@@ -241,14 +245,14 @@ def _stand_by(square: float, share: float, part: float, diagonal: Array, sense: 
 
 @kernel
 def fewer(sense: Array) -> float:
-    """Return how many errors that follow one another tell as much as one independent one."""
+    """Return the number of correlated errors equivalent to one independent error."""
     alike = min(max(sense[RELATED] / sense[SQUARED], 0.0), MOST_ALIKE)
     return (1.0 + alike) / (1.0 - alike)
 
 
 @kernel
 def _feel(share: float, noise: float, relative: float, sense: Array) -> None:
-    """Remember an error, by its expected size."""
+    """Store an error, normalised by its expected size."""
     usual = sense[USUAL]
     quick = min(20.0 * share, 0.5)
     side = min(max((abs(relative) - QUARTILE) / NEAR, -1.0), 1.0)
@@ -262,7 +266,7 @@ def _feel(share: float, noise: float, relative: float, sense: Array) -> None:
 
 @kernel
 def _compare(share: float, noise: float, left: float, made_up: float, sense: Array) -> None:
-    """Remember how what is learnt would have helped: what it leaves, what it makes up for."""
+    """Store how adaptation would have helped: the remaining and the corrected error."""
     late = min(LATE * share, 0.5)
     sense[HELPED] += late * (made_up * (left + made_up) - sense[HELPED])
     sense[APART] += late * (made_up * made_up + noise * noise - sense[APART])
@@ -270,7 +274,7 @@ def _compare(share: float, noise: float, left: float, made_up: float, sense: Arr
 
 @kernel
 def trusted(senses: Array) -> float:
-    """Return how far from fitted to learnt errors would have been least, of all sensors."""
+    """Return the step from fitted to adapted parameters that would have minimised the errors."""
     helped, apart = 0.0, 0.0
     for first in range(0, senses.size, SENSES):
         helped += senses[first + HELPED]
@@ -280,7 +284,7 @@ def trusted(senses: Array) -> float:
 
 @kernel
 def _spread(root: Array, f: Array, g: Array, excited: float) -> None:
-    """Add ``excited`` times what a measurement tells to what is known; ``g`` becomes P phi."""
+    """Update the factored covariance; ``g`` becomes P phi."""
     p = f.size
     still = abs(excited) < STILL
     before = 0.0 if still else 1.0 / excited
@@ -301,7 +305,7 @@ def _spread(root: Array, f: Array, g: Array, excited: float) -> None:
 
 @kernel
 def _bound(root: Array, widest: Array, i: int) -> None:
-    """Keep the variance of one parameter from passing the widest; each has its turn."""
+    """Bound the variance of one parameter, each in turn."""
     p = widest.size
     variance = root[i]
     first = p + (i * (i + 1)) // 2
@@ -323,7 +327,7 @@ def _bound(root: Array, widest: Array, i: int) -> None:
 
 @kernel
 def pull_back(c: Array, learnt: Array, along: Array, work: Array) -> None:
-    """Bring what measurements do not tell back to what was fitted, in the time to learn in.
+    """Pull unobservable parameters back to the fitted ones within the adaptation time.
 
     It is weighed as if the fit were measured too: by the covariance, over the widest. ``along`` and
     ``work`` have a number a parameter to compute in.
@@ -378,13 +382,13 @@ def covariance_of(root: Array, p: int) -> Array:
 
 @kernel
 def root_size(p: int) -> int:
-    """Return how many numbers a covariance of p parameters has."""
+    """Return the number of entries of the factored covariance of p parameters."""
     return (p * (p + 1)) // 2
 
 
 @kernel
 def family_at(c: Array) -> int:
-    """Return where the numbers of the family begin among the coefficients of a learner.
+    """Return the index of the family's coefficients in an adaptive block.
 
     These are [p, sample time / time, noise, share of one output among those measured, scales (p),
     widest variances in squares of them (p), fitted parameters (p), covariance at the start as root],
@@ -396,7 +400,7 @@ def family_at(c: Array) -> int:
 
 @kernel
 def start_learning(c: Array, learnt: Array) -> None:
-    """Start what is learnt, [theta, used, root, senses], with the fitted parameters."""
+    """Start adaptation, [theta, used, root, senses], with the fitted parameters."""
     p, noise = int(c[0]), c[2]
     fitted, fresh = c[4 + 2 * p : 4 + 3 * p], c[4 + 3 * p : family_at(c)]
     fill(learnt[:p], fitted)
@@ -414,7 +418,7 @@ def start_learning(c: Array, learnt: Array) -> None:
 # -- of weighted sums of play operators ---------------------------------------------------------------
 
 LEAST = 0.1
-"""Share of a fitted partial sum of weights that is left, whatever is measured."""
+"""Smallest share of a fitted partial sum of weights that adaptation leaves."""
 
 GROUPS = (
     Group("gain", "higher (softer springs, or more area)", "lower (stiffer springs, or less area)"),
@@ -425,7 +429,7 @@ GROUPS = (
 
 @kernel
 def inverse_at(c: Array) -> int:
-    """Return where the inverse's numbers begin among the coefficients, behind [limits, least]."""
+    """Return the index of the inverse's coefficients, after [limits, least]."""
     return family_at(c) + 2 * int(c[0])
 
 
@@ -440,7 +444,7 @@ def follow_learning(
     y: float,
     measured: float,
 ) -> float:
-    """Learn, and find the operators' common input for a reference; return the direction it takes.
+    """Adapt, find the operators' common input for a reference, and return its direction.
 
     Parameters and weights in use are [weights, offset]; ``s`` are the operators; ``last`` is [previous
     reference, samples clipped, direction of travel].
@@ -481,7 +485,7 @@ def follow_learning(
 def learning_kernels(
     inverse_start: Start, take: Callable[..., float], before: int
 ) -> tuple[Step, Start]:
-    """Return step and start of an inverse that learns its weights and an offset.
+    """Return step and start of an inverse that adapts its weights and an offset.
 
     ``take(way, c, state, n)`` takes, and returns, the input of the operators' edge where the reference
     goes a way, by the inverse's coefficients, whose thresholds are from 3 on; between operators and
@@ -491,7 +495,7 @@ def learning_kernels(
     def adaptive_step(
         coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
     ) -> None:
-        """Invert, and learn the weights and an offset from what is measured."""
+        """Advance the inverse, and adapt weights and offset to measurements."""
         n = int(coefficients[0]) - 1
         own = coefficients[inverse_at(coefficients) :]
         last, learnt = state[n + before : n + before + 3], state[n + before + 3 :]
@@ -501,7 +505,7 @@ def learning_kernels(
         outputs[0] = take(way, own, state, n)
 
     def adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-        """Start as the inverse does, with the weights as fitted."""
+        """Start as the inverse does, with the fitted weights."""
         last = int(coefficients[0]) - 1 + before
         own = coefficients[inverse_at(coefficients) :]
         inverse_start(own, state[: last + 2], inputs, virgin)
@@ -513,7 +517,7 @@ def learning_kernels(
 
 @kernel
 def keep_rising(theta: Array, least: Array) -> None:
-    """Raise weights that are too low for a sum that rises right after every reversal."""
+    """Raise weights that are too small for a sum that increases after every reversal."""
     n = theta.size - 1
     total = 0.0
     for i in range(n):
@@ -523,7 +527,7 @@ def keep_rising(theta: Array, least: Array) -> None:
 
 @kernel
 def take_over(aim: Array, used: Array, s: Array, y: float, travel: float, band: float) -> None:
-    """Move what is used to what is aimed at, as far as the input need not turn before the reference."""
+    """Move the used weights to the estimated ones, without reversing the input."""
     n = s.size
     total, change = used[n], aim[n] - used[n]
     for i in range(n):
@@ -546,7 +550,7 @@ def learnable_operators(
     start: Start,
     with_parameters: Callable[[Array], Block],
 ) -> Learnable:
-    """Return what is learnt of a weighted sum of play operators: its weights, and an offset.
+    """Return the adaptive parameters of a sum of play operators: its weights, and an offset.
 
     Gain and friction are expected to change by 30 %, each weight by itself by 10 %, the offset by 30 %
     of the span; ``limits`` are the lowest and highest input of the operators.

@@ -1,4 +1,4 @@
-"""Linear blocks as state-space systems, which other tools of control take over."""
+"""Linear blocks as state-space systems, for use with other control libraries."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ class LinearSystem:
 
     @classmethod
     def gain(cls, gains: ArrayLike, offset: float = 0.0) -> LinearSystem:
-        """Return what answers at once and forgets, y = D u + offset."""
+        """Return a static gain, y = D u + offset."""
         d = np.atleast_2d(np.asarray(gains, dtype=np.float64))
         m, k = d.shape
         empty = np.zeros((0, 0)), np.zeros((0, k)), np.zeros((m, 0)), d
         return cls(*empty, None, np.zeros(k), np.full(m, offset))
 
     def then(self, other: LinearSystem) -> LinearSystem:
-        """Return this one driving another."""
+        """Return the series connection of this system and another."""
         n, m = len(self.a), len(other.a)
         a = np.block([[self.a, np.zeros((n, m))], [other.b @ self.c, other.a]])
         b = np.vstack([self.b, other.b @ self.d])
@@ -70,7 +70,7 @@ class LinearSystem:
         return LinearSystem(a, b, c, other.d @ self.d, step, self.input_offset, at_rest)
 
     def beside(self, other: LinearSystem) -> LinearSystem:
-        """Return the sum of this one and another of the same inputs."""
+        """Return the sum of this system and another with the same inputs."""
         n, m = len(self.a), len(other.a)
         a = np.block([[self.a, np.zeros((n, m))], [np.zeros((m, n)), other.a]])
         b, c = np.vstack([self.b, other.b]), np.hstack([self.c, other.c])
@@ -79,7 +79,7 @@ class LinearSystem:
         return LinearSystem(a, b, c, self.d + other.d, step, self.input_offset, at_rest)
 
     def among(self, taken: list[int], given: list[int], k: int, m: int) -> LinearSystem:
-        """Return it among k inputs, of which it takes some, and m outputs, of which it gives some."""
+        """Return the system embedded among k inputs and m outputs."""
         if (taken, given) == ([*range(k)], [*range(m)]):
             return self
         b, c, d = np.zeros((len(self.a), k)), np.zeros((m, len(self.a))), np.zeros((m, k))
@@ -89,7 +89,7 @@ class LinearSystem:
         return LinearSystem(self.a, b, c, d, self.sample_time, u, y)
 
     def rests(self, inputs: Array) -> Array:
-        """Return the outputs at which it rests where the inputs are held, shape (m,)."""
+        """Return the steady outputs for constant inputs, shape (m,)."""
         held = self.d
         if len(self.a):
             held = held + self.c @ np.linalg.solve(np.eye(len(self.a)) - self.a, self.b)

@@ -1,4 +1,4 @@
-"""Blocks without memory: lines, polynomials, straight pieces, logarithms and the dead zone of contact.
+"""Blocks without memory: lines, polynomials, piecewise-linear maps, logarithms and contact dead zone.
 
 Each rises or falls with its input, so each has an exact inverse, most of the same form.
 """
@@ -81,7 +81,7 @@ def negative_step(coefficients: Array, state: Array, inputs: Array, outputs: Arr
 
 @dataclass(frozen=True, config=fields.STRICT)
 class Negative(Block):
-    """y = -u, for outputs that fall while the input rises, such as a muscle's length.
+    """y = -u, for outputs that decrease with the input, such as a muscle's length.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Negative(Block):
 
 @kernel
 def interpolate(x: float, knots: Array, values: Array) -> float:
-    """Return the piecewise-linear function at ``x``; the end pieces continue beyond the knots."""
+    """Return the piecewise-linear function at ``x``, extrapolated beyond the knots."""
     low = 0
     high = knots.size - 1
     while high - low > 1:
@@ -125,7 +125,7 @@ def interpolate(x: float, knots: Array, values: Array) -> float:
 
 
 def check_increasing(what: str, knots: Sequence[float], values: Sequence[float]) -> None:
-    """Refuse fewer than two knots, and knots or values that do not increase."""
+    """Raise an error for fewer than two knots, or for knots or values that do not increase."""
     if len(knots) < 2 or len(knots) != len(values):
         raise ModelError(
             f"a {what} has {len(knots)} knots and {len(values)} values",
@@ -147,7 +147,7 @@ def piecewise_linear_step(coefficients: Array, state: Array, inputs: Array, outp
 
 @dataclass(frozen=True, config=fields.STRICT)
 class PiecewiseLinear(Block):
-    """Straight lines between knots, continued beyond the first and the last.
+    """Piecewise-linear function with extrapolation.
 
     After a Prandtl-Ishlinskii model it makes the modified one (MPI).
 
@@ -222,7 +222,7 @@ def least_slope(
 
 
 def slopes_at(polynomial: Sequence[float], low: float, high: float) -> Array:
-    """Return a polynomial's slopes at both ends of a range, and where they turn in it."""
+    """Return a polynomial's slopes at both ends of a range and at their extrema."""
     slope = np.polynomial.Polynomial(polynomial).deriv()
     turns = np.asarray(slope.deriv().roots(), dtype=np.complex128)
     return np.asarray(
@@ -328,7 +328,7 @@ class Polynomial(Invertible):
 # -- logarithm and exponential ---------------------------------------------------------------
 
 FLOOR = 0.05
-"""Of u + offset, where the logarithm turns into its tangent."""
+"""Value of u + offset below which the logarithm is continued by its tangent."""
 
 
 @step
@@ -340,7 +340,7 @@ def logarithm_step(coefficients: Array, state: Array, inputs: Array, outputs: Ar
 
 @step
 def exponential_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Undo the logarithm; coefficients are [offset]."""
+    """Invert the logarithm; coefficients are [offset]."""
     y = inputs[0]
     bend = math.log(FLOOR)
     x = math.exp(y) if y > bend else FLOOR + (y - bend) * FLOOR
@@ -349,7 +349,7 @@ def exponential_step(coefficients: Array, state: Array, inputs: Array, outputs: 
 
 @dataclass(frozen=True, config=fields.STRICT)
 class Raised(Block):
-    """A logarithm of a raised input, or what undoes it."""
+    """A logarithm of a shifted input, or its inverse."""
 
     parameters = ("offset",)
     typical = (0.5,)
@@ -361,7 +361,7 @@ class Raised(Block):
 
 @dataclass(frozen=True, config=fields.STRICT)
 class Logarithm(Raised):
-    """Logarithm of a raised input.
+    """Logarithm of a shifted input.
 
     Friction in a muscle grows in proportion to pressure, so play operators of constant threshold belong
     on the logarithm of pressure: a large offset makes the thresholds constant in the pressure itself,
@@ -385,7 +385,7 @@ class Logarithm(Raised):
 
 @dataclass(frozen=True, config=fields.STRICT)
 class Exponential(Raised):
-    """What undoes a `Logarithm`.
+    """Inverse of a `Logarithm`.
 
     Parameters
     ----------
@@ -406,13 +406,13 @@ class Exponential(Raised):
 # -- contact ---------------------------------------------------------------------------------
 
 LOST = 0.95
-"""Share of the smallest pressures that does not act; with the rest, every output has one input."""
+"""Share of the smallest pressures without effect; keeps the map invertible."""
 
 MOST_STEPS = 60
-"""Of Newton's method, which comes from above and needs four to eight."""
+"""Maximum number of Newton steps; four to eight are needed."""
 
 SETTLED = 1e-16
-"""Relative step below which it has come."""
+"""Relative step at which Newton's method has converged."""
 
 SINGLE = {"SETTLED": 1e-7}
 
@@ -428,7 +428,7 @@ def contact_step(coefficients: Array, state: Array, inputs: Array, outputs: Arra
 
 @step
 def contact_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Undo it: the root of a convex rising function."""
+    """Invert the contact dead zone: the root of a convex increasing function."""
     c = coefficients[0]
     goal = abs(inputs[0])
     u = goal + LOST * c
@@ -444,7 +444,7 @@ def contact_inverse_step(coefficients: Array, state: Array, inputs: Array, outpu
 
 @dataclass(frozen=True, config=fields.STRICT)
 class Contact(Invertible):
-    """Dead zone of small pressures, which only fill the bladder towards the braid.
+    """Dead zone at small pressures, which only press the bladder against the braid.
 
     Large pressures act as if less by about c.
 

@@ -1,4 +1,4 @@
-"""How a model is written: equations in LaTeX, and the symbol and unit of every number in them.
+"""Notation of models: equations in LaTeX, and symbol and unit of every parameter.
 
 A block declares both once, beside its fields; what a number means its docstring says already.
 """
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from mckibben.blocks.fields import Channel
 
 FEW = 8
-"""Numbers of a vector that are written in one line; more stand in a table."""
+"""Longest vector that is written in one line; longer ones are tables."""
 
 MANY = 30
-"""Numbers above which only their shape is written."""
+"""Number of entries above which only the shape is written."""
 
 
 class Symbol(NamedTuple):
-    """How a field is written: in LaTeX, the first index, and the unit, None where none is declared."""
+    """Notation of a field: LaTeX symbol, first index, and unit (None if undeclared)."""
 
     letter: str
     first: int = 1
@@ -31,11 +31,11 @@ class Symbol(NamedTuple):
 
     @property
     def stem(self) -> str:
-        """The letter without what is below it."""
+        """The letter without its subscript."""
         return re.sub(r"_(\{[^}]*\}|\w)$", "", self.letter)
 
     def of_shape(self, *sizes: int) -> str:
-        """Return how many numbers there are, in LaTeX, instead of them."""
+        """Return the dimensions of an array in LaTeX, instead of its values."""
         shape = r" \times ".join(map(str, sizes))
         return rf"{self.stem} \in \mathbb{{R}}^{{{shape}}}"
 
@@ -64,14 +64,14 @@ class Notation:
             self.symbols[field] = Symbol(letter, int(first or 1), unit or "")
 
     def of(self, field: str) -> Symbol:
-        """Return how a field is written: as declared, or by its name."""
+        """Return the notation of a field: as declared, or by its name."""
         named = rf"\mathrm{{{field.replace('_', chr(92) + ' ')}}}"
         return self.symbols.get(field, Symbol(named))
 
 
 @dataclass(frozen=True)
 class Written:
-    """A model, or a part of one, on paper.
+    """Equations and parameters of a model, or of a part of one.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class Written:
 
 
 def indexed(symbol: str, index: Sequence[int], first: int) -> str:
-    r"""Return a symbol whose last letters below are numbers.
+    r"""Return a symbol with numeric subscripts.
 
     >>> indexed("w_i", (2,), 1), indexed("S_{kj}", (0, 1), 1), indexed("T_p", (), 1)
     ('w_{3}', 'S_{1,2}', 'T_p')
@@ -113,7 +113,7 @@ def indexed(symbol: str, index: Sequence[int], first: int) -> str:
 
 
 def resolved(unit: str, place: int, units: Mapping[str, str]) -> str:
-    """Return a unit of which nothing is left open.
+    """Return a unit without placeholders.
 
     >>> resolved("{y}/{u}", 0, {"y": "mm", "u": "bar"}), resolved("{y}/{u}", 0, {"y": "mm", "u": "mm"})
     ('mm/bar', '')
@@ -134,7 +134,7 @@ def resolved(unit: str, place: int, units: Mapping[str, str]) -> str:
 
 @cache
 def meanings(cls: type) -> dict[str, str]:
-    """Return what docstrings say of every field of a class and of its bases, on one line."""
+    """Return the description of every field of a class and its bases, from docstrings."""
     found: dict[str, str] = {}
     for owner in reversed(cls.__mro__):
         text = inspect.cleandoc(owner.__dict__.get("__doc__") or "")
@@ -149,7 +149,7 @@ def meanings(cls: type) -> dict[str, str]:
 
 
 def short(meaning: str) -> str:
-    """Return the first sentence of a meaning, without units, which stand beside it.
+    """Return the first sentence of a description, without units.
 
     >>> short("k, stiffness of the stops [N/mm], not negative. None by default.")
     'k, stiffness of the stops, not negative'
@@ -170,7 +170,7 @@ def tex(value: float, digits: int = 4) -> str:
 
 
 def summed(terms: Sequence[tuple[float, str]]) -> str:
-    r"""Return a sum in LaTeX, of numbers times what stands behind each; nothing for no factor.
+    r"""Return a sum in LaTeX of numbers times symbols.
 
     >>> summed([(2.0, ""), (-1.5, "x"), (1.0, "y")])
     '2 - 1.5\\,x + y'
@@ -196,7 +196,7 @@ def unit_tex(unit: str) -> str:
 
 
 def lettered(symbol: str, channels: Sequence[Channel]) -> list[str]:
-    r"""Return what the letters of channels stand for.
+    r"""Return the meanings of the channel letters.
 
     >>> from mckibben.blocks.fields import PRESSURE
     >>> lettered("u", [PRESSURE])
@@ -212,5 +212,5 @@ def lettered(symbol: str, channels: Sequence[Channel]) -> list[str]:
 
 
 def with_unit(text: str, unit: str) -> str:
-    """Return a number in LaTeX with its unit behind it, if it has any."""
+    """Return a number in LaTeX with its unit."""
     return rf"{text}\,{unit_tex(unit)}" if unit else text

@@ -1,4 +1,4 @@
-"""What refuses bad fields and numbers, and has its parameters as a vector in a fixed structure."""
+"""Base classes that validate fields and have a parameter vector of fixed structure."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ Made = TypeVar("Made")
 
 UNCOMPUTABLE = (ArithmeticError, np.linalg.LinAlgError)
 COMPUTING = {"coefficients", "initial_state", "inverse", "passes", "reachable"}
-"""Methods in which numbers may be too large or too small to compute with, as where one is made."""
+"""Methods in which numbers may overflow or underflow, such as constructors."""
 
 
 def _computing(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a method whose arithmetic errors are told as those of the model's numbers."""
+    """Return a method whose arithmetic errors are raised as model errors."""
 
     @wraps(method)
-    def told(self: Any, *given: Any, **named: Any) -> Any:
+    def guarded(self: Any, *given: Any, **named: Any) -> Any:
         try:
             return method(self, *given, **named)
         except UNCOMPUTABLE as error:
             raise _beyond_sense(type(self), error) from error
 
-    return told
+    return guarded
 
 
 def _beyond_sense(cls: type, error: Exception) -> ModelError:
     return ModelError(
         f"the numbers of {getattr(cls, 'kind', cls.__name__)!r} cannot be computed with ({error})",
-        remedy="identify the model again; numbers so large or small mean nothing",
+        remedy="identify the model again; values of this size are not meaningful",
     )
 
 
@@ -52,7 +52,7 @@ class Checked(ABCMeta):
     def __new__(
         mcs, name: str, bases: tuple[type, ...], namespace: dict[str, Any], **named: Any
     ) -> Checked:
-        """Return the class, its arithmetic guarded."""
+        """Return the class with guarded arithmetic."""
         for method in COMPUTING & namespace.keys():
             if isfunction(namespace[method]):
                 namespace[method] = _computing(namespace[method])
@@ -80,7 +80,7 @@ class Checked(ABCMeta):
 
 
 class Parametrised(metaclass=Checked):
-    """What has a parameter vector, by default made of fields.
+    """An object with a parameter vector, by default made of its fields.
 
     A field may be a number, a vector, rows, a part that has parameters itself, several of those, or
     None.
@@ -100,7 +100,7 @@ class Parametrised(metaclass=Checked):
         return self.notation.equations
 
     def worked(self) -> tuple[str, ...]:
-        """Return equations with this one's numbers in them, in LaTeX, where they are short; or none."""
+        """Return equations with numerical values in LaTeX, if short."""
         return ()
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
@@ -109,7 +109,7 @@ class Parametrised(metaclass=Checked):
         return self.notation.of(field).unit
 
     def name_of(self, field: str, index: tuple[int, ...]) -> str:
-        """Return what a number of a field is called, for people: the field's name, and its places."""
+        """Return the label of a parameter: the field's name, and its indices."""
         return " ".join([field.replace("_", " "), *(str(place + 1) for place in index)])
 
     @property
@@ -119,7 +119,7 @@ class Parametrised(metaclass=Checked):
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """What each number of `pack` is called, for people; see `name_of`."""
+        """Label of each entry of `pack`; see `name_of`."""
         names: list[str] = []
         for field in self.parameters:
             for index, leaf in leaves(getattr(self, field)):
@@ -128,7 +128,7 @@ class Parametrised(metaclass=Checked):
         return tuple(names or (f"{self.kind} {place + 1}" for place in range(self.n_parameters)))
 
     def numbers(self) -> Iterator[tuple[Parametrised, str, tuple[int, ...]]]:
-        """Give the part, the field and the places in it of every number of `pack`, in its order."""
+        """Yield part, field and indices of every entry of `pack`, in order."""
         for field in self.parameters:
             for index, leaf in leaves(getattr(self, field)):
                 if isinstance(leaf, Parametrised):
@@ -137,7 +137,7 @@ class Parametrised(metaclass=Checked):
                     yield self, field, index
 
     def pack(self) -> Array:
-        """Return the parameters as a vector, shape (n_parameters,); structure stays outside."""
+        """Return the parameters as a vector, shape (n_parameters,)."""
         return gathered(self, self.parameters)
 
     def unpack(self, parameters: ArrayLike) -> Self:
@@ -154,12 +154,12 @@ class Parametrised(metaclass=Checked):
 
 
 def same_as(path: str) -> Any:
-    """Return a property that is an attribute of a part: ``"part.attribute"``."""
+    """Return a property that refers to an attribute of a part: ``"part.attribute"``."""
     return property(attrgetter(path), doc=f"``{path}``")
 
 
 def gathered(part: Parametrised, names: Iterable[str]) -> Array:
-    """Return the numbers of attributes in one vector."""
+    """Return the values of attributes in one vector."""
     numbers: list[float] = []
     for name in names:
         _gather(getattr(part, name), numbers)
@@ -205,7 +205,7 @@ def _is_flat(values: tuple[Any, ...]) -> bool:
 
 
 def leaves(value: Any, index: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Any]]:
-    """Give the numbers and the parts of a field, each with its places."""
+    """Yield the numbers and parts of a field, each with its indices."""
     if isinstance(value, tuple):
         for place, item in enumerate(value):
             yield from leaves(item, (*index, place))

@@ -1,4 +1,4 @@
-"""Plans of a horizon: pressures of all muscles in so many samples, as near a wish as limits let.
+"""Horizon optimisation: pressures of all muscles, closest to a target within limits.
 
     min sum_t |G_t (p_t - q_t) - e_t|^2 / 2   where all limits hold.
 
@@ -25,19 +25,20 @@ from mckibben.arrays import Array
 from mckibben.blocks.kernels import SLACK, fill, kernel
 
 MOST_STEPS = 30
-"""Of the interior-point method; it takes about ten."""
+"""Maximum number of steps of the interior-point method; it needs about ten."""
 
 CLOSED = 1e-11
-"""Gap between primal and dual, over the mean squared slope [bar^2], that counts as none."""
+"""Duality gap, relative to the mean squared slope, that counts as zero [bar^2]."""
 
 STAYS, FLAT = 1e-9, 1e-30
-"""Weight of staying where no slope pulls, and mean squared slope below which there is none."""
+"""Weight on constant pressure where the slope is zero, and mean squared slope that counts as zero.
+"""
 
 STAYING = 1e-6
-"""The same of one muscle: share of the mean squared slope by which pressures stay."""
+"""The same for one muscle: weight on constant pressure, relative to the mean squared slope."""
 
 ROOM = 0.3
-"""Least room that limits are given at the start [bar], and their price."""
+"""Initial slack of the limits [bar], and its cost."""
 
 SINGLE = {"CLOSED": 1e-7, "STAYS": 1e-6, "FLAT": 1e-30, "STAYING": 1e-6}
 
@@ -45,7 +46,7 @@ SINGLE = {"CLOSED": 1e-7, "STAYS": 1e-6, "FLAT": 1e-30, "STAYING": 1e-6}
 def limit_rows(
     low: Array, high: Array, change: float, total: float, draw: float, volumes: Array
 ) -> Array:
-    """Return all limits, shape (rows, 2 + n); those that are infinite are left out.
+    """Return all finite limits, shape (rows, 2 + n).
 
     Parameters
     ----------
@@ -80,7 +81,7 @@ def limit_rows(
 
 @kernel
 def weighed(row: Array, path: Array, t: int) -> float:
-    """Return the weighted sum that a row limits, in sample t of a path."""
+    """Return the weighted sum of a limit's row in sample t of a path."""
     n, total = row.size - 2, 0.0
     for k in range(n):
         from_here = path[t * n + k] if row[0] > 0.0 else 0.0
@@ -90,7 +91,7 @@ def weighed(row: Array, path: Array, t: int) -> float:
 
 @kernel
 def own_place(row: Array) -> int:
-    """Return the muscle that a row is of, or -1 if of several."""
+    """Return the muscle of a limit's row, or -1 for several."""
     found = -1
     for k in range(row.size - 2):
         if row[2 + k] != 0.0:
@@ -102,7 +103,7 @@ def own_place(row: Array) -> int:
 
 @kernel
 def allowed(n: int, rows: Array, path: Array, t: int, at_any_rate: bool) -> bool:
-    """Move sample t of a path to where it may be; return whether it was there already.
+    """Project sample t of a path onto the limits; return whether it changed nothing.
 
     Each pressure goes to its own limits; what the supply cannot give is taken from all changes in one
     share. Limits of changes are left out where it may move at any rate.
@@ -136,8 +137,8 @@ def allowed(n: int, rows: Array, path: Array, t: int, at_any_rate: bool) -> bool
 
 
 @kernel
-def kept_to(n: int, rows: Array, path: Array) -> bool:
-    """Clip a path to all limits, sample by sample; return whether it kept to them."""
+def clipped_to(n: int, rows: Array, path: Array) -> bool:
+    """Clip a path to all limits, sample by sample; return whether it was feasible."""
     there = True
     for t in range(path.size // n - 1):
         one = allowed(n, rows, path, t, False)
@@ -147,7 +148,7 @@ def kept_to(n: int, rows: Array, path: Array) -> bool:
 
 @kernel
 def plan_scratch(length: int, n: int, rows: int) -> int:
-    """Return how many numbers a plan is computed in."""
+    """Return the length of the working memory of a plan."""
     if n == 1:
         return 9 * length + 4
     return length * (3 * n * n + 3 * n + 6 * rows) + 2 * n * n + 2 * n
@@ -155,7 +156,7 @@ def plan_scratch(length: int, n: int, rows: int) -> int:
 
 @kernel
 def invert_small(n: int, matrix: Array, result: Array) -> None:
-    """Invert a positive definite matrix, n by n in a row, by Gauss and Jordan; destroys it."""
+    """Invert a positive definite matrix, n by n in a row, by Gauss-Jordan elimination, in place."""
     for i in range(n * n):
         result[i] = 1.0 if i % (n + 1) == 0 else 0.0
     for i in range(n):
@@ -173,7 +174,7 @@ def invert_small(n: int, matrix: Array, result: Array) -> None:
 
 @kernel
 def applied(n: int, matrix: Array, x: Array, scale: float, y: Array) -> None:
-    """Add to y a matrix, n by n in a row, times x and a number."""
+    """Add to y a matrix, n by n in a row, times x and a factor."""
     for i in range(n):
         total = 0.0
         for j in range(n):
@@ -226,7 +227,7 @@ def factored(n: int, rows: Array, hessian: Array, duals: Array, system: Array, w
 def moved(
     n: int, rows: Array, system: Array, right: Array, step: Array, duals: Array, work: Array
 ) -> None:
-    """Solve for one step of a path, of the room that limits leave, and of their prices.
+    """Solve for one step of a path, of the slacks, and of their multipliers.
 
     ``right`` is what the pressures' gradient lacks; ``duals`` are [room, price, what rooms are off, what
     room times price shall become over room, step of room, step of price], all rows of each sample.
@@ -268,7 +269,7 @@ def moved(
 
 @kernel
 def furthest(values: Array, steps: Array) -> float:
-    """Return the share of a step, at most 1, at which the first value becomes 0."""
+    """Return the largest share of a step, at most 1, that leaves all values positive."""
     share = 1.0
     for i in range(values.size):
         if steps[i] < 0.0:
@@ -280,7 +281,7 @@ def furthest(values: Array, steps: Array) -> float:
 def plan_several(
     n: int, rows: Array, slopes: Array, nominal: Array, errors: Array, path: Array, scratch: Array
 ) -> int:
-    """Find the pressures of a horizon from those before it; return the steps taken.
+    """Find the pressures of a horizon from the preceding ones; return the number of steps.
 
     ``slopes`` are N by m by n, ``nominal`` (q) N by n and ``errors`` (e) N by m.
     """
@@ -290,7 +291,7 @@ def plan_several(
     count, size_of = length * m, length * block
     hessian, system = scratch[:size_of], scratch[size_of : 3 * size_of]
     vectors = scratch[3 * size_of :]
-    wished, right = vectors[: length * n], vectors[length * n : 2 * length * n]
+    desired, right = vectors[: length * n], vectors[length * n : 2 * length * n]
     rest = vectors[2 * length * n :]
     step, others = rest[: (length + 1) * n], rest[(length + 1) * n :]
     duals, work = others[: 6 * count], others[6 * count :]
@@ -311,11 +312,11 @@ def plan_several(
                 own[i * n + j] = total / size
             own[i * n + i] += STAYS
         for i in range(n):
-            wished[t * n + i] = 0.0
+            desired[t * n + i] = 0.0
             for k in range(n_errors):
-                wished[t * n + i] += slope[k * n + i] * errors[t * n_errors + k] / size
+                desired[t * n + i] += slope[k * n + i] * errors[t * n_errors + k] / size
             for k in range(n):
-                wished[t * n + i] += own[i * n + k] * nominal[t * n + k]
+                desired[t * n + i] += own[i * n + k] * nominal[t * n + k]
     fill(p, nominal)
     for t in range(length):
         for i in range(m):
@@ -324,7 +325,7 @@ def plan_several(
             price[t * m + i] = ROOM
     for taken in range(MOST_STEPS):
         gap, amiss = 0.0, 0.0
-        fill(right, wished)
+        fill(right, desired)
         for t in range(length):
             curved = hessian[t * block : (t + 1) * block]
             applied(n, curved, p[t * n : (t + 1) * n], -1.0, right[t * n : (t + 1) * n])
@@ -416,9 +417,9 @@ def plan_one(
             x[place + 3], d[place + 3] = least + fall, over
             count += 4
         weight = slopes[t] * slopes[t] + staying
-        wished = weight * nominal[t] + slopes[t] * errors[t]
+        desired = weight * nominal[t] + slopes[t] * errors[t]
         for i in range(count):
-            d[i] += weight * x[i] - wished
+            d[i] += weight * x[i] - desired
     _, _ = turned(count, x, d, low, high, best, 0)
     last = path[0]
     for t in range(length):
@@ -432,7 +433,7 @@ def plan_one(
 def turned(
     count: int, x: Array, d: Array, low: float, high: float, best: Array, t: int
 ) -> tuple[int, float]:
-    """Find where the derivative passes 0, within the range; return the knot beyond, and the value."""
+    """Find where the derivative crosses 0 within the range; return the knot beyond, and the value."""
     place = 0
     while place < count and not d[place] > 0.0:
         place += 1

@@ -1,4 +1,4 @@
-"""A compensator that looks ahead: model-predictive, with limits of pressure, its rate and the supply.
+"""Model-predictive compensators with limits of pressure, its rate, and the supply.
 
 In every sample the exact inverse runs over the references of a horizon from the memory that the muscles
 really have. What it gives is used where limits let it: then this is the exact inverse. Where they do
@@ -35,7 +35,7 @@ from mckibben.blocks.parameters import same_as
 from mckibben.blocks.planning import (
     MOST_STEPS,
     allowed,
-    kept_to,
+    clipped_to,
     limit_rows,
     plan_one,
     plan_scratch,
@@ -45,19 +45,19 @@ from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
 NUDGE = 1e-3
-"""Of the pressure range: by how much pressures are moved to see the model's slope."""
+"""Step of pressure for slopes of the model, relative to the pressure range."""
 
 MOST = 1e6
-"""Of limits: bar, or bar/s."""
+"""Largest limit [bar or bar/s]."""
 
 HEAD = 8
-"""Coefficients before the nudges."""
+"""Number of coefficients before the pressure steps."""
 
 PASSES = 2
-"""Times that a plan is made, each along what the model makes of the one before."""
+"""Number of optimisations per sample, each linearised about the result of the last."""
 
 STILL = 0.1
-"""By the nudge: what moves less counts as going on as before."""
+"""Motion, relative to the pressure step, that counts as unchanged."""
 
 Limit = Annotated[FiniteFloat, Gt(0), Le(MOST)]
 
@@ -66,7 +66,7 @@ Limit = Annotated[FiniteFloat, Gt(0), Le(MOST)]
 
 
 def model_state(compensator: Block, state: Array) -> Array:
-    """Return the model's state as a compensator's tells it.
+    """Return the model's state from a compensator's.
 
     Raises
     ------
@@ -84,13 +84,13 @@ def model_state(compensator: Block, state: Array) -> Array:
     if isinstance(compensator, Balance) or compensator.n_states == 0:
         return state.copy()
     raise ModelError(
-        f"{compensator.title!r} is no exact inverse whose memory could be foreseen",
+        f"{compensator.title!r} is not an exact inverse, so its state cannot be predicted",
         remedy="invert a model such as pi, gpi, mpi or balance with `invert()`, and give that",
     )
 
 
 def at_once(block: Any) -> Any:
-    """Return a block without its dead times, which its inverse knows nothing of."""
+    """Return a block without its dead times, which its inverse does not compensate."""
     match block:
         case Series() | PerChannel():
             return replace(block, parts=tuple(map(at_once, block.parts)))
@@ -100,7 +100,7 @@ def at_once(block: Any) -> Any:
 
 
 def undoing_state(compensator: Block) -> Callable[[Array], Array]:
-    """Return what makes a compensator's state of its model's."""
+    """Return the kernel that converts a model's state to its compensator's."""
     match compensator:
         case Inverse():
             return compensator.forward.inverse_state
@@ -123,7 +123,7 @@ Resume = Callable[[Array, Array, Array], None]
 
 @kernel
 def pi_resume(coefficients: Array, memory: Array, state: Array) -> None:
-    """Fill the state of a PI model's inverse from that of the model, which has these coefficients."""
+    """Set the state of a PI model's inverse from the model's."""
     n, y = memory.size, 0.0
     for i in range(n):
         state[i] = memory[i]
@@ -134,7 +134,7 @@ def pi_resume(coefficients: Array, memory: Array, state: Array) -> None:
 
 @kernel
 def gpi_resume(coefficients: Array, memory: Array, state: Array) -> None:
-    """Fill the state of a GPI model's inverse from that of the model, which has these coefficients."""
+    """Set the state of a GPI model's inverse from the model's."""
     n, y = memory.size - 1, 0.0
     for i in range(n):
         state[i] = memory[i]
@@ -144,12 +144,12 @@ def gpi_resume(coefficients: Array, memory: Array, state: Array) -> None:
 
 @kernel
 def same_resume(coefficients: Array, memory: Array, state: Array) -> None:
-    """Fill a state that is that of the model."""
+    """Copy the model's state."""
     fill(state, memory)
 
 
 def resume_of(compensator: Block) -> Resume | None:
-    """Return the kernel that fills a compensator's state from its model's; None where there is none."""
+    """Return the kernel that sets a compensator's state from its model's; None if there is none."""
     match compensator:
         case Inverse(forward=PI()):
             return pi_resume
@@ -164,26 +164,26 @@ def resume_of(compensator: Block) -> Resume | None:
 
 
 def _in_room(function: Any) -> Any:
-    """Return a step that is given scratch, whether it takes some or not."""
+    """Return a step with a working-memory argument, whether it needs one or not."""
 
     @kernel
     def without_scratch(
         coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
     ) -> None:
-        """Run what needs no scratch."""
+        """Run a step that needs no working memory."""
         function(coefficients, state, inputs, outputs)
 
     return function if in_scratch(function) else without_scratch
 
 
 def _start_in_room(function: Any) -> Any:
-    """Return a start that is given scratch, whether it takes some or not."""
+    """Return a start with a working-memory argument, whether it needs one or not."""
 
     @kernel
     def start_without_scratch(
         coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
     ) -> None:
-        """Start what needs no scratch."""
+        """Run a start that needs no working memory."""
         function(coefficients, state, inputs, virgin)
 
     return function if in_scratch(function) else start_without_scratch
@@ -193,7 +193,7 @@ def _start_in_room(function: Any) -> Any:
 def predictive_kernels(
     model_step: Step, undo_step: Step, undo_start: Start, resume: Resume, *, one: bool
 ) -> tuple[Step, Start]:
-    """Return the step and the start of a compensator that looks ahead, of one muscle or several.
+    """Return step and start of a predictive compensator, for one muscle or several.
 
     They are made of the kernels of a model and of its inverse; ``resume`` fills the inverse's state
     from the model's. Coefficients are [n, horizon, limits, the model's states, the inverse's, the
@@ -208,7 +208,7 @@ def predictive_kernels(
     def predictive_start(
         coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
     ) -> None:
-        """Start as the inverse does: as if its first reference had been there all along."""
+        """Start as the inverse does: as if its first reference had always been applied."""
         c = coefficients
         numbers = c[HEAD + 2 * int(c[0]) + int(c[2]) * (int(c[0]) + 2) + int(c[5]) :]
         undoing = scratch[: int(c[4])]
@@ -222,7 +222,7 @@ def predictive_kernels(
 def step_of(
     answers: Any, undoes: Any, resume: Any, *, one: bool, decorate: Callable[[Any], Any]
 ) -> Callable[..., None]:
-    """Return the step of `predictive_kernels`, uncompiled; what it calls is compiled, or decorated.
+    """Return the step of `predictive_kernels`, uncompiled; its callees are compiled, or decorated.
 
     Where a model is of several kernels, ``answers``, ``undoes`` and ``resume`` are not compiled either.
     """
@@ -234,18 +234,18 @@ def step_of(
         model: Array,
         nudges: Array,
         memory: Array,
-        wished: Array,
+        desired: Array,
         path: Array,
         given: Array,
         tables: Array,
         states: Array,
         room: Array,
     ) -> None:
-        """Find the errors along a path, and the model's slopes where the motion goes on.
+        """Compute the errors along a path, and the model's slopes where the motion continues.
 
         ``tables`` become [slopes, errors]; they are followed by three vectors to compute in.
         """
-        size, length, count = memory.size, path.size // n - 1, wished.size
+        size, length, count = memory.size, path.size // n - 1, desired.size
         m = count // length
         trial, kept, after = states[:size], states[size : 2 * size], states[2 * size : 3 * size]
         slopes, errors = tables[: n * count], tables[n * count : (n + 1) * count]
@@ -271,13 +271,13 @@ def step_of(
                     slopes[(t * m + i) * n + k] = (change[i] - answer[i]) / (way[k] * nudges[k])
                 given[k] = path[(t + 1) * n + k]
             for i in range(m):
-                errors[t * m + i] = wished[t * m + i] - answer[i]
+                errors[t * m + i] = desired[t * m + i] - answer[i]
             fill(kept, after)
 
     def predictive_step(
         coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
     ) -> None:
-        """Give the first pressures of a horizon within all limits, and take that step."""
+        """Compute the first pressures of a horizon within all limits, and take that step."""
         c = coefficients
         n, m, length, size, n_undoing = int(c[0]), int(c[7]), int(c[1]), int(c[3]), int(c[4])
         planned, count = length * n, length * m
@@ -285,7 +285,7 @@ def step_of(
         n_limits = int(c[2]) * (n + 2)
         rows, own = numbers[:n_limits], numbers[n_limits:]
         model, undo = own[: int(c[5])], own[int(c[5]) : int(c[5]) + int(c[6])]
-        memory, wished, last = state[:size], state[size : size + count], state[size + count :]
+        memory, desired, last = state[:size], state[size : size + count], state[size + count :]
         states, undoing = scratch[: 3 * size], scratch[3 * size : 3 * size + n_undoing]
         more = scratch[3 * size + n_undoing :]
         asked, given = more[: inputs.size], more[inputs.size : 2 * inputs.size - m + n]
@@ -295,13 +295,13 @@ def step_of(
         room = rest[2 * (n + planned) + (n + 1) * count + n + 2 * m :]
         first = last[n] == 0.0
         for i in range(count - m):
-            wished[i] = inputs[i % m] if first else wished[i + m]
-        fill(wished[count - m :], inputs[:m])
+            desired[i] = inputs[i % m] if first else desired[i + m]
+        fill(desired[count - m :], inputs[:m])
         resume(model, memory, undoing)
         fill(asked, inputs)
         fill(given[n:], inputs[m:])
         for t in range(length):
-            fill(asked[:m], wished[t * m : (t + 1) * m])
+            fill(asked[:m], desired[t * m : (t + 1) * m])
             undoes(undo, undoing, room, asked, path[(t + 1) * n : (t + 2) * n])
         if first:  # whatever the rate
             fill(nominal[:n], lowest)
@@ -311,12 +311,12 @@ def step_of(
             last[n] = 1.0
         fill(path[:n], last[:n])
         fill(nominal, path)
-        if not kept_to(n, rows, path):
+        if not clipped_to(n, rows, path):
             slopes, errors = tables[: n * count], tables[n * count : (n + 1) * count]
             for _ in range(PASSES):
-                linearise(n, model, nudges, memory, wished, nominal, given, tables, states, room)
+                linearise(n, model, nudges, memory, desired, nominal, given, tables, states, room)
                 _ = planner(n, rows, slopes, nominal[n:], errors, path, room)
-                _ = kept_to(n, rows, path)
+                _ = clipped_to(n, rows, path)
                 fill(nominal, path)
             last[n + 1] += 1.0
         fill(last[:n], path[n : 2 * n])
@@ -328,7 +328,7 @@ def step_of(
 
 
 def one_step_of(block: Block, sample_time: float) -> Callable[..., None]:
-    """Return what runs a block of several kernels as their steps in scratch are run."""
+    """Return a step that runs a block of several kernels."""
     state = np.empty(block.n_states)
     given, found = np.empty((1, len(block.inputs))), np.empty((1, len(block.outputs)))
     run = block.bind(sample_time, state, given, found)
@@ -344,7 +344,7 @@ def one_step_of(block: Block, sample_time: float) -> Callable[..., None]:
 
 @dataclass(frozen=True, config=STRICT)
 class Predictive(Block):
-    """A compensator with limits, which are looked at over a horizon.
+    """Compensator with limits, optimised over a horizon.
 
     Parameters
     ----------
@@ -413,24 +413,24 @@ class Predictive(Block):
             )
         if self.total_limit is not None and self.total_limit <= low.sum():
             raise ModelError(
-                f"all pressures at their lowest come to {low.sum():g} bar, but "
+                f"all pressures at their lowest add up to {low.sum():g} bar, but "
                 f"total_limit is {self.total_limit:g}",
                 remedy="give a higher one",
             )
 
     @cached_property
     def forward_model(self) -> Block:
-        """What the compensator undoes: from pressures to displacements."""
+        """The inverted model: from pressures to displacements."""
         return self.compensator.inverse()
 
     @cached_property
     def _undoing(self) -> Block:
-        """The compensator, of a model whose outputs come at once."""
+        """The compensator of the model without dead times."""
         return at_once(self.compensator)
 
     @cached_property
     def _planned(self) -> Block:
-        """The model along which is planned."""
+        """The model used for prediction."""
         return self._undoing.inverse()
 
     @cached_property
@@ -443,17 +443,17 @@ class Predictive(Block):
 
     @property
     def samples_ahead(self) -> int:  # type: ignore[override]
-        """By how many samples references are given ahead of when they are due."""
+        """Preview of the references [samples]."""
         return self.horizon - 1
 
     @property
     def n_states(self) -> int:
-        """The model's memory; references to come; last pressures, whether there are; plans made."""
+        """States: the model's, future references, last pressures and their validity, plan counter."""
         n, m = len(self.outputs), self.compensator.n_driven
         return self._planned.n_states + self.horizon * m + n + 2
 
     def rows(self, sample_time: float) -> Array:
-        """Return all limits, as `mckibben.blocks.planning` says."""
+        """Return all limits, as in `mckibben.blocks.planning`."""
         low, high = self.pressures
         most = [self.rate_limit, self.total_limit, self.flow_limit]
         rate, total, flow = (np.inf if limit is None else limit for limit in most)
@@ -461,7 +461,7 @@ class Predictive(Block):
         return limit_rows(low, high, rate * sample_time, total, flow * sample_time, volumes)
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the state before the first sample: as if its reference had been there all along."""
+        """Return the initial state: as if its reference had always been applied."""
         if initial is not None and not isinstance(initial, str):
             return explicit_state(self, initial)
         own = model_state(self._undoing, self._undoing.initial_state(first, initial))
@@ -473,7 +473,7 @@ class Predictive(Block):
 
     @property
     def n_scratch(self) -> int:
-        """States to try, pressures, slopes, and what a plan computes in."""
+        """Scratch: trial states, pressures, slopes, and the working memory of a plan."""
         model, undo = self._planned, self._undoing
         n, m = len(self.outputs), undo.n_driven
         planned = plan_scratch(self.horizon, n, len(self.rows(1.0)))
@@ -484,7 +484,7 @@ class Predictive(Block):
 
     @cached_property
     def _kernels(self) -> tuple[Step, Start] | None:
-        """Those of a compensator of one kernel; None where it is of several."""
+        """Kernels of a compensator of one kernel; None for several."""
         resume = resume_of(self._undoing)
         if resume is None or not isinstance(self.compensator.start, str):
             return None
@@ -506,7 +506,7 @@ class Predictive(Block):
     def coefficients(self, sample_time: float | None) -> Array:
         if self._kernels is None:
             raise ModelError(
-                f"{self.compensator.title!r} cannot be run ahead in C",
+                f"{self.compensator.title!r} cannot be simulated ahead in C",
                 remedy="export pi, gpi or balance that starts at its first sample, or "
                 "stream this one from Python",
             )
@@ -514,7 +514,7 @@ class Predictive(Block):
         return self._numbers(sample_time, [block.coefficients(sample_time) for block in blocks])
 
     def _numbers(self, sample_time: float | None, own: list[Array]) -> Array:
-        """Return the coefficients, of these of the model and the inverse."""
+        """Return the coefficients, with those of the model and the inverse."""
         rows = self.rows(needs_sample_time(self.kind, sample_time))
         low, high = self.pressures
         head = [
@@ -529,13 +529,13 @@ class Predictive(Block):
 
     @property
     def needs_double(self) -> str:
-        """Of several muscles: their plan is solved for step by step, and would be off by 0.2 %."""
+        """Why several muscles need double precision: in single precision their plan is off by 0.2 %."""
         return "plans several muscles, for which single precision is too coarse" * (
             len(self.outputs) > 1
         )
 
     def cost(self, sample_time: float | None) -> Cost:
-        """Return that of the inverse over the horizon; at worst, of all plans too."""
+        """Return the cost of the inverse over the horizon; at worst of all plans too."""
         n, length = len(self.outputs), self.horizon
         inverse = self.compensator.cost(sample_time).usual
         answers = PASSES * (n + 1) * self._planned.cost(sample_time).usual
@@ -566,5 +566,5 @@ class Predictive(Block):
 
     @classmethod
     def example(cls) -> Self:
-        """Return the inverse of a Prandtl-Ishlinskii model behind a slow valve."""
+        """Return the inverse of a Prandtl-Ishlinskii model after a slow valve."""
         return cls(PI.example().inverse(), horizon=8, rate_limit=10.0)

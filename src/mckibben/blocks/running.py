@@ -1,4 +1,4 @@
-"""Running blocks: sample by sample, and many at once."""
+"""Running blocks sample by sample, and many at once."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Stream:
-    """A block running sample by sample, whatever comes.
+    """A block running sample by sample.
 
     An input that is not finite, and may not be missing, changes nothing, and outputs are always finite:
     after a bad input, memory is untouched and the outputs are those of the last good step, 0 before the
@@ -63,7 +63,7 @@ class Stream:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything: the next step is a first one."""
+        """Reset to the initial state."""
         self._started = False
         self._kept: float | list[float] = 0.0
         self.status = self.GOOD
@@ -115,7 +115,7 @@ class Stream:
 
 
 def refuse_time(sample_time: float | None) -> None:
-    """Refuse what cannot be the time between two samples: no finite number of seconds above 0."""
+    """Raise an error for an invalid sample time."""
     possible = sample_time is None or (isfinite(sample_time) and sample_time > 0)
     require(possible, "sample_time", sample_time, "a positive time [s]")
 
@@ -131,7 +131,7 @@ def run_many(
     sample_time: float | None = None,
     initial: Initial | None = None,
 ) -> Array:
-    """Return what blocks of the same channels give, shape (blocks, n, n_outputs), on all cores."""
+    """Return outputs of blocks with the same channels, shape (blocks, n, n_outputs), on all cores."""
     refuse_time(sample_time)
     outputs = np.empty((len(blocks), inputs.shape[0], len(blocks[0].outputs)))
 

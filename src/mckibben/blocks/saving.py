@@ -1,4 +1,4 @@
-"""Blocks as JSON that a person can read: exact to the last bit, and data only, never code.
+"""Blocks as readable JSON: exact to the last bit, and data only, never code.
 
 A file starts with ``format`` and ``version``; every block names its ``kind``, which the registry
 turns into a class. Unknown kinds and fields, numbers that are not finite and values of the wrong type
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 FORMAT = "mckibben-model"
 VERSION = 1
 LARGEST_FILE = 64 * 2**20
-"""Bytes; a longer file is refused before it is parsed."""
+"""Largest model file [bytes]; a larger one is refused before parsing."""
 
 
 def to_dict(block: Block) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def to_dict(block: Block) -> dict[str, Any]:
 
 
 def from_dict(content: Mapping[str, Any]) -> Block:
-    """Return the block that `to_dict` described; refuse anything that is not as it should be."""
+    """Return the block of a dict from `to_dict`; raise an error for invalid content."""
     if not isinstance(content, Mapping) or content.get("format") != FORMAT:
         raise ModelError(
             f'this is not a saved model (no "format": "{FORMAT}")',
@@ -55,7 +55,7 @@ def from_dict(content: Mapping[str, Any]) -> Block:
 
 
 def part_to_dict(part: Any) -> Any:
-    """Return a block, or anything in one, as JSON-ready values."""
+    """Return a block, or a value in one, as JSON-ready values."""
     if is_dataclass(part) and not isinstance(part, type):
         named = {"kind": part.kind} if hasattr(part, "kind") else {}
         return named | {f.name: part_to_dict(getattr(part, f.name)) for f in fields(part)}
@@ -65,7 +65,7 @@ def part_to_dict(part: Any) -> Any:
 
 
 def part_from_dict(content: Any, group: str = "blocks") -> Any:
-    """Return the block (or other plug-in of ``group``) that `part_to_dict` described."""
+    """Return the block (or other plug-in of ``group``) of a dict from `part_to_dict`."""
     if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str):
         raise ModelError('a block without a "kind"', remedy="save the model again")
     kind = content["kind"]
@@ -83,7 +83,7 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
 
 
 def nested(content: Any) -> Any:
-    """Turn the dict of a block inside another into that block; for fields of compositions."""
+    """Convert the dict of a block inside another to that block; for fields of compositions."""
     return part_from_dict(content) if isinstance(content, Mapping) else content
 
 
@@ -93,7 +93,7 @@ def to_text(block: Block) -> str:
 
 
 def save(block: Block, path: str | Path) -> None:
-    """Write a block as JSON, by a temporary file that is then renamed, over what had the name."""
+    """Save a block as JSON, through a temporary file that is then renamed."""
     write_text(path, to_text(block))
 
 
@@ -141,5 +141,5 @@ def _refuse(constant: str) -> None:
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     content = dict(pairs)
     if len(content) < len(pairs):
-        raise ModelError("a field stands twice in the file", remedy="save the model again")
+        raise ModelError("a field occurs twice in the file", remedy="save the model again")
     return content

@@ -1,4 +1,4 @@
-"""Fields of a saved model that were not identified, set to other values without identifying it again."""
+"""Setting fields of a saved model that were not identified."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from mckibben.errors import ModelError, ModelWarning
 from mckibben.numerals import numeral
 
 BEYOND = 0.05
-"""Share by which a value may lie beyond those that the model was identified at."""
+"""Share by which a value may exceed the range of the identification without a warning."""
 
 
 def settable(model: Block) -> dict[str, Any]:
-    """Return the fields of a model and its parts that can be set, with their values.
+    """Return the settable fields of a model and its parts, with their values.
 
     >>> from mckibben.blocks.force.activation import ActivationPressure
     >>> settable(ActivationPressure.example())
@@ -26,7 +26,7 @@ def settable(model: Block) -> dict[str, Any]:
 
 
 def with_fields(model: Block, values: Mapping[str, Any]) -> Block:
-    """Return a model with other values of fields that were not identified, in whichever part has them.
+    """Return a model with other values of settable fields, in any part.
 
     Warns where a value lies beyond those that the model was identified at.
 
@@ -65,7 +65,7 @@ def _within(value: float, low: float, high: float) -> bool:
 
 
 def _parts(value: Any) -> Iterator[Block]:
-    """Give a block and all blocks in its fields."""
+    """Yield a block and all blocks in its fields."""
     if isinstance(value, tuple):
         for item in value:
             yield from _parts(item)
@@ -89,7 +89,7 @@ def _changed(value: Any, values: Mapping[str, Any]) -> Any:
 
 
 def summary(model: Block) -> dict[str, Any]:
-    """Return what a model takes, gives and is, for JSON."""
+    """Return a summary of a model for JSON: inputs, outputs and kind."""
     from mckibben.blocks.force.feedforward import compensator
 
     try:

@@ -1,4 +1,4 @@
-"""Equations solved inside kernels: one root a sample, in a bracket, and small linear systems.
+"""Equations solved inside kernels: bracketed roots, and small linear systems.
 
 An inverse without a closed form is solved for in every sample, for a block whose output rises with its
 input. The block gives two compiled functions: ``trial(u, memory)``, the output that an input would
@@ -28,7 +28,7 @@ from mckibben.blocks.kernels import (
 )
 
 MOST_STEPS = 200
-"""Of bisection, of closing the bracket, and of the walk each way: far more than they take."""
+"""Maximum number of steps of bisection, of closing the bracket, and of each bracketing search."""
 
 
 @inlined
@@ -106,7 +106,7 @@ def solve_near(
 
 @inlined
 def solve_input(trial: Any, coefficients: Array, state: Array, inputs: Array) -> float:
-    """Return the input for which the forward block follows the reference, and remember it."""
+    """Solve for the input that reproduces the reference, and store it."""
     n = state.size - 2
     lowest, highest = coefficients[-2], coefficients[-1]
     forward, own = coefficients[:-2], state[:n]
@@ -122,10 +122,10 @@ def solve_input(trial: Any, coefficients: Array, state: Array, inputs: Array) ->
 def solved_inverse(
     trial: Callable[..., float], advance: Callable[..., None], start: Start
 ) -> tuple[Step, Start]:
-    """Return the step and the start of a block's inverse, by its ``trial``, ``advance`` and start."""
+    """Return step and start of a block's inverse, from its ``trial``, ``advance`` and start."""
 
     def inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-        """Solve for the input for which the block follows the reference, and take that step."""
+        """Solve for the input that reproduces the reference, and take that step."""
         u = solve_input(trial, coefficients, state, inputs)
         advance(u, coefficients[:-2], state[:-2])
         outputs[0] = u
@@ -136,10 +136,10 @@ def solved_inverse(
 def solved_kernels(
     trial: Callable[..., float], advance: Callable[..., None], start: Start
 ) -> tuple[Step, Step, Start]:
-    """Return the step of the block, too, before those of its inverse."""
+    """Return the step of the block, and those of its inverse."""
 
     def forward_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-        """Give the output, and take the step."""
+        """Compute the output, and take the step."""
         outputs[0] = trial(inputs[0], (coefficients, state))
         advance(inputs[0], coefficients, state)
 
@@ -147,7 +147,7 @@ def solved_kernels(
 
 
 def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> Start:
-    """Return the start kernel of an inverse that is solved for: by bisection, the first input that fits.
+    """Return the start of an iterative inverse: by bisection, the first input that fits.
 
     ``start`` is that of the block, behind whose state the inverse has 2 numbers, the last input and the
     count of samples clipped, or the count alone.
@@ -196,11 +196,11 @@ def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> 
 
 
 USUAL_NEWTON, MOST_NEWTON = 3, 60
-"""Steps of Newton's method, on smooth references and at worst."""
+"""Steps of Newton's method: typical on smooth references, and maximum."""
 
 
 def newton_cost(step: int) -> Cost:
-    """Return the cost of a sample that is solved by Newton's method, of whose steps one is known."""
+    """Return the cost of a sample solved by Newton's method, from that of one step."""
     return Cost(USUAL_NEWTON * step, MOST_NEWTON * step)
 
 
@@ -243,7 +243,7 @@ def newton(
     least_step: float,
     memory: Array,
 ) -> float:
-    """Return where a rising ``evaluate(x, memory)`` is the target, between two ends that bracket it.
+    """Return the root of an increasing ``evaluate(x, memory) - target`` in a bracket.
 
     Newton's method inside a shrinking bracket, with ``slope(x, value, memory)`` given the value there;
     ends when the step is at most ``least_step``, or the bracket cannot shrink any further.

@@ -1,1 +1,1 @@
-"""The command line: one file a command, nothing but calls into the package."""
+"""The command line: one file per command, with calls into the package only."""

@@ -1,4 +1,4 @@
-"""The program's first lines: Ctrl-C while it is being loaded ends it without a traceback."""
+"""Entry point of the program; Ctrl-C during loading ends it without a traceback."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Entry point: commands by name, loaded when they are used, and what becomes of errors and warnings."""
+"""Commands by name, loaded on use, and the handling of errors and warnings."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ BAD_INPUT = 2
 
 
 class Commands(click.Group):
-    """The commands; a help lists them by the first lines of their modules, which are not loaded."""
+    """The commands; the help lists the first lines of their modules without loading them."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return their names."""
@@ -94,7 +94,7 @@ app = Commands(
 
 
 def run() -> None:
-    """Run the command line: errors become one paragraph on standard error, and an exit code."""
+    """Run the command line; errors are printed in one paragraph and set the exit code."""
     forget_notes()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -149,5 +149,5 @@ def _say(message: str, code: int) -> int:
 
 
 def _text(warning: Warning | str) -> str:
-    """Return the text of a warning with its parameters as they were written."""
+    """Return the text of a warning with parameters as flags."""
     return str(warning.args[0] if isinstance(warning, Warning) and warning.args else warning)

@@ -1,4 +1,4 @@
-"""What commands print: words and tables, or JSON, on standard output; notes and progress beside."""
+"""Output of commands: text, tables or JSON on standard output; notes and progress on standard error."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from mckibben.errors import MckibbenError, in_terms_of
 from mckibben.system.atomic import to_json
 
 INTERRUPTED = 130
-"""Exit code of a command that was stopped."""
+"""Exit code of an interrupted command."""
 
 _UNSEEN = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )
-"""What a terminal would obey instead of showing it, and halves of characters."""
+"""Control characters and surrogates, which are not printed."""
 
 
 class InterruptionError(MckibbenError):
-    """Work that the user stopped; the text says what was finished."""
+    """Work that the user stopped; the text states what was finished."""
 
 
 def visible(text: str) -> str:
-    r"""Return words with control characters written out: names in files may hold anything.
+    r"""Return text with control characters escaped; names in files may contain any.
 
     >>> visible("\x1b[2J")
     '\\u001b[2J'
@@ -48,7 +48,7 @@ _noted: set[str] = set()
 
 
 def note(text: str, *, error: bool = False) -> None:
-    """Print a note, unless it was printed before; its parameters as flags."""
+    """Print a note once, with its parameters as flags."""
     line = f"Note: {plainly(text)}"
     if line not in _noted:
         _noted.add(line)
@@ -56,7 +56,7 @@ def note(text: str, *, error: bool = False) -> None:
 
 
 def forget_notes() -> None:
-    """Begin a command: nothing was printed yet."""
+    """Reset the printed notes at the start of a command."""
     _noted.clear()
 
 

@@ -1,4 +1,4 @@
-"""Flags and arguments of commands, made from the annotations of a function and of its options."""
+"""Flags and arguments of commands, from the annotations of a function and of its options."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mckibben.options import Option, parsed
 
 @dataclass(frozen=True)
 class Argument:
-    """A value that stands without a flag.
+    """A positional argument.
 
     Parameters
     ----------
@@ -38,17 +38,18 @@ COMMANDS = (
     *("track", "plan", "plot", "reproduce", "measured", "info", "link", "example", "export"),
     *("rig", "muscles", "app"),
 )
-"""Each is a module of `mckibben.cli.commands`, with a command of its name, and its help as docstring."""
+"""Commands: each is a module of `mckibben.cli.commands` of its name, whose docstring is its help.
+"""
 
 _flags: dict[str, str] = {}
-"""Of the command that runs: its flags by the names of their parameters."""
+"""Flags of the running command, by parameter name."""
 
 
 class Command(click.Command):
-    """A command whose flags are what errors call its parameters."""
+    """A command whose flags are named in errors."""
 
     def make_context(self, *given: Any, **more: Any) -> click.Context:
-        """Take the words that were typed."""
+        """Store the arguments as typed."""
         _flags.clear()
         for param in self.params:
             if isinstance(param, click.Option) and param.name:
@@ -57,7 +58,7 @@ class Command(click.Command):
 
 
 def as_flag(name: str, key: str | None = None, value: str | None = None) -> str:
-    """Return a parameter in an error as a flag of the command that runs, or as Python has it."""
+    """Return a parameter in an error as a flag of the running command, or as Python."""
     flag = _flags.get(name) or _flags.get(f"{name}s")
     if flag is None:
         return python_parameter(name, key, value)
@@ -66,12 +67,12 @@ def as_flag(name: str, key: str | None = None, value: str | None = None) -> str:
 
 
 def as_command(name: str) -> str:
-    """Return an operation in an error as a command, or as Python has it."""
+    """Return an operation in an error as a command, or as Python."""
     return f"mckibben {name}" if name in COMMANDS else python_operation(name)
 
 
 def plainly(text: str) -> str:
-    """Return a note in one line, its parameters as flags."""
+    """Return a note in one line, with parameters as flags."""
     return in_terms_of(" ".join(text.split()), as_flag, as_command)
 
 
@@ -81,17 +82,17 @@ Files = Annotated[
 Test = Annotated[tuple[Path, ...], Option("Recording to test on; repeatable.", "FILE")]
 ModelFile = Annotated[Path, Argument("MODEL", "Saved model (JSON).")]
 Quick = Annotated[bool, Option("Models that take seconds; same as --models quick.")]
-Force = Annotated[bool, Option("Replace files of yours, too; never what is read.")]
+Force = Annotated[bool, Option("Replace files that mckibben did not write, except inputs.")]
 Json = Annotated[bool, Option("Print the result as JSON on standard output.", flag="--json")]
 
 
 def repeated() -> str:
-    """Return the command as it was typed."""
+    """Return the command line as it was typed."""
     return shlex.join(["mckibben", *sys.argv[1:]])
 
 
 def command(run: Callable[..., int | None]) -> click.Command:
-    """Return a command that calls a function: its parameters are arguments and flags.
+    """Return a command that calls a function, whose parameters are arguments and flags.
 
     Parameters that are dataclasses are asked for field by field. The help is the docstring of the
     function, or of its module where it has none. What the function returns is the exit code.
@@ -129,7 +130,7 @@ def made(name: str, hint: Any, default: Any) -> click.Parameter:
     kind, *extras = get_args(hint) if get_origin(hint) is Annotated else (hint,)
     about = next((one for one in extras if isinstance(one, Option | Argument)), Option(""))
     required = default is Parameter.empty or default is MISSING
-    kind, several, width = _taken_apart(kind)
+    kind, several, width = _unwrapped(kind)
     if isinstance(about, Argument):
         return click.Argument(
             [name],
@@ -165,8 +166,8 @@ def _spellings(name: str, flag: str) -> list[str]:
     return [flag or f"--{name.replace('_', '-')}"]
 
 
-def _taken_apart(kind: Any) -> tuple[Any, bool, int]:
-    """Return the kind of one value, whether there may be several, and of how many words it is."""
+def _unwrapped(kind: Any) -> tuple[Any, bool, int]:
+    """Return the type of one value, whether it may be repeated, and its number of words."""
     if get_origin(kind) in (Union, types.UnionType):
         kind = next(one for one in get_args(kind) if one not in (type(None), Any))
     if get_origin(kind) in (list, tuple):
@@ -188,14 +189,14 @@ def _click_type(kind: Any) -> Any:
 
 
 def _is_plain(default: Any, about: Option) -> bool:
-    """Return whether a default is what would be typed."""
+    """Return whether a default is shown as it would be typed."""
     return isinstance(default, int | float | str | Path) and default != "" and not about.parse
 
 
 def _parsed(
     name: str, about: Option, mapping: bool, several: bool, default: Any
 ) -> Callable[..., Any]:
-    """Return what makes the value of an option from the words given for it."""
+    """Return the parser of an option's words."""
 
     def value(context: click.Context, parameter: click.Parameter, given: Any) -> Any:
         del context

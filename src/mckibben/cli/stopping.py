@@ -1,4 +1,4 @@
-"""Ctrl-C: the first stops the work and says what is finished, the second ends the program at once."""
+"""Ctrl-C: the first stops the work and reports what is finished, the second exits at once."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PATIENCE = 1.3
 
 @contextmanager
 def stoppable(folder: Path | None) -> Iterator[None]:
-    """Let long work be stopped; whatever it is at, the program ends soon.
+    """Make long work interruptible.
 
     Parameters
     ----------
@@ -71,30 +71,30 @@ def stoppable(folder: Path | None) -> Iterator[None]:
 
 @contextmanager
 def _watched() -> Iterator[None]:
-    """Hear of signals in a thread too: the main one hears nothing while it is in compiled code."""
-    heard, told = os.pipe()
-    os.set_blocking(told, False)
+    """Handle signals in a thread, as the main thread cannot while it runs compiled code."""
+    read_end, write_end = os.pipe()
+    os.set_blocking(write_end, False)
 
     def watch() -> None:
-        if not os.read(heard, 1):
+        if not os.read(read_end, 1):
             return  # all is done
         with suppress(OSError):
             os.write(2, b"\nStopping ...\n")
-        ready, _, _ = select.select([heard], [], [], PATIENCE)
-        if not ready or os.read(heard, 1):
+        ready, _, _ = select.select([read_end], [], [], PATIENCE)
+        if not ready or os.read(read_end, 1):
             leave(INTERRUPTED)  # a second signal, or it takes too long
 
     threading.Thread(target=watch, daemon=True).start()
-    before = signal.set_wakeup_fd(told, warn_on_full_buffer=False)
+    before = signal.set_wakeup_fd(write_end, warn_on_full_buffer=False)
     try:
         yield
     finally:
         signal.set_wakeup_fd(before)
-        os.close(told)
+        os.close(write_end)
 
 
 def _quiet(printed: Any) -> Any:
-    """Do not print where an interruption is lost: in what compiled code calls, as a compiler does."""
+    """Suppress messages about interruptions that are lost in compiled code."""
 
     def lost(what: sys.UnraisableHookArgs) -> None:
         if what.exc_type is not KeyboardInterrupt:
@@ -104,17 +104,17 @@ def _quiet(printed: Any) -> Any:
 
 
 def how_to_go_on(folder: Path | None) -> str:
-    """Return what was finished of work that was stopped, and how to go on."""
+    """Return what was finished of the stopped work, and how to resume."""
     if folder is None:
         return "Stopped."
     place = folder / UNFINISHED
     if not any(place.rglob("*.*")):
         return "Stopped before anything was finished."
-    return f"Stopped; the same command goes on from what is in {place}."
+    return f"Stopped; the same command resumes from {place}."
 
 
 def stop_short(board: Leaderboard, folder: Path | None) -> None:
-    """Leave if a comparison was stopped before it was done.
+    """Exit if a comparison was stopped before it was done.
 
     Raises
     ------

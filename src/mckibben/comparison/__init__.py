@@ -1,1 +1,1 @@
-"""Models chosen and tested on recordings: splits, scores, intervals, memory test, the whole study."""
+"""Model comparison on recordings: splits, scores, intervals, memory test, and whole studies."""

@@ -1,4 +1,4 @@
-"""Comparisons on a joblib backend chosen outside, such as a Dask cluster: the same tasks, elsewhere.
+"""Comparisons on an external joblib backend, such as a Dask cluster.
 
 What comes back is unpickled, so a cluster is trusted as this machine is.
 """
@@ -22,7 +22,7 @@ PATIENCE = 30.0
 
 @contextmanager
 def on_cluster(address: str | None) -> Iterator[None]:
-    """Fit the models of comparisons within this context on a Dask cluster; without address, here.
+    """Fit the models of comparisons within this context on a Dask cluster; locally without address.
 
     Results are those of a serial run, to the bit.
 
@@ -57,7 +57,7 @@ def on_cluster(address: str | None) -> Iterator[None]:
 
 
 def chosen() -> bool:
-    """Return whether a joblib backend of another kind than its own was chosen outside."""
+    """Return whether an external joblib backend is selected."""
     if "joblib" not in sys.modules:
         return False
     from joblib.parallel import LokyBackend, get_active_backend
@@ -66,7 +66,7 @@ def chosen() -> bool:
 
 
 def processes() -> int:
-    """Return how many processes the backend that was chosen outside has."""
+    """Return the number of processes of the selected backend."""
     from joblib.parallel import get_active_backend
 
     backend, wanted = get_active_backend()
@@ -74,7 +74,7 @@ def processes() -> int:
 
 
 def outcomes(work: Work, common: Any, items: Sequence[Any]) -> Iterator[Outcome]:
-    """Yield one outcome for every item, as it comes, whatever becomes of the workers."""
+    """Yield one outcome per item as it finishes, also if workers fail."""
     from joblib import Parallel, delayed
     from joblib.parallel import get_active_backend
 

@@ -1,4 +1,4 @@
-"""Which channels of recordings drive, which are modelled, and which are given beside."""
+"""Selection of inputs, outputs and further inputs among the channels of recordings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mckibben.estimators.coupled.base import loads_among, schedules
 from mckibben.recording import Recording
 
 Names = str | Sequence[str] | None
-"""One channel, several, or None for what the recordings' names say."""
+"""One channel, several, or None to choose by the recordings' names."""
 
 DRIVING = ("pressure", "voltage", "command", "input", "u", "p")
 """Names of inputs, those nearest to the muscle first."""
@@ -23,28 +23,31 @@ ALONG, TURNED = ("displacement", "length", "contraction", "position"), ("angle",
 """Names of translations and of rotations."""
 
 COORDINATES = "[xyz]"
-"""Of one place; each is an output of its own."""
+"""Coordinates of a position; each is a separate output."""
 
 MOVED = (*ALONG, *TURNED, "output", COORDINATES)
 """Names of outputs."""
 
 UNITS_DRIVING, UNITS_MOVED = ("bar", "V"), ("mm", "rad")
-"""Units of either, where names are not recognised."""
+"""Units of inputs and of outputs, for names that are not recognised."""
 
 PLACES = "[a-z]|left|right|top|bottom|upper|lower|front|back|rear|flexor|extensor"
-"""Endings that distinguish channels of one quantity, where numbers do not."""
+"""Suffixes other than numbers that distinguish channels of one quantity."""
 
 DESIRED = ("reference_", "command_")
-"""Beginnings of names of what a loop is given: these are no measurements."""
+"""Prefixes of references of a loop, which are not measurements."""
 
 FORCE, PRESSURE, OF_FORCE = "force", "pressure", ("length", "displacement")
-"""Force laws are of the first of these that there is, beside the pressure."""
+"""Channels of force laws: the first of these that is present, with the pressure."""
 
 HELD = 0.01
-"""Share of its largest value by which a length must vary for a force to be learned of it."""
+"""Smallest variation of a length, relative to its largest value, for which a force law is fitted.
+"""
 
 STEADY = 0.05
-"""Largest variation within a run, over that of all runs, of a load that is a level of each run."""
+"""Largest variation of a load within a run, relative to that over all runs, for which it counts as
+constant in the run.
+"""
 
 Sides = tuple[tuple[str, ...], tuple[str, ...]]
 """Inputs and outputs."""
@@ -52,7 +55,7 @@ Sides = tuple[tuple[str, ...], tuple[str, ...]]
 
 @dataclass(frozen=True)
 class Channels:
-    """What drives, what is to be modelled, and what schedules.
+    """Inputs, outputs and scheduling channels of a comparison.
 
     Parameters
     ----------
@@ -68,24 +71,24 @@ class Channels:
 
     @property
     def single(self) -> bool:
-        """Whether this is one muscle whose load does not matter."""
+        """Whether this is one muscle without a load input."""
         return len(self.inputs) == len(self.outputs) == 1 and self.scheduling is None
 
     def scheduled(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
-        """Return the channels that schedule models of recordings."""
+        """Return the scheduling channels for models of recordings."""
         if self.scheduling is not None:
             return self.scheduling
         return () if self.single else schedules(recordings, (*self.inputs, *self.outputs))
 
     def known(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
-        """Return all channels that models are given; those of force by length find the pressure."""
+        """Return all input channels of the models; force laws also use the pressure."""
         names = (*self.inputs, *self.scheduled(recordings))
         by_length = self.outputs == (FORCE,) and any(name in OF_FORCE for name in names)
         finds = by_length and PRESSURE not in names and all(PRESSURE in one for one in recordings)
         return (*names, PRESSURE) if finds else names
 
     def ignored(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
-        """Return loads, and lengths that a force depends on, that vary and that no model is given."""
+        """Return varying loads and lengths that are no input of any model."""
         lengths = OF_FORCE if self.outputs == (FORCE,) else ()
         others = {*self.known(recordings), *self.outputs}
         some = dict.fromkeys([*schedules(recordings), *lengths])
@@ -96,7 +99,7 @@ class Channels:
         )
 
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Return every output with the input of its number, else of its place."""
+        """Return every output with the input of the same number, or of the same position."""
 
         def own(place: int, output: str) -> str:
             number = re.search(r"\d*$", output)
@@ -114,7 +117,7 @@ def channels_of(
     outputs: Names = None,
     load: str | None = None,
 ) -> Channels:
-    """Return the channels that a comparison is about, as named, else by names and units.
+    """Return the channels of a comparison: as named, otherwise by names and units.
 
     A force beside other inputs is a load. Force is modelled over length or displacement, where that
     varies and nothing else is moved; models of it find the pressure themselves.
@@ -139,15 +142,15 @@ def channels_of(
     given = _named(recordings, inputs, sides[0])
     wanted = _named(recordings, outputs, sides[1])
     channels = loads_told(recordings, Channels(given, wanted, (load,) if load else None))
-    told = channels.scheduling or ()
-    named = (*channels.inputs, *channels.outputs, *told)
+    further = channels.scheduling or ()
+    named = (*channels.inputs, *channels.outputs, *further)
     if twice := [name for name in named if named.count(name) > 1]:
         raise DataError(
             "the channel is named twice among inputs, outputs and load",
             channel=twice[0],
-            remedy="a model is not given what it predicts: name each channel once",
+            remedy="an output cannot also be an input: name each channel once",
         )
-    for name in told:
+    for name in further:
         for recording in recordings:
             if name not in recording:
                 raise DataError(
@@ -160,7 +163,7 @@ def channels_of(
 
 
 def recognised(recordings: Sequence[Recording], channels: Sequence[str]) -> Sides:
-    """Return which of some channels that all recordings have are inputs and outputs; of several, all.
+    """Return inputs and outputs among the channels common to all recordings; of several, all.
 
     Where none is recognised, the first drives the second.
     """
@@ -173,7 +176,7 @@ def recognised(recordings: Sequence[Recording], channels: Sequence[str]) -> Side
 
 
 def loads_told(recordings: Sequence[Recording], channels: Channels) -> Channels:
-    """Return channels whose forces beside other inputs schedule: loads are never commanded."""
+    """Return channels with forces as scheduling loads, if there are other inputs."""
     loads = loads_among(recordings, channels.inputs)
     if channels.scheduling is not None or not loads:
         return channels
@@ -182,7 +185,7 @@ def loads_told(recordings: Sequence[Recording], channels: Channels) -> Channels:
 
 
 def dead_loads_told(recordings: Sequence[Recording], channels: Channels) -> Channels:
-    """Return channels of one muscle with the loads that are held at a level in every recording."""
+    """Return channels of one muscle with the loads that are constant in every recording."""
     if not (channels.single and recordings):
         return channels
     held = [
@@ -194,13 +197,13 @@ def dead_loads_told(recordings: Sequence[Recording], channels: Channels) -> Chan
 
 
 def held_at_levels(recordings: Sequence[Recording], name: str) -> bool:
-    """Return whether a channel differs from recording to recording, and hardly within one."""
+    """Return whether a channel differs between recordings but is nearly constant in each."""
     span = float(np.ptp(np.concatenate([one[name] for one in recordings])))
     return span > 0 and all(float(np.ptp(one[name])) <= STEADY * span for one in recordings)
 
 
 def any_moves(recordings: Sequence[Recording], channels: Sequence[str]) -> bool:
-    """Return whether any channel moves within any recording, by more than its offset would round to."""
+    """Return whether any channel varies within a recording by more than rounding."""
     return any(
         float(np.ptp(run[name])) > 1e-6 * (1.0 + float(np.abs(run[name]).max()))
         for run in recordings
@@ -210,7 +213,7 @@ def any_moves(recordings: Sequence[Recording], channels: Sequence[str]) -> bool:
 
 
 def varies(lengths: Sequence[Array]) -> bool:
-    """Return whether lengths of all recordings are held at more than one, approaches excepted."""
+    """Return whether lengths are held at several values over all recordings, ignoring approaches."""
     samples = np.concatenate([*lengths, np.zeros(0)])
     if not samples.size:
         return False
@@ -218,7 +221,7 @@ def varies(lengths: Sequence[Array]) -> bool:
 
 
 def lacks_displacement(recordings: Sequence[Recording]) -> bool:
-    """Return whether force by length and pressure is all there is to model: nothing else is moved."""
+    """Return whether the only model possible is force by length and pressure."""
     others = (*ALONG, *TURNED)
     return all(
         {OF_FORCE[0], PRESSURE, FORCE} <= {*one.channels}
@@ -228,7 +231,7 @@ def lacks_displacement(recordings: Sequence[Recording]) -> bool:
 
 
 def moved_by(recordings: Sequence[Recording], given: str, channels: Sequence[str]) -> str:
-    """Return the channel over which an output loops: its input, or where that is held what drives."""
+    """Return the abscissa of an output's loop: its input, or the driving channel if that is constant."""
     if any_moves(recordings, (given,)):
         return given
     driving = _called(channels, DRIVING)
@@ -238,7 +241,7 @@ def moved_by(recordings: Sequence[Recording], given: str, channels: Sequence[str
 def _force_over(
     recordings: Sequence[Recording], inputs: Sequence[str] | None, outputs: Sequence[str] | None
 ) -> str | None:
-    """Return the length or displacement over which force is modelled, beside pressure, or None."""
+    """Return the length or displacement of a force law with pressure, or None."""
     meant = lacks_displacement(recordings) if outputs is None else tuple(outputs) == (FORCE,)
     for name in OF_FORCE if meant else ():
         asked = inputs is None or set(inputs) in ({name}, {name, PRESSURE})
@@ -249,7 +252,7 @@ def _force_over(
 
 
 def _over_held(recordings: Sequence[Recording], sides: Sides) -> Sides:
-    """Return force over the output found, where that is held in all recordings and the force is not."""
+    """Return force instead of the output, if that is held in all recordings and the force is not."""
     outputs = sides[1]
     held = len(outputs) == 1 and not any_moves(recordings, outputs)
     forced = all(FORCE in one for one in recordings) and any_moves(recordings, (FORCE,))
@@ -264,7 +267,7 @@ def _units(recordings: Sequence[Recording], channels: Sequence[str]) -> dict[str
 
 
 def _by_name(channels: Sequence[str], units: Mapping[str, str]) -> Sides:
-    """Return inputs and outputs by name, else by unit; empty where neither is recognised.
+    """Return inputs and outputs by name, else by unit; empty if neither is recognised.
 
     Outputs are the first quantity, or where those are fewer than inputs, the most of a kind. Kinds are
     not mixed: errors in mm and in rad have no mean.
@@ -280,7 +283,7 @@ def _by_name(channels: Sequence[str], units: Mapping[str, str]) -> Sides:
 
 
 def _called(channels: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
-    """Return the channels that are called by the first of some words that any is: one, or several.
+    """Return the channels with the first of several names that occurs: one, or numbered ones.
 
     Several are distinguished by numbers, of which the first may be missing, or by places.
     """

@@ -1,4 +1,4 @@
-"""The choice among models: by cross-validated error, never by the test."""
+"""Model choice: by cross-validated error, never by the test."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ CONSTANT = "constant"
 """Name of the row that predicts the mean of the training output, whatever the input: never chosen."""
 
 CAUTION = 2.0
-"""Factor on the error of a model that is good only near its training data, where models are sorted."""
+"""Factor on the ranking error of a model that is reliable only near its training data."""
 
 USEFUL = 0.9
-"""Share of the constant's error on the test from which on a model is of no use."""
+"""Test error, relative to that of the constant, above which no model is recommended."""
 
 Against = Literal["validation", "test"]
-"""Where the constant is not beaten, so that no model is recommended."""
+"""The data on which no model is clearly better than the constant, so that none is recommended."""
 
 
 class Ranked(Protocol):
@@ -29,7 +29,7 @@ class Ranked(Protocol):
 
     @property
     def reason(self) -> str | None:
-        """Why it failed, or None."""
+        """Reason of a failure, or None."""
 
     @property
     def skill_least(self) -> float | None:
@@ -37,7 +37,7 @@ class Ranked(Protocol):
 
     @property
     def test_error(self) -> float:
-        """RMSE on the test data, infinite where there is none."""
+        """RMSE on the test data, infinite if there is none."""
 
 
 R = TypeVar("R", bound=Ranked)
@@ -49,7 +49,7 @@ def order(
     fitted: float | None,
     skill_least: float | None = None,
 ) -> tuple[bool, bool, float, str]:
-    """Return what models are sorted by: the validated ones first, by that; nothing of the test is in it.
+    """Return the sort key of models: validated ones first, by their error; independent of the test.
 
     Those that are known to be no better than the constant come last. Blocks of the same motion cannot
     show how a model extrapolates, so the error of one with a caution counts `CAUTION` times.
@@ -68,7 +68,7 @@ def order(
 
 
 def recommended(rows: Sequence[R], constant: Ranked | None) -> tuple[R | None, Against | None]:
-    """Return the model to recommend, or None and where the constant is not beaten.
+    """Return the recommended model, or None and the data on which it is no better than the constant.
 
     It is the first in the order of the choice that beats the constant in the cross-validation beyond
     chance. The test does not choose, but it may take the recommendation away: no other is chosen in
@@ -92,7 +92,7 @@ def recommended(rows: Sequence[R], constant: Ranked | None) -> tuple[R | None, A
 
 
 def acceptable(row: Ranked, constant: Ranked | None) -> bool:
-    """Return whether nothing is known against a row beside one that is recommended."""
+    """Return whether a row has no known defect compared with a recommended one."""
     if row.reason is not None or constant is None:
         return row.reason is None
     return (row.skill_least is None or row.skill_least > 0) and _beats(row, constant)
@@ -103,12 +103,12 @@ def _beats(row: Ranked, constant: Ranked) -> bool:
 
 
 def useful(error: float, constant: float) -> bool:
-    """Return whether an error is clearly less than that of the constant on the same samples."""
+    """Return whether an error is clearly smaller than that of the constant on the same samples."""
     return error < USEFUL * constant
 
 
 def skill_of(squares: Array, constant: Array, seed: int) -> tuple[float, float]:
-    """Return the share of a constant's squared error that a model removes, and its lower bound.
+    """Return the share of a constant's squared error that a model explains, and its lower bound.
 
     The bound is exceeded by 99 % of resamples of blocks, the same for both.
 

@@ -1,4 +1,4 @@
-"""One model fitted, cross-validated and run free; in tasks that processes can share."""
+"""Fitting, cross-validation and free runs of one model, in tasks for worker processes."""
 
 from __future__ import annotations
 
@@ -29,18 +29,20 @@ from mckibben.system.threads import cores
 from mckibben.system.workers import Outcome
 
 TIMED_SAMPLES = 20_000
-"""Of the simulation that the time of a step is measured by."""
+"""Number of samples of the simulation that measures the time of a step."""
 
 WORTH_A_PROCESS = 4.0
-"""Seconds of work below which starting processes takes longer than it saves."""
+"""Seconds of work below which starting processes costs more time than it saves."""
 
 PIECES = 8
-"""Consecutive pieces of a held-out recording that squared errors are summed over, to be resampled."""
+"""Number of consecutive pieces of a held-out recording whose squared errors are summed, for
+resampling.
+"""
 
 
 @dataclass(frozen=True)
 class Data:
-    """What all models are given: data to fit and test on, parts of the cross-validation, channels.
+    """Data common to all models: training and test data, folds, channels.
 
     ``early`` are recordings for searches that stop early.
     """
@@ -62,7 +64,7 @@ class Data:
         return np.concatenate([(found - run.matrix(names))[rows] for found, run, rows in runs])
 
     def held_out(self, predictions: Mapping[int, Sequence[Array]], block: Block) -> list[Held]:
-        """Return predictions of all folds beside what was measured."""
+        """Return predictions on all folds, and the measured outputs."""
         return [
             Held(
                 run.matrix(channel.name for channel in block.inputs),
@@ -80,7 +82,7 @@ class Data:
 
 @dataclass(frozen=True)
 class Item:
-    """A model to fit, and its settings; perhaps only to the recording of that index."""
+    """A model to fit, and its settings; optionally for one recording only."""
 
     model: str
     settings: Mapping[str, Any]
@@ -89,7 +91,7 @@ class Item:
 
 @dataclass(frozen=True)
 class Task:
-    """Folds of a model to validate on, and whether to fit to all training data and to test.
+    """Folds of a model to validate on, and whether to fit on all training data and test.
 
     Folds come first: they load the compiled kernels, which the fit that is timed then finds ready.
     """
@@ -102,7 +104,7 @@ class Task:
 
 @dataclass(frozen=True)
 class FitResult:
-    """What came of a task, or of all tasks of a model.
+    """Result of a task, or of all tasks of a model.
 
     Parameters
     ----------
@@ -130,7 +132,7 @@ class FitResult:
 
 
 def tasks_of(name: str, item: Item, n_folds: int, split: bool) -> list[Task]:
-    """Return the tasks of a model: one, or one for every fold.
+    """Return the tasks of a model: one, or one per fold.
 
     What is fitted to one recording only is not validated, since no other model is on the same samples.
     """
@@ -141,29 +143,29 @@ def tasks_of(name: str, item: Item, n_folds: int, split: bool) -> list[Task]:
 
 
 def effort_of(model: str, data: Data) -> float:
-    """Return about how many seconds a fit of a model takes."""
+    """Return the approximate time of a fit [s]."""
     samples = sum(len(recording) for recording in data.split.train)
     return float(registry.load("estimators", model).effort * max(samples, 2000) / 10_000)
 
 
 def processes_for(seconds: float) -> int:
-    """Return how many processes should share so much work, here or on the backend chosen outside."""
+    """Return the number of processes for an amount of work, local or on an external backend."""
     if backends.chosen():
         return backends.processes()
     return cores() if seconds > WORTH_A_PROCESS else 1
 
 
 def results(
-    data: Data, tasks: Sequence[Task], n: int, told: Callable[..., None] | None = None
+    data: Data, tasks: Sequence[Task], n: int, report: Callable[..., None] | None = None
 ) -> Iterator[Outcome]:
-    """Yield what comes of every task, as it comes, from so many processes; see `Workers.results`."""
+    """Yield the results of tasks as they finish; see `Workers.results`."""
     if backends.chosen():
         return backends.outcomes(fit, data, tasks)
-    return workers.outcomes(fit, data, tasks, n, told)
+    return workers.outcomes(fit, data, tasks, n, report)
 
 
 def fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:
-    """Do a task; whatever goes wrong is the reason in the result."""
+    """Run a task; any error becomes the reason in the result."""
     try:
         return _fit(data, task, tell)
     except MckibbenError as error:
@@ -225,7 +227,7 @@ def _fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:
 
 
 def _predicted(block: Block, fold: Fold, names: Sequence[str]) -> tuple[Array, ...]:
-    """Return free-running outputs on what a fold holds out; a single recording is both sides."""
+    """Return free-running outputs on a fold's held-out data; a single recording is on both sides."""
     fitted = list(zip(fold.train, fold.train_rows, strict=True))
     found = []
     for recording in fold.test:
@@ -261,7 +263,7 @@ def _step_cost(block: Block, recording: Recording) -> float:
 
 
 def joined(tasks: Sequence[FitResult]) -> FitResult:
-    """Return what came of all tasks of a model as one."""
+    """Return the combined result of all tasks of a model."""
     failed = next((one for one in tasks if one.reason is not None), None)
     if failed is not None:
         return failed
@@ -272,7 +274,7 @@ def joined(tasks: Sequence[FitResult]) -> FitResult:
 
 
 def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed: int) -> Row:
-    """Return the row of a model: all its scores, and its skill over the constant.
+    """Return the row of a model: all scores, and its skill over the constant.
 
     Parameters
     ----------
@@ -301,7 +303,7 @@ def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed
             if constant is not None:
                 skill, least = skill_of(squares.sum(axis=1), constant.sum(axis=1), seed)
         else:
-            invalid = "its outputs ran away on a part of the data that it was not fitted to"
+            invalid = "its outputs diverged on data that it was not fitted to"
     return Row(
         model=name,
         n_parameters=found.diagnostics.get("n_free", len(names)),
@@ -322,7 +324,7 @@ def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed
 
 
 def squares_of(data: Data, predictions: Mapping[int, Sequence[Array]]) -> Array:
-    """Return squared errors of consecutive pieces of all that is held out, summed, shape (pieces, k)."""
+    """Return summed squared errors of consecutive pieces of held-out data, shape (pieces, k)."""
     names = data.channels.outputs
     return np.array(
         [
@@ -337,14 +339,14 @@ def squares_of(data: Data, predictions: Mapping[int, Sequence[Array]]) -> Array:
 
 
 def validated(data: Data, squares: Array) -> dict[str, float]:
-    """Return the RMSE of every output over all that is held out, from its squared errors."""
+    """Return the held-out RMSE of every output from its squared errors."""
     count = sum(int(rows.sum()) for fold in data.folds for rows in fold.test_rows)
     errors = np.sqrt(squares.sum(axis=0) / count)
     return dict(zip(data.channels.outputs, errors.tolist(), strict=True))
 
 
 class Constant(NamedTuple):
-    """The mean of the training output as a model, whatever the input."""
+    """The mean of the training output as a model, for any input."""
 
     row: Row
     outputs: tuple[Array, ...]

@@ -1,4 +1,4 @@
-"""One call to identify a family of models and choose its orders by cross-validated free-run error."""
+"""Identification of a model family, with orders chosen by cross-validated free-running error."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from mckibben.system.workers import checked
 
 @dataclass(frozen=True)
 class Identified:
-    """What `identify` found.
+    """Result of `identify`.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def identify(
     progress: bool | Tell | None = None,
     **settings: Any,
 ) -> Identified:
-    """Identify a family of models, its orders chosen by cross-validated free-run error.
+    """Identify a model family, with orders chosen by cross-validated free-running error.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def identify(
     jobs : int, optional
         Processes; default as many as there are cores, or none for little work.
     progress : bool or callable, optional
-        Whether to show a bar; or who is told the share done, and words.
+        Whether to show a bar; or a callback for the share done, and a text.
     **settings
         Further settings of the estimator.
 
@@ -85,14 +85,14 @@ def identify(
     Raises
     ------
     ModelError
-        On an unknown family, a family without usual orders where none are given, or where every
+        On an unknown family, a family without default orders if none are given, or where every
         combination fails.
     """
     estimator_class = registry.load("estimators", family)
     grid = orders or estimator_class.param_grid
     if not grid:
         raise ModelError(
-            f"there are no usual orders of {family!r}",
+            f"{family!r} has no default orders",
             remedy="give orders, settings with the values to try",
         )
     runs = listed(recordings)

@@ -1,4 +1,4 @@
-"""What a comparison finds: a row for every model, and all of them in the order of the choice."""
+"""Results of a comparison: one row per model, in the order of the choice."""
 
 from __future__ import annotations
 
@@ -105,24 +105,24 @@ class Row:
 
     @property
     def test_error(self) -> float:
-        """RMSE on the test data, infinite where there is none."""
+        """RMSE on the test data, infinite if there is none."""
         return float("inf") if self.test is None else self.test.rmse
 
     @property
     def chosen_by(self) -> float:
-        """The error that the model is chosen by: the validated one, else that of the fit."""
+        """The error used for the choice: cross-validated, else of the fit."""
         fitted = float("inf") if self.train is None else self.train.rmse
         return fitted if self.validation_rmse is None else self.validation_rmse
 
     @property
     def order(self) -> tuple[bool, bool, float, str]:
-        """What rows are sorted by."""
+        """Sort key of the row."""
         fitted = None if self.train is None else self.train.rmse
         return order(self.model, self.validation_rmse, fitted, self.skill_least)
 
     @cached_property
     def inverse(self) -> Block | None:
-        """The inverse of the model, or None where there is none."""
+        """The inverse of the model, or None."""
         try:
             return None if self.block is None else compensator(self.block)
         except MckibbenError:
@@ -130,17 +130,17 @@ class Row:
 
     @property
     def level(self) -> bool:
-        """Whether the interval of the difference to the chosen model holds 0."""
+        """Whether the interval of the difference to the chosen model contains 0."""
         ends = self.difference_interval
         return self.reason is None and ends is not None and ends[0] <= 0 <= ends[1]
 
     @property
     def caution(self) -> str | None:
-        """Why the model is good only near what it was trained on, or None."""
+        """Why the model is reliable only near its training data, or None."""
         return caution(self.model)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the row as the leaderboard files hold it."""
+        """Return the row as in the leaderboard files."""
         if self.reason is not None:
             return {"model": self.model, "status": "failed", "reason": self.reason}
         test = None
@@ -178,7 +178,7 @@ class Row:
 
 
 def inverse_of(inverse: Block | None) -> Literal["exact", "solved", "none"]:
-    """Return how an inverse is found: by a formula, by solving in every step, or not at all.
+    """Return the kind of inverse: closed form, solved in every step, or none.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def _finite(value: float | None) -> float | None:
 
 @dataclass(frozen=True, repr=False)
 class Leaderboard(DrawsItself):
-    """Models chosen on the training side, and their errors on data not used to fit or to choose.
+    """Models chosen on training data, and their errors on independent test data.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ class Leaderboard(DrawsItself):
     shared : tuple of str
         Where recordings to fit to and to test on are the same data, which the user insisted on.
     loads : tuple of str
-        Channels given to models beside the inputs, and never commanded.
+        Further input channels of models, which are never commanded.
     ignored : tuple of str
         Loads that vary in the recordings and that no model is given.
     outside : mapping of str to float
@@ -269,17 +269,17 @@ class Leaderboard(DrawsItself):
 
     @property
     def input(self) -> str:
-        """The input, or all of them."""
+        """The input, or all inputs."""
         return ", ".join(self.inputs)
 
     @property
     def output(self) -> str:
-        """The output, or all of them."""
+        """The output, or all outputs."""
         return ", ".join(self.outputs)
 
     @property
     def best(self) -> Row | None:
-        """The model chosen, or None where none is worth recommending; see `recommended`.
+        """The chosen model, or None if none is recommended; see `recommended`.
 
         It has the least cross-validated error on the training side. One whose cross-validation failed
         is chosen only if every other's did. The test has no part in it, except that nothing is
@@ -289,7 +289,7 @@ class Leaderboard(DrawsItself):
 
     @property
     def not_recommended(self) -> Against | None:
-        """Where the constant is not beaten, so that no model is recommended though some worked."""
+        """The data on which no model is better than the constant, so that none is recommended."""
         return recommended(self.rows, self.constant)[1]
 
     @property
@@ -300,7 +300,7 @@ class Leaderboard(DrawsItself):
 
     @property
     def ranking(self) -> tuple[Row, ...]:
-        """The rows with the constant in its place: behind all that are known to be better."""
+        """The rows including the constant, which follows all models known to be better."""
         if self.constant is None or not self.rows:
             return self.rows
         order = self.constant.order
@@ -312,7 +312,7 @@ class Leaderboard(DrawsItself):
 
     @property
     def failures(self) -> dict[str, list[str]]:
-        """Every reason for which models failed, once, with those models."""
+        """Every distinct reason of failure, with the models."""
         found: dict[str, list[str]] = {}
         for row in self.rows:
             if row.reason is not None or row.test is None or row.train is None:
@@ -321,12 +321,12 @@ class Leaderboard(DrawsItself):
 
     @property
     def lowest(self) -> Row | None:
-        """The row with the least test error, which is nothing to choose by, or None."""
+        """The row of lowest test error (not a basis for the choice), or None."""
         tested = [row for row in self.rows if row.test is not None]
         return min(tested, key=lambda row: row.test_error, default=None)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the leaderboard as ``leaderboard.json`` holds it."""
+        """Return the leaderboard as in ``leaderboard.json``."""
         best, lowest = self.best, self.lowest
         return {
             "input": self.inputs[0] if len(self.inputs) == 1 else list(self.inputs),
@@ -351,7 +351,7 @@ class Leaderboard(DrawsItself):
         }
 
     def to_frame(self) -> pd.DataFrame:
-        """Return the leaderboard as a table, one row a model, nested names joined by dots.
+        """Return the leaderboard as a table, one row per model, nested names joined by dots.
 
         Where tests are shared with training, a column says so.
         """

@@ -1,4 +1,4 @@
-"""The memory test: a model must keep the branches of the loop apart, as the data do, also in a hold."""
+"""Memory test: whether a model reproduces the gap between branches, also in a hold."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HOLD = 10
 
 @dataclass(frozen=True)
 class Memory:
-    """Whether a model keeps rising and falling branches as far apart as the data do.
+    """Gaps between rising and falling branches, modelled and measured.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def memory_test(
     outputs: Sequence[Array],
     pairs: Sequence[tuple[str, str]],
 ) -> Memory:
-    """Compare the branch gaps of a model with the measured ones, and let it hold.
+    """Compare the branch gaps of a model with the measured ones, and test a long hold.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def _moving(names: Sequence[str], recordings: Sequence[Recording], given: str) -
 
 
 def branch_gaps(u: Array, y: Array) -> Array:
-    """Return y (n, k) on the falling branch less y on the rising one, at equal inputs u (n,).
+    """Return y (n, k) on the falling branch minus y on the rising one, at equal inputs u (n,).
 
     Shape (pairs, k): every level is taken on each pair of neighbouring branches that cross it.
     """
@@ -135,7 +135,7 @@ def branch_gaps(u: Array, y: Array) -> Array:
 def hold_test(
     block: Block, recording: Recording, input_name: str, output_name: str
 ) -> float | None:
-    """Return the share of the model's own mid-range branch gap that survives a long hold.
+    """Return the share of the model's mid-range branch gap that survives a long hold.
 
     The input goes up to mid-range and stays, and in a second run up to the top, down to mid-range and
     stays; ramps last as long as the recording's median branch, the hold ten times that. Other inputs

@@ -1,4 +1,4 @@
-"""What is to be compared, on what: models that apply to the recordings, channels, split and folds."""
+"""Set-up of a comparison: applicable models, channels, split and folds."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from mckibben.signals import made_manageable
 Settings = Mapping[str, Mapping[str, Any]]
 
 N_FOLDS = 4
-"""Parts of the cross-validation."""
+"""Number of folds of the cross-validation."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be compared, on what.
+    """Set-up of a comparison.
 
     Parameters
     ----------
@@ -55,11 +55,11 @@ class Plan:
         return constant_of(self.data)
 
     def kept(self, folder: str | Path | None) -> Checkpoints:
-        """Return where finished models are kept."""
+        """Return where finished models are stored."""
         return Checkpoints(folder, self.data)
 
     def board(self, rows: Sequence[Row] = ()) -> Leaderboard:
-        """Return the leaderboard of the models that are finished."""
+        """Return the leaderboard of the finished models."""
         done = {row.model for row in rows}
         pending = tuple(name for name in self.items if name not in done)
         return replace(self.empty, rows=tuple(rows), pending=pending, constant=self.constant.row)
@@ -81,7 +81,7 @@ def plan_of(
     allow_shared: bool = False,
     allow_early: bool = False,
 ) -> Plan:
-    """Return what a comparison is to do; see `compare`."""
+    """Return the set-up of a comparison; see `compare`."""
     recordings, tests, checks = listed(train), listed(test), listed(validation)
     whole = isinstance(n_folds, int) and n_folds >= 0
     require(whole, "n_folds", n_folds, "0, 1, 2 or more")
@@ -154,7 +154,7 @@ def plan_of(
 
 
 def _early(every: Sequence[Recording], channels: Channels, allow: bool) -> tuple[str, ...]:
-    """Refuse an output that moves before its one input, or note it where that is allowed."""
+    """Raise an error, or note, if the output moves before its input."""
     from mckibben.files.condition import early
 
     found = early(every, channels.inputs[0], channels.outputs[0]) if channels.single else None
@@ -173,7 +173,7 @@ def _early(every: Sequence[Recording], channels: Channels, allow: bool) -> tuple
 
 
 def _checked(some: Sequence[Sequence[Recording]], channels: Channels) -> str:
-    """Refuse recordings to fit, or all of them, that no model could use; return the outputs' unit."""
+    """Raise an error for recordings that no model can use; return the outputs' unit."""
     from mckibben.estimators.core.data import training_data
 
     for recordings in some:
@@ -188,7 +188,7 @@ def _checked(some: Sequence[Sequence[Recording]], channels: Channels) -> str:
 
 
 def _outside(split: Split, names: Sequence[str]) -> dict[str, float]:
-    """Return channels and the share of the samples scored where they are beyond all of training."""
+    """Return channels outside their training range, and the share of scored samples where they are."""
     found = {}
     for name in names:
         trained = [recording[name] for recording in split.train if name in recording]
@@ -202,7 +202,7 @@ def _outside(split: Split, names: Sequence[str]) -> dict[str, float]:
 
 
 def _at_each_load(train: Sequence[Recording], load: str, item: Item) -> dict[str, Item]:
-    """Return a model that is not given the load, fitted to each recording alone."""
+    """Return a model without load input, fitted to each recording separately."""
     items: dict[str, Item] = {}
     for place, run in enumerate(train):
         name = f"{item.model} at {run[load].mean():.3g} {run.units[load]} ({run.name})"
@@ -238,7 +238,7 @@ def _chosen(
 def objections(
     models: Iterable[str], recordings: Sequence[Recording], channels: Channels
 ) -> dict[str, str]:
-    """Return which of some models have no place on channels of recordings, and why."""
+    """Return which models do not apply to recordings, and why."""
     asked = recordings, channels.inputs, channels.outputs, channels.scheduling
     found: dict[str, str] = {}
     for name in models:
@@ -253,7 +253,7 @@ def objections(
 
 
 def _timeless(estimator: type[Estimator], recordings: Sequence[Recording]) -> str | None:
-    """Return which recordings lack the time that a model needs, or None."""
+    """Return the recordings without the time that a model needs, or None."""
     missing = [each.name for each in recordings if each.sample_time is None]
     if not (missing and estimator.needs_time):
         return None

@@ -1,4 +1,4 @@
-"""Models × recordings: chosen on the training side, tested once on data used for nothing else."""
+"""Comparison of models on recordings: chosen on training data, tested once on independent data."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ from mckibben.system.workers import checked
 Watch = Callable[[str, float, float], None]
 
 SURE = 0.1
-"""Share of the work after which the time left is estimated by the pace so far."""
+"""Share of the work after which the remaining time is extrapolated from the progress so far."""
 
 
 @dataclass(frozen=True)
 class Standing:
-    """How far a comparison is: models done, those in work, the one that would be chosen so far.
+    """Progress of a comparison: finished and running models, and the best so far.
 
     ``seconds`` is about how long the rest takes.
     """
@@ -63,11 +63,11 @@ class Standing:
 
     @property
     def share(self) -> float:
-        """Models done, of all."""
+        """Share of finished models."""
         return self.done / max(self.total, 1)
 
     def __str__(self) -> str:
-        """Return it for a progress bar.
+        """Return the text of a progress bar.
 
         >>> str(Standing(12, 28, ("gpi",)))
         '12 of 28 models, fitting gpi'
@@ -101,12 +101,12 @@ def compare(
     found: Callable[[Leaderboard], None] | None = None,
     watch: Watch | None = None,
 ) -> Leaderboard:
-    """Fit models on the same data with the same seeds, choose one, and test all.
+    """Fit models to the same data, choose one by cross-validation, and test all.
 
     Every error is free-running. Models are fitted to the training recordings, and chosen by
     cross-validation within them (over recordings, or over blocks of cycles of a single one); nothing is
     chosen by the test. A model that fails is a row with its reason. The mean of the training output is
-    a row as well: where no model beats it beyond chance, none is recommended. An interrupt ends the
+    a row as well: if no model is significantly better, none is recommended. An interrupt ends the
     work at once; the leaderboard then holds what was finished, and names what is pending.
 
     Parameters
@@ -118,10 +118,10 @@ def compare(
         which the output moves, which is then left out of training; of several muscles, or under loads,
         every third level of what schedules, or every third recording.
     inputs, outputs : str or sequence of str, optional
-        Channels, by default as their names say: ``pressure`` and ``displacement``, of several muscles
-        ``pressure_1`` and so on. Of several outputs, models are chosen by the mean error.
+        Channels, by default by their names: ``pressure`` and ``displacement``, for several muscles
+        ``pressure_1`` and so on. For several outputs, models are chosen by the mean error.
     load : str, optional
-        Channel of a load that varies, given to models; `mpi` for each load stands beside.
+        Channel of a varying load, an input of the models; `mpi` per load is compared, too.
     validation : sequence of Recording
         To stop searches early and to choose on; nothing is fitted to them.
     models : "all", "quick", str or sequence of str
@@ -131,32 +131,31 @@ def compare(
         Model name to settings of its estimator.
     n_folds : int
         Parts of the cross-validation; those whose input goes beyond that of the rest are not used.
-        1, or too few cycles: a single fit without the last quarter of the training data, tried on that.
-        0: none, and the choice is by the error on the data fitted.
+        1, or too few cycles: one fit, validated on the last quarter of the training data.
+        0: none, and the choice is by the error on the fitted data.
     seed : int
-        Of everything random.
+        Seed of all random numbers.
     jobs : int, optional
         Processes, which share the models and their folds; default as many as there are cores, or none
-        for little work. A joblib backend chosen outside, such as Dask's, is used instead. Results are
-        the same to the bit.
+        for little work. An external joblib backend, such as Dask's, is used instead. Results are
+        identical.
     most_samples : int
-        Longer recordings are thinned to so many samples to fit, and to test on, turning points kept.
-        Default: 100 000; of more than a million, 40 000, in stretches where thinning would lose the
-        motion. Scores are of the samples kept.
+        Longer recordings are thinned to so many samples for fit and test, including turning points.
+        Default: 100 000; of more than a million, 40 000, in segments where thinning would lose the
+        motion. Scores refer to these samples.
     allow_shared : bool
-        Whether to go on where recordings to test on are those fitted to, or training has some twice.
+        Whether to allow test recordings that were fitted, and repeated training recordings.
     allow_early : bool
-        Whether to go on where the output moves before its input.
+        Whether to allow outputs that move before their input.
     folder : path, optional
-        Where finished models are kept until all are, so that a comparison that was stopped and is
-        called again goes on from there.
+        Folder for finished models, from which an interrupted comparison is resumed.
     clear : bool
-        Whether to forget what was kept when all is done; else the caller does, once it has written
-        what is returned, by ``Checkpoints(folder).clear()``.
+        Whether to remove these at the end; otherwise the caller does, by
+        ``Checkpoints(folder).clear()``.
     progress : bool or callable, optional
-        Whether to show a bar; or called with the `Standing` whenever that changes.
+        Whether to show a bar; or a callback for every change of the `Standing`.
     found : callable, optional
-        Called with the leaderboard of the models finished, whenever one is.
+        Called with the leaderboard of the finished models after each one.
     watch : callable, optional
         Called, while a model is fitted, with its name, the share done of its fits, and the least cost
         so far; not on joblib's backends.
@@ -208,7 +207,7 @@ def compare(
 
 @dataclass(frozen=True)
 class Ranking:
-    """A leaderboard of the models finished, and their outputs on all recordings, training first."""
+    """A leaderboard of the finished models, and their outputs on all recordings, training first."""
 
     board: Leaderboard
     outputs: Mapping[str, tuple[Array, ...]] = field(repr=False)
@@ -222,7 +221,7 @@ def ranked(
     progress: Callable[[Standing], None] | None = None,
     watch: Watch | None = None,
 ) -> Generator[Ranking]:
-    """Yield the ranking whenever a model is finished, cheap models first; the last one is whole."""
+    """Yield the ranking after every model, fast models first; the last ranking is complete."""
     checked(jobs)
     data, table = plan.data, _Table(plan)
     keys = {
@@ -262,7 +261,7 @@ def ranked(
             counts = len(table.rows), len(plan.items)
             progress(Standing(*counts, working, best, plan.empty.unit, rest * pace))
 
-    def told(index: int, *what: float) -> None:
+    def report(index: int, *what: float) -> None:
         name = tasks[index].name
         if not what and name not in begun:
             begun.append(name)
@@ -274,7 +273,7 @@ def ranked(
     if table.rows:
         yield table.ranking()
     found: dict[str, list[FitResult]] = {name: [] for name in remaining}
-    for outcome in results(data, tasks, workers, told):
+    for outcome in results(data, tasks, workers, report):
         name = tasks[outcome.index].name
         what = outcome.value
         if not isinstance(what, FitResult):
@@ -292,7 +291,7 @@ def ranked(
 
 
 def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
-    """Return the row of a model, with its band where it is the best until now, as it may be chosen."""
+    """Return the row of a model, with its band if it is the best so far."""
     try:
         row = row_of(plan.data, name, found, plan.constant.squares, plan.empty.seed)
     except MckibbenError as error:  # its outputs overflow
@@ -306,7 +305,7 @@ def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
 
 
 class _Table:
-    """Rows that are finished, and the resamples of their test errors, on the same blocks for all."""
+    """Finished rows, and the resamples of their test errors, on common blocks."""
 
     def __init__(self, plan: Plan) -> None:
         self.rows: dict[str, Row] = {}
@@ -318,7 +317,7 @@ class _Table:
         self._resamples: dict[tuple[str, tuple[int, ...]], Array] = {}
 
     def add(self, row: Row, outputs: tuple[Array, ...]) -> None:
-        """Take the row of a model that is finished, and its outputs on all recordings."""
+        """Add the row of a finished model, and its outputs on all recordings."""
         self.rows[row.model] = row
         if row.test is not None:
             errors = self._errors[row.model] = self._plan.data.test_errors(outputs)
@@ -328,7 +327,7 @@ class _Table:
             self._correlation[row.model] = correlation_length(np.split(squares.mean(axis=1), ends))
 
     def sorted(self) -> list[Row]:
-        """Return the rows that were tested, in the order of the choice."""
+        """Return the tested rows in the order of the choice."""
         tested = [row for row in self.rows.values() if row.test is not None]
         return sorted(tested, key=lambda row: row.order)
 
@@ -362,7 +361,7 @@ class _Table:
         return Ranking(replace(board, constant=placed[-1]), outputs)
 
     def _resampled(self, models: Sequence[str]) -> list[Array]:
-        """Return resampled test RMSE of models; blocks suit the median of their correlation lengths."""
+        """Return resampled test RMSE of models; block lengths fit their median correlation length."""
         correlation = float(np.median(list(self._correlation.values())))
         blocks = tuple(block_length(n, correlation) for n in self._lengths)
         missing = [model for model in models if (model, blocks) not in self._resamples]

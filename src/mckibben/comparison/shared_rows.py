@@ -1,4 +1,4 @@
-"""Rows that two recordings have in common: copies, slices, one file given twice.
+"""Shared rows of recordings: copies, slices, or a file given twice.
 
 Two runs of one experiment never agree, to rounding, over many movements of the output. Of rests only the
 length counts. Copies that were resampled, filtered or zeroed hold other numbers, and are not found.
@@ -20,22 +20,24 @@ from mckibben.errors import DataError, DataWarning
 from mckibben.recording import Recording
 
 WINDOW = 64
-"""Movements of the output in a row that must agree; of short recordings, half of theirs."""
+"""Number of consecutive output changes that must agree; half of that of short recordings."""
 
 FEWEST = 8
-"""Movements below which recordings are not compared."""
+"""Number of output changes below which recordings are not compared."""
 
 ROUNDING = 2e-4
-"""What values are rounded to, as a share of a channel's largest magnitude in all recordings."""
+"""Rounding of values, relative to the largest magnitude of a channel over all recordings."""
 
 GRAVE = 0.05
-"""Share of the windows of the recording that has fewer from which two recordings share data."""
+"""Share of equal windows, in the recording with fewer of them, above which two recordings share
+data.
+"""
 
 _WEIGHTS = np.random.default_rng(0).integers(2**64, size=1024, dtype=np.uint64)  # any will do
 
 
 class Shared(NamedTuple):
-    """What a recording has in common with one before it in a list.
+    """Shared part of a recording and an earlier one in a list.
 
     Parameters
     ----------
@@ -60,7 +62,7 @@ class Shared(NamedTuple):
 def shared_rows(
     recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
 ) -> list[Shared]:
-    """Return which recordings share data: rows in which all channels agree while an output moves."""
+    """Return recordings that share data: rows in which all channels agree while an output moves."""
     if len(recordings) < 2:
         return []
     moves = _movements(recordings, inputs, outputs)
@@ -99,7 +101,7 @@ def check_shared(
     *,
     allow: bool | None = None,
 ) -> tuple[str, ...]:
-    """Refuse recordings that share data, or return in words what they share.
+    """Raise an error if recordings share data, or return statements about it.
 
     Warns of runs of a virtual rig with the same seed, and so the same sensor noise, in two roles.
 
@@ -124,7 +126,7 @@ def check_shared(
             remedy = f"{again}, or {remedy}"
         if allow is not None:
             remedy += (
-                "; to go on all the same (runs of a sensor with few levels may agree and be two), give "
+                "; or, if the runs are distinct (a coarse sensor may read the same in both), give "
                 "`allow_shared`: every result states it"
             )
         raise DataError(sentences[0], file=listed[found[0].second][1].source, remedy=remedy)
@@ -141,7 +143,7 @@ def check_shared(
 
 
 def _seeded(one: Recording, other: Recording) -> str:
-    """Return what to do about two runs of one virtual rig with one seed; empty if they are not."""
+    """Return the remedy for two runs of one virtual rig with one seed; empty otherwise."""
     rig, seed = ([run.meta.get(key) for run in (one, other)] for key in ("rig", "seed"))
     if rig[0] is None or seed[0] is None or rig[0] != rig[1] or seed[0] != seed[1]:
         return ""
@@ -151,7 +153,7 @@ def _seeded(one: Recording, other: Recording) -> str:
 def without_copies(
     recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
 ) -> list[Recording]:
-    """Return recordings without those that are, but for a little, in one before them."""
+    """Return recordings without those that are nearly contained in an earlier one."""
     found = shared_rows(recordings, inputs, outputs)
     copies = {shared.second for shared in found if shared.share > 1 - GRAVE}
     return [one for place, one in enumerate(recordings) if place not in copies]
@@ -167,7 +169,7 @@ def _sentence(shared: Shared, listed: Sequence[tuple[str, Recording]]) -> str:
     verb = {"validate": "validated", "calibrate": "calibrated"}.get(other_role, "tested")
     what = f"{verb} on data that it was {'fitted to' if role == 'fit' else 'chosen by'}"
     if role == other_role:
-        what = f"the same samples would count twice to {role}"
+        what = f"the same samples would be used twice to {role}"
     return (
         f"{what}: {start:.6g} to {stop:.6g} {unit} after the start of {names[1]} are those of "
         f"{names[0]} from {shared.begins - one.start_time:.6g} {unit} on, {100 * shared.share:.0f} % of "
@@ -178,7 +180,7 @@ def _sentence(shared: Shared, listed: Sequence[tuple[str, Recording]]) -> str:
 def _movements(
     recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
 ) -> list[tuple[Array, NDArray[np.uint64]]]:
-    """Return when the outputs of each move, and hashes of the rows there and the rests before."""
+    """Return the times of output changes in each, and hashes of the rows there and before."""
     every = [recording.matrix([*outputs, *inputs]) for recording in recordings]
     largest = np.max([abs(one).max(axis=0) for one in every], axis=0, initial=np.finfo(float).tiny)
     found = []

@@ -1,4 +1,4 @@
-"""What is used to fit, to choose and to test."""
+"""Splits of data into fit, validation and test."""
 
 from __future__ import annotations
 
@@ -17,30 +17,32 @@ from mckibben.recording import Recording
 from mckibben.signals import reversals, split_cycles
 
 FEWEST = 10
-"""Samples in either part of a split."""
+"""Smallest number of samples on either side of a split."""
 
 HELD_OUT = 0.25
-"""Share of the input's travel that is held out where nothing else says what."""
+"""Share of the input's travel that is held out by default."""
 
 EVERY = 3
-"""Of the runs of several muscles, or of a muscle under loads, each so-manieth is held out."""
+"""Every how many runs one is held out, for several muscles or varying loads."""
 
 ENOUGH = 12
-"""Fewest runs of which a third can be held out in turn."""
+"""Smallest number of runs of which a third can be held out."""
 
 PIECES = 4
-"""Of a part that has pieces from all over a recording."""
+"""Number of pieces, spread over a recording, of a part."""
 
 HARDLY = 0.2
-"""Standard deviation of an output in a part, over that in all, below which it hardly moves there."""
+"""Standard deviation of an output in a part, relative to the whole, below which the part counts as
+at rest.
+"""
 
 BEYOND = 0.05
-"""Share of the range of an input that a part may go beyond, as noise does, and still be within it."""
+"""Share of an input's range by which a part may exceed it (noise) and count as inside."""
 
 
 @dataclass(frozen=True)
 class Split:
-    """Data to fit, and data to test on.
+    """Training and test data.
 
     Parameters
     ----------
@@ -62,7 +64,7 @@ class Split:
 
 @dataclass(frozen=True)
 class Fold:
-    """Part of a cross-validation: recordings to fit and to run free, and their samples that count."""
+    """Fold of a cross-validation: recordings to fit and to simulate, and their scored samples."""
 
     train: tuple[Recording, ...]
     train_rows: tuple[Mask, ...]
@@ -71,7 +73,7 @@ class Fold:
 
 
 def given_split(train: Sequence[Recording], test: Sequence[Recording]) -> Split:
-    """Return the split that the user gave.
+    """Return the user's split.
 
     The first sample of a test recording starts its memory, unless it continues a training recording,
     and is not scored.
@@ -86,18 +88,18 @@ def given_split(train: Sequence[Recording], test: Sequence[Recording]) -> Split:
 
 
 def split_of(train: Sequence[Recording], test: Sequence[Recording], channels: Channels) -> Split:
-    """Return the split that the user gave, or else what is held out of the training recordings."""
+    """Return the user's split, or else one that holds out part of the training recordings."""
     return given_split(train, test) if test else held_out(train, channels)
 
 
 def tested_from(rows: Mask) -> int | None:
-    """Return the first sample tested on of a recording that was fitted before that; else None."""
+    """Return the first test sample of a recording whose beginning was fitted; else None."""
     first = int(rows.argmax())
     return first if first > 1 else None  # of others, the first sample may only start their memory
 
 
 def held_out(recordings: Sequence[Recording], channels: Channels) -> Split:
-    """Return the split of recordings where the user gave nothing to test on.
+    """Return the default split of recordings without test data.
 
     Of one muscle, the last part; where every run holds the input, such as a length, the last runs at
     its levels, or levels within. Of several muscles, or under loads, every third level of what
@@ -173,7 +175,7 @@ def held_out_part(recordings: Sequence[Recording], channels: Channels, share: fl
 
 
 def _tail(recordings: Sequence[Recording], channel: str, travel: float, rest: str) -> Split:
-    """Hold out the last so much of the input's travel."""
+    """Hold out the last part of the input's travel."""
     train, partly, whole = _cut(recordings, channel, travel)
     described, tests, rows = [], [], []
     if partly is not None:
@@ -186,7 +188,7 @@ def _tail(recordings: Sequence[Recording], channel: str, travel: float, rest: st
         raise DataError(
             f"{len(recordings[-1])} samples are too few to hold out a part for a test",
             file=recordings[-1].source,
-            remedy="give a longer recording, or a test recording of its own with `test`",
+            remedy="give a longer recording, or a separate test recording with `test`",
         )
     if whole:
         given = given_split(train, whole)
@@ -199,7 +201,7 @@ def _tail(recordings: Sequence[Recording], channel: str, travel: float, rest: st
 def _cut(
     recordings: Sequence[Recording], channel: str, travel: float
 ) -> tuple[list[Recording], tuple[Recording, int] | None, list[Recording]]:
-    """Cut the last so much of the input's travel off: what is before, cut at a sample, and after."""
+    """Cut off the last part of the input's travel: the part before, the index, and the part after."""
     before, after = list(recordings), list[Recording]()
     travels = [_travel(recording[channel]) for recording in before]
     while len(before) > 1 and travels[-1][-1] <= travel:
@@ -215,7 +217,7 @@ def _cut(
 
 
 def _travel(u: Array) -> Array:
-    """Return how far the input has gone up and down until every sample, without its noise."""
+    """Return the cumulative travel of the input at every sample, without noise."""
     turns = reversals(u)
     gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(u[turns])))])
     branch = np.clip(np.searchsorted(turns, np.arange(u.size), side="right") - 1, 0, turns.size - 2)
@@ -224,7 +226,7 @@ def _travel(u: Array) -> Array:
 
 
 def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
-    """Yield the parts of a cross-validation over recordings, or over blocks of cycles of a single one.
+    """Yield cross-validation folds over recordings, or over blocks of cycles of a single one.
 
     Of recordings that each hold the input, such as a length, every part has one of each level. Of a
     recording of fewer cycles than parts, every part has pieces from all over it.
@@ -261,7 +263,7 @@ def _left_out(train: Sequence[Recording], left: Sequence[Recording]) -> Fold:
 
 
 def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]]:
-    """Return the first recordings at every level of an input that all hold, the second ...; or none."""
+    """Return repetitions of the levels of a common input: all first runs, all second ...; or none."""
     if any(np.ptp(recording[channel]) > 0 for recording in train):
         return []
     levels = [float(recording[channel][0]) for recording in train]
@@ -273,7 +275,7 @@ def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]
 def validation_folds(
     train: Sequence[Recording], channels: Channels, n: int, given: Sequence[Recording] = ()
 ) -> tuple[tuple[Fold, ...], str]:
-    """Return the parts on which models are chosen within the training data, and what that is called.
+    """Return the folds within the training data, and a description of them.
 
     A cross-validation in ``n`` parts; where there are too few cycles for one, or for ``n`` of 1, the
     last part of the training data; where that is too little, or for 0, nothing. A part whose input
@@ -335,7 +337,7 @@ def _in_turn(train: Sequence[Recording], channels: Channels) -> Iterator[Fold]:
 
 
 def _within(values: Array, others: Array) -> bool:
-    """Return whether values stay within the range of others, nearly."""
+    """Return whether values stay nearly within the range of others."""
     low, high = others.min(), others.max()
     slack = BEYOND * (high - low)
     return bool(values.min() >= low - slack and values.max() <= high + slack)

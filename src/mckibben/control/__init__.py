@@ -1,4 +1,4 @@
-"""Controllers, and loops closed on anything that steps like a rig."""
+"""Controllers, and closed loops on rigs and models."""
 
 from mckibben.control.controller import BlockController as BlockController
 from mckibben.control.controller import Controller as Controller

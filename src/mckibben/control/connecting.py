@@ -1,4 +1,4 @@
-"""What a block in a loop is given, and what it drives: by name and unit, never by position.
+"""Connections of blocks in a loop, matched by name and unit, never by position.
 
 Every input is found before the plant moves, under its own name and in its own unit, or made of another
 way to measure the same motion by the rest length; or the loop is refused.
@@ -23,11 +23,11 @@ Channels = tuple[Channel, ...]
 
 
 Line = tuple[int, float, float]
-"""Where a value is in an array, and the gain and offset that convert it."""
+"""Index of a value in an array, and the gain and offset of its unit conversion."""
 
 
 def match(wanted: Channel, offered: Sequence[Channel], rest_length: float | None) -> Line | None:
-    """Return the place of the channel that another is, or is made of, with gain and offset, or None."""
+    """Return the index of the matching channel, with gain and offset, or None."""
     names = [plain(channel.name) for channel in offered]
     own = plain(wanted.name)
     if own in names:  # be it in another unit, which is refused
@@ -44,13 +44,13 @@ def match(wanted: Channel, offered: Sequence[Channel], rest_length: float | None
 def find(
     wanted: Channel, offered: Sequence[Channel], rest_length: float | None, taker: str, giver: str
 ) -> Line:
-    """Return what `match` does, or refuse in words of who needs the channel and who offers others."""
+    """Return the result of `match`, or raise an error that names both sides."""
     line = match(wanted, offered, rest_length)
     if line is not None:
         return line
     units = {plain(other.name): other.unit or "no unit" for other in offered}
     own, unit = plain(wanted.name), wanted.unit or "no unit"
-    problem = f"{taker} needs it, and {giver} gives {', '.join(units) or 'nothing'}"
+    problem = f"{taker} needs it, but {giver} has {', '.join(units) or 'nothing'}"
     remedy = f"give it under that name, in {unit}, or use a block and a plant of the same channels"
     if own in units:
         problem = f"{taker} has it in {unit}, and {giver} in {units[own]}"
@@ -61,7 +61,7 @@ def find(
 
 
 class Selection:
-    """Values picked out of an array, and converted."""
+    """Values selected from an array, and converted."""
 
     def __init__(self, lines: Sequence[Line]) -> None:
         places, gains, offsets = zip(*lines, strict=True)
@@ -77,7 +77,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class Offer:
-    """What a loop gives a controller at every step, and what it takes of it.
+    """Signals that a loop offers to a controller, and commands that it accepts.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class Offer:
     rest_length: float | None = None
 
     def inputs(self, block: Block, beside: Channels = ()) -> Selection:
-        """Return what picks a block's inputs from references, schedule, measurements and others.
+        """Return the selection of a block's inputs from references, schedule, measurements and others.
 
         What is driven through the block follows a reference; what ends in `MEASURED` is measured; and
         what schedules it is in the reference or is measured.
@@ -122,11 +122,11 @@ class Offer:
     def selected(
         self, wanted: Channels, offered: Sequence[Channel], taker: str, giver: str
     ) -> Selection:
-        """Return what picks channels out of others, or refuses as `find` does."""
+        """Return the selection of channels out of others; raise an error as `find` does."""
         return Selection([find(c, offered, self.rest_length, taker, giver) for c in wanted])
 
     def commands(self, block: Block) -> Selection:
-        """Return what picks the plant's commands, all and no others, from a block's outputs."""
+        """Return the selection of the plant's commands from a block's outputs."""
         for channel in block.outputs:
             find(channel, self.driven, None, block.title, f"what drives {self.plant}")
         return self.selected(self.driven, block.outputs, self.plant, block.title)

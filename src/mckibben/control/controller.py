@@ -1,4 +1,4 @@
-"""What a controller is: references and measurements in, pressures out, sample by sample."""
+"""Controllers: from references and measurements to pressures, sample by sample."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ Ahead = tuple[Array, Array]
 
 
 class Controller(ABC):
-    """Asked once a control step for the commands of n muscles."""
+    """Computes the commands of n muscles in every control step."""
 
     preview: float = 0.0
-    """How far ahead its compensator wants the reference, to make up for dead time [s]."""
+    """Preview of the reference for the compensator, to make up for dead time [s]."""
 
     forward_model: Block | None = None
-    """The model that its compensator undoes, if it has one."""
+    """The model that the compensator inverts, if there is one."""
 
     samples_ahead: int = 0
-    """How many samples further ahead it wants the reference, to plan with."""
+    """Further preview of the reference for prediction [samples]."""
 
     def connect(self, offer: Offer) -> None:
-        """Learn what a loop gives and takes, before `reset`, and refuse what does not fit."""
+        """Connect to the signals of a loop, before `reset`; raise an error if they do not match."""
         del offer
 
     @abstractmethod
     def reset(self, sample_time: float) -> None:
-        """Forget the past, and get ready for steps of so many seconds."""
+        """Reset the state, for a given sample time [s]."""
 
     @abstractmethod
     def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
@@ -55,17 +55,17 @@ class Controller(ABC):
 
     @property
     def n_clipped(self) -> int:
-        """How many samples its compensator has clipped by itself since the start."""
+        """Number of samples that its compensator has clipped since the start."""
         return 0
 
     def applied(self, pressures: Array) -> None:
-        """Learn what was applied in the end, after limits."""
+        """Receive the commands applied after limits."""
         del pressures
 
 
 @dataclass
 class BlockController(Controller):
-    """A block in a loop: a compensator alone, feedback, or both, as it is saved and exported.
+    """A block in a loop: compensator, feedback, or both, as saved and exported.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class BlockController(Controller):
 
     @property
     def n_clipped(self) -> int:
-        """Those of the compensator."""
+        """That of the compensator."""
         return self._stream.block.n_clipped(self._stream.state)
 
     def connect(self, offer: Offer) -> None:

@@ -1,4 +1,4 @@
-"""A plant that changes while it runs: muscles soften, rub less, and pressure is measured differently."""
+"""Drifting plants: changes of stiffness, friction, and pressure calibration during a run."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ GROUPS = ("stiffness", "friction", "gain")
 """What drifts: rubber, friction, and the calibration of pressure, commanded and measured alike."""
 
 PART = 1e-4
-"""Changes come in parts of this size, relative to what changes."""
+"""Relative size of one step of drift."""
 
 
 class Ageing(Plant, Protocol):
-    """A plant whose muscles can age while it runs: rigs."""
+    """A plant whose muscles can age while it runs, such as rigs."""
 
     @property
     def sample_time(self) -> float:
-        """Time of a step [s]."""
+        """Sample time [s]."""
 
     def aged(self, factors: Mapping[str, float]) -> Self:
-        """Return the plant, where this one is, with stiffness and friction of its muscles scaled."""
+        """Return the plant in its current state with scaled stiffness and friction."""
 
 
 @dataclass(frozen=True)
 class Drift:
-    """A change of a group, by a factor, straight in time or at once.
+    """Change of a group by a factor, linear in time or at once.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Drift:
             require(0.0 <= time < np.inf, name, time, "0 s or more")
 
     def at(self, time: float) -> float:
-        """Return the factor at a time [s], in parts of `PART`."""
+        """Return the factor at a time [s], in steps of `PART`."""
         if self.over > 0.0:
             share = min(max((time - self.start) / self.over, 0.0), 1.0)
         else:
@@ -69,7 +69,7 @@ class Drift:
 
 
 class Drifting:
-    """A rig of which something drifts while it is stepped, by its own physics.
+    """A rig of which some parameters drift while it runs.
 
     What it remembers, as forces in its friction, it keeps.
 
@@ -91,19 +91,19 @@ class Drifting:
 
     @property
     def factors(self) -> Mapping[str, float]:
-        """How far every group has come, of what it was."""
+        """Current factor of every group."""
         return dict(self._factors)
 
     def limits(self, name: str) -> Any:
-        """Return the rig's limits on an input channel."""
+        """Return the rig's limits of an input channel."""
         return self.fresh.limits(name)
 
     def changed(self, settings: Mapping[str, Any]) -> Drifting:
-        """Return the same of a rig with other settings."""
+        """Return this plant with other settings of its rig."""
         return Drifting(self.fresh.changed(settings), self.drifts)
 
     def reset(self, seed: int = 0) -> Array:
-        """Make it as new, bring it to rest, and return the first measurement."""
+        """Reset all drift, bring the rig to rest, and return the first measurement."""
         self._now, self._steps = self.fresh, 0
         self._factors = dict.fromkeys(GROUPS, 1.0)
         measured = self.fresh.reset(seed)
@@ -111,7 +111,7 @@ class Drifting:
         return self._shown(measured)
 
     def step(self, action: ArrayLike | Mapping[str, float]) -> Array:
-        """Hold commands for one sample time, age, and return the next measurement."""
+        """Hold commands for one sample time, apply drift, and return the next measurement."""
         gain = self._factors["gain"]
         if isinstance(action, Mapping):
             action = {
@@ -126,11 +126,11 @@ class Drifting:
         return shown
 
     def _shown(self, measured: Array) -> Array:
-        """Return what sensors of a drifted calibration show."""
+        """Return the readings of sensors with drifted calibration."""
         return np.where(self._felt, measured / self._factors["gain"], measured)
 
     def _age(self) -> None:
-        """Change what has changed by now."""
+        """Apply the drift until now."""
         time = self._steps * self.fresh.sample_time
         factors = dict.fromkeys(GROUPS, 1.0)
         for drift in self.drifts:

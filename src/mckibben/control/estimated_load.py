@@ -1,4 +1,4 @@
-"""A controller that is given an estimate of the load, where nothing measures it."""
+"""A controller with an estimated load, for plants without a load sensor."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class EstimatedLoad(Controller):
 
     @property
     def n_clipped(self) -> int:
-        """Those of the controller's compensator."""
+        """That of the controller's compensator."""
         return self.controller.n_clipped
 
     def connect(self, offer: Offer) -> None:
@@ -54,7 +54,7 @@ class EstimatedLoad(Controller):
         self._load = np.zeros(len(self.estimate.outputs))
 
     def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
-        """Return the controller's commands; the load to come is taken to be that of now."""
+        """Return the controller's commands, with the current load estimate for the next step."""
         found = self._stream.step(self._inputs(measured))
         self._load = self._load + self._share * (found - self._load)
         now, then = (np.concatenate((self._load, beside)) for beside in (scheduled, ahead[1]))

@@ -1,4 +1,4 @@
-"""Where a model was identified, as far as it says so, and what of a recording lies beyond."""
+"""The input range of a model's identification, and recordings outside it."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
 BEYOND = 0.05
-"""Share of a range beyond which it is left: noise does less."""
+"""Share of a range beyond which a value counts as outside; noise is smaller."""
 
 Asked = list[tuple[Channel, Array, tuple[float, float]]]
 
 
 def known_ranges(model: Block) -> dict[str, tuple[float, float]]:
-    """Return the lowest and highest of a model's inputs where it was identified, by name.
+    """Return the lowest and highest identified value of a model's inputs, by name.
 
     Of its own input range, or its inverse's; of what a balance was scheduled and loaded by; or else of
     what its band saw. Inputs of which nothing is known are absent.
@@ -63,7 +63,7 @@ def known_ranges(model: Block) -> dict[str, tuple[float, float]]:
 
 
 def beyond_known(model: Block, recording: Recording) -> list[str]:
-    """Return what of a recording lies beyond where a model was identified, as far as it knows that.
+    """Return warnings about parts of a recording outside the identified range.
 
     Of a balance, what schedules and loads it; and what drives it: displacements of a compensator,
     pressures otherwise. Other inverses tell of what they clip as they run.

@@ -1,4 +1,4 @@
-"""Control laws by name: each makes, of a compensator and feedback, what closes a loop.
+"""Control laws by name, each made from a compensator and feedback.
 
 A law is a function of a compensator and of what tunes feedback, called where the law has any; the first
 line of its docstring is what it is called to a person. Laws are registered in the group ``controllers``.
@@ -21,7 +21,7 @@ Tuned = Callable[[], PIDFeedback]
 
 
 def control_law(name: str, compensator: Block, tuned: Tuned) -> Block | Controller:
-    """Return what closes a loop by a law: a block wherever it can be saved and exported.
+    """Return the controller of a law; a block if it can be saved and exported.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def control_law(name: str, compensator: Block, tuned: Tuned) -> Block | Controll
 
 
 def refusal(name: str, compensator: Block, plant: Plant) -> str:
-    """Return why a law closes no loop of a compensator on a plant, or an empty string.
+    """Return why a law cannot be used with a compensator on a plant, or an empty string.
 
     Channels alone decide: nothing is run, and feedback is not tuned.
     """
@@ -70,7 +70,7 @@ def observer(compensator: Block, tuned: Tuned) -> Controller:
     del tuned
     if compensator.samples_ahead:
         raise ModelError(
-            "an observer cannot correct references that a compensator has used ahead",
+            "an observer cannot be used with a compensator that looks ahead",
             remedy="use feedforward or feedforward-pid with a compensator that looks ahead",
         )
     return DisturbanceObserver(compensator)

@@ -26,7 +26,7 @@ from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
 
 ROUNDING = 1e-9
-"""Share of what is reached by which a reference touches its end."""
+"""Share of the reachable range within which a reference counts as at its end."""
 
 
 class Beyond(NamedTuple):
@@ -49,7 +49,7 @@ class Beyond(NamedTuple):
 
 @dataclass(frozen=True)
 class Tracked(DrawsItself):
-    """What came of a loop.
+    """Result of a closed loop.
 
     Parameters
     ----------
@@ -83,13 +83,13 @@ class Tracked(DrawsItself):
 
 
 MOST_STEPS = 10**7
-"""Of the approach, and of the time not scored."""
+"""Largest number of steps of the approach, and of the time not scored."""
 
 MOST_DELAY = 10**4
-"""Steps."""
+"""Largest delay [steps]."""
 
 MOST_NOISE = 1e6
-"""[mm or N]."""
+"""Largest measurement noise [mm or N]."""
 
 
 def track(
@@ -107,40 +107,39 @@ def track(
     seed: int = 0,
     progress: bool | Callable[[float], None] | None = None,
 ) -> Tracked:
-    """Let a controller make a plant's motions, or its force, follow references.
+    """Track references of motion or force with a controller on a plant.
 
     Parameters
     ----------
     controller : Block or Controller
-        A block is driven as `BlockController` drives it.
+        A block is wrapped in a `BlockController`.
     plant : Plant
         A rig; it is run at the reference's sample time, which is the control rate.
     reference : Recording
-        Channels of motion to follow [mm or rad], or without any the force [N], and of what schedules the
-        controller and is held on the plant, such as ``pressure_extensor`` or the length in a test stand,
-        as they should be. What a block drives, as pressures recorded with it, is passed over. With the
-        rest length of the plant, or of the reference, a displacement, contraction or length is any of
-        these.
+        Desired motions [mm or rad], or without any the desired force [N], and scheduling or held
+        channels, such as ``pressure_extensor`` or the length in a test stand. Channels driven by
+        the block, such as recorded pressures, are ignored. With the rest length of the plant, or of
+        the reference, a displacement, contraction or length is any of these.
     approach : float
         Time to go from rest to the first reference [s], not scored.
     settle : float
         Time after that which is not scored either [s].
     pressure_loop : bool
-        Whether measured pressures are fed back inside, as regulators with a sensor do.
+        Whether an inner loop corrects pressures by measured ones, as regulators with a sensor do.
     noise : float
-        Standard deviation added to what is followed, as measured [mm or N].
+        Standard deviation of the noise added to the followed measurements [mm or N].
     delay : int
-        Control steps by which measurements come late.
+        Delay of measurements [control steps].
     slew : float, optional
         Fastest change of a pressure [bar/s].
     preview : float, optional
-        How far ahead compensators are given the reference [s], in whole steps, and never less than the
-        next step's; the end is held. Default the dead time of what they undo. Those that plan get it
-        the samples of their horizon earlier still.
+        Preview of the reference for compensators [s], in whole steps, at least one; its end is
+        extended. Default: the dead time of the inverted model. Predictive compensators receive
+        their horizon in addition.
     seed : int
-        Of all noise.
+        Seed of all noise.
     progress : bool or callable, optional
-        Whether to show a bar; or who is told the share of the time that has passed.
+        Whether to show a bar; or a callback for the share of the time passed.
 
     Returns
     -------
@@ -149,8 +148,8 @@ def track(
     Raises
     ------
     DataError
-        If the reference has no time, or no channel that the plant measures; or if the controller wants
-        or gives another channel than the loop, or in another unit.
+        If the reference has no time, or no channel that the plant measures; or if channels or units
+        of controller and loop do not match.
     ModelError
         On settings out of range.
     """
@@ -266,7 +265,7 @@ def track(
 def _check(
     approach: float, settle: float, noise: float, delay: int, slew: float | None, step: float
 ) -> None:
-    """Refuse settings out of range, and what is no number."""
+    """Raise an error for settings out of range."""
     longest = MOST_STEPS * step
     ranges = {
         "approach": (approach, longest, "s"),
@@ -289,7 +288,7 @@ def _cost(errors: Array, at_limit: NDArray[np.bool_]) -> float:
 def ends(
     model: Block | None, followed: Sequence[Channel], rest_length: float | None
 ) -> dict[str, tuple[float, float]]:
-    """Return the lowest and highest that a model can reach of what is followed, as far as it says."""
+    """Return the lowest and highest value that a model can reach, if known."""
     found: dict[str, tuple[float, float]] = {}
     if model is None:
         return found
@@ -304,13 +303,13 @@ def ends(
 
 
 def outside(reference: Array, low: float, high: float) -> NDArray[np.bool_]:
-    """Return which samples of a reference, shape (n,), lie beyond both ends and rounding."""
+    """Return which samples of a reference, shape (n,), are out of the range by more than rounding."""
     margin = ROUNDING * (high - low)
     return np.asarray((reference < low - margin) | (reference > high + margin))
 
 
 def beyond(errors: Array, out: NDArray[np.bool_], low: float, high: float) -> Beyond | None:
-    """Return what of a reference is out of reach, by `outside`, or None."""
+    """Return the part of a reference that is out of reach, by `outside`, or None."""
     if not out.any():
         return None
     others = errors[~out]

@@ -1,4 +1,4 @@
-"""Disturbance observer: what the model does not explain is estimated, and the reference shifted by it.
+"""Disturbance observer: estimates the model error, and corrects the reference by it.
 
 The forward model runs on the applied pressures beside the plant; the low-passed difference between
 measurement and model is an output disturbance (a load, a drift, an error of the model), and the
@@ -21,7 +21,7 @@ from mckibben.errors import require
 
 @dataclass
 class DisturbanceObserver(Controller):
-    """A compensator and its model, side by side with the plant.
+    """A compensator and its model in parallel with the plant.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class DisturbanceObserver(Controller):
 
     @property
     def n_clipped(self) -> int:
-        """Those of the compensator."""
+        """That of the compensator."""
         return self.compensator.n_clipped(self._ahead.state)
 
     def connect(self, offer: Offer) -> None:
@@ -73,6 +73,6 @@ class DisturbanceObserver(Controller):
         return self._commands(self._ahead.step(wanted))
 
     def applied(self, pressures: Array) -> None:
-        """Let the model take the step that the plant takes."""
+        """Advance the model by the applied commands."""
         taken = self._taken(np.concatenate((pressures, self._scheduled)))
         self._expected = self._modelled(self._beside.step(taken))

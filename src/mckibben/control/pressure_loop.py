@@ -1,4 +1,4 @@
-"""The inner loop that regulators with a pressure sensor have: what is asked for is what is there.
+"""Inner pressure loop, as in regulators with a pressure sensor.
 
 Compensators are identified on measured pressures; between command and pressure lie valves that fill and
 vent at rates of their own. How large a gain they bear nobody says: it is halved where it swings.
@@ -13,19 +13,22 @@ import numpy as np
 from mckibben.arrays import Array
 
 SLIGHT = 0.05
-"""Of the range: pressure that is off by more, to and fro, swings, where less was asked for meanwhile."""
+"""Share of the range: an alternating pressure error above this is an oscillation."""
 
 
 QUICK = 0.1
-"""Longest step that sees a regulator get to its pressure [s]; in longer ones it is there already."""
+"""Longest step in which a regulator's transient is visible [s]; with longer steps it has settled.
+"""
 
 STEADY = 0.2
-"""Most that the integral takes in of a step's error: with all of it, what is seen a step late swings."""
+"""Largest share of a step's error that is integrated: with more, the delay of a step causes
+oscillation.
+"""
 
 
 @dataclass
 class PressureLoop:
-    """PI feedback of pressure on top of the pressure asked for.
+    """PI feedback of pressure, added to the commanded pressure.
 
     Parameters
     ----------
@@ -62,7 +65,7 @@ class PressureLoop:
         return np.clip(command, self.low, self.high)
 
     def _calm(self, wanted: Array, error: Array) -> None:
-        """Halve the gains with which pressures swing though nothing like it is asked for."""
+        """Halve the gains if pressures oscillate without a corresponding command."""
         slight = SLIGHT * (self.high - self.low)
         self._least, self._most = np.minimum(self._least, wanted), np.maximum(self._most, wanted)
         side = np.sign(error) * (np.abs(error) > slight)

@@ -1,4 +1,4 @@
-"""References known ahead, so that dead time vanishes.
+"""Preview of references, to compensate dead time.
 
 What a compensator gives cannot act before the dead time of the air has passed. Where it is given its
 reference that much ahead, as a robot knows that plans its motion, what comes of it is on time: offline
@@ -15,11 +15,11 @@ from mckibben.errors import require
 from mckibben.recording import Recording, sample_time_of
 
 MOST_PREVIEW = 1e4
-"""Seconds."""
+"""Longest preview [s]."""
 
 
 def dead_time_undone(compensator: Block) -> float:
-    """Return the dead time of what a compensator undoes [s]: how far ahead it wants its reference.
+    """Return the dead time of the inverted model [s], which is the preview needed.
 
     That of a compensator alone where there is feedback on top; 0 where nothing is known to be undone.
 
@@ -34,13 +34,13 @@ def dead_time_undone(compensator: Block) -> float:
 
 
 def samples_ahead(preview: float, sample_time: float) -> int:
-    """Return a preview in whole samples, rounded, or refuse one that is out of range."""
+    """Return a preview in whole samples; raise an error if it is out of range."""
     require(0 <= preview <= MOST_PREVIEW, "preview", preview, f"0 to {MOST_PREVIEW:g} s")
     return round(preview / sample_time)
 
 
 def previewed(reference: Recording, preview: float) -> Recording:
-    """Return a reference as a compensator is given it ahead: every sample has what comes later.
+    """Return a reference shifted by the preview.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What of a plant is driven, what is followed, and what is held: by names of channels."""
+"""Roles of a plant's channels, by name: driven, followed, or held."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from mckibben.errors import DataError
 from mckibben.recording import REST_LENGTH, Recording, conversion, standard_unit
 
 MOVED = ("displacement", "angle")
-"""What motions are called: of a muscle, and of a joint."""
+"""Names of motions of muscles and joints."""
 
 NOISE = 0.01
-"""Share of a rig's range by which what is held may begin beyond it: noise of a sensor."""
+"""Share of a rig's range by which a constant input may exceed it, for sensor noise."""
 
 
 class Plant(Protocol):
-    """What can be controlled: the step interface of rigs."""
+    """Interface of a plant: the step interface of rigs."""
 
     @property
     def name(self) -> str:
@@ -39,26 +39,26 @@ class Plant(Protocol):
         """Channels that it measures."""
 
     def reset(self, seed: int = 0) -> Array:
-        """Bring it to rest and return the first measurement."""
+        """Bring it to rest, and return the first measurement."""
 
     def step(self, action: ArrayLike | Mapping[str, float]) -> Array:
         """Hold commands for one sample time and return the next measurement."""
 
     def limits(self, name: str) -> Any:
-        """Return what the hardware lets through on an input channel: ``low`` and ``high``."""
+        """Return the hardware limits of an input channel: ``low`` and ``high``."""
 
     def changed(self, settings: Mapping[str, Any]) -> Any:
         """Return the same plant with other settings."""
 
 
 def rest_length_of(plant: Plant) -> float | None:
-    """Return the length of a plant's muscle where displacement is 0 [mm]; None where it is not known."""
+    """Return the length of a plant's muscle at displacement 0 [mm]; None if unknown."""
     length: float | None = getattr(plant, "rest_length", None)
     return length
 
 
 def asked(plant: Plant, reference: Recording, compensator: Block | None = None) -> Recording:
-    """Return a reference in the channels of a plant, where a rest length makes them of its own.
+    """Return a reference in the channels of a plant, converted by the rest length if necessary.
 
     Pressures recorded with it, which a compensator is to give, are left out.
     """
@@ -75,13 +75,13 @@ def asked(plant: Plant, reference: Recording, compensator: Block | None = None) 
 
 
 def channels_of(plant: Plant, names: Iterable[str]) -> tuple[Channel, ...]:
-    """Return channels of a plant with their units: those of a twin's model, or else the package's."""
+    """Return channels of a plant with their units: those of a twin's model, or the package's."""
     units = plant.units if isinstance(plant, Twin) else {}
     return tuple(Channel(name, units.get(name, standard_unit(name) or "")) for name in names)
 
 
 def offered(plant: Plant, reference: Recording) -> Offer:
-    """Return what a loop on a plant gives a controller, and takes of it.
+    """Return the signals that a loop on a plant offers to a controller, and its commands.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def offered(plant: Plant, reference: Recording) -> Offer:
 
 
 def followed_by(plant: Plant, reference: Recording) -> list[str]:
-    """Return the motions, or the force, of a reference that a plant measures; of a twin, all it gives.
+    """Return the motions, or the force, of a reference that a plant measures; for a twin, all outputs.
 
     Raises
     ------
@@ -129,13 +129,13 @@ def followed_by(plant: Plant, reference: Recording) -> list[str]:
 
 
 def roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str]]:
-    """Return the inputs that a controller drives, and those that a reference holds."""
+    """Return the inputs driven by a controller, and those set by a reference."""
     held = [name for name in plant.inputs if name in reference]
     return actuated(plant, held), held
 
 
 def resting(plant: Plant, held: Mapping[str, float]) -> dict[str, float]:
-    """Return the settings of a plant that rests at what is held; noise beyond a rig's range is no wish.
+    """Return the settings of a plant that rests at the held inputs, ignoring noise beyond its range.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def resting(plant: Plant, held: Mapping[str, float]) -> dict[str, float]:
 
 
 def actuated(plant: Plant, held: Collection[str]) -> list[str]:
-    """Return the inputs of a plant that move its muscles, and are not held.
+    """Return the inputs of a plant that drive its muscles, and are not held.
 
     They are called pressures or voltages; a twin says itself what drives it.
     """

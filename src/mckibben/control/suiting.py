@@ -1,4 +1,4 @@
-"""Whether what a plant tells of a controller holds: it may be another muscle, or know no time."""
+"""Checks whether results on a plant apply to the muscle of a compensator."""
 
 from __future__ import annotations
 
@@ -15,19 +15,21 @@ from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
-APART = 0.25
-"""Share of a model's stroke by which a plant's slow rise begins or ends elsewhere that is another
-muscle: specimens of a type, temperatures and loads differ by less, the next size by more."""
+LARGEST_DIFFERENCE = 0.25
+"""Share of a model's stroke by which the ends of the plant's slow rise may differ before it counts
+as another muscle: specimens, temperatures and loads differ by less, muscle sizes by more.
+"""
 
 BEYOND = 0.25
-"""Share of a model's range of pressure that a plant does not let through, and that is another muscle:
-recordings of one muscle begin and end a few tenths of a bar apart."""
+"""Share of a model's pressure range beyond the plant's limits above which it counts as another
+muscle: recordings of one muscle differ by a few tenths of a bar.
+"""
 
-REMEDY = "try it on a model of your own muscle (`plant=model.json`), where that was identified"
+REMEDY = "test it on a model of your own muscle (`plant=model.json`), where that was identified"
 
 
 def of_itself(model: Block | None, plant: Plant) -> bool:
-    """Tell whether a plant is the very model that a compensator undoes."""
+    """Return whether a plant is the model that a compensator inverts."""
     return (
         model is not None
         and isinstance(plant, Twin)
@@ -36,7 +38,7 @@ def of_itself(model: Block | None, plant: Plant) -> bool:
 
 
 def doubts(compensator: Block, plant: Plant, rise: Recording) -> list[str]:
-    """Return what speaks against taking what a compensator does on a plant for what it does on a muscle.
+    """Return warnings against transferring results of a compensator from a plant to a muscle.
 
     ``rise`` is what the plant does while its commands rise slowly, from `mckibben.control.slow_rise`.
     """
@@ -44,30 +46,30 @@ def doubts(compensator: Block, plant: Plant, rise: Recording) -> list[str]:
     if model is None:
         return []
     if of_itself(model, plant):
-        same = "the plant is the very model that the compensator undoes"
+        same = "the plant is the model that the compensator inverts"
         if isinstance(plant, Twin) and plant.scatters:
             return [f"{same}, with its band: errors without feedback are draws from the band"]
         return [
-            f"{same}, which makes it right by construction: only limits and rates show: try it "
-            "on another model of the muscle, or give this one the band of recordings held back "
+            f"{same}, so errors come from limits and rates alone: test it "
+            "on another model of the muscle, or calibrate this one on held-out recordings "
             "(`calibrate()`; `plant=banded.json`)"
         ]
     return [*_pressures(model, plant, rise), *_strokes(model, plant, rise)]
 
 
 def doubts_of_feedback(law: str, plant: Plant) -> list[str]:
-    """Return what speaks against feedback's errors on a plant: a model without time has no lag."""
+    """Return warnings about feedback on a plant: a static model has no lag."""
     if law == "feedforward" or not isinstance(plant, Twin) or plant.forward.rate_dependent:
         return []
     return [
-        "the plant is a model without time, which answers at once: feedback is better on it than it "
-        "will be on the muscle: compare feedback on a model with time, such as balance of "
+        "the plant is a static model, which responds within one sample: feedback performs better on it "
+        "than on the muscle; test feedback on a model with dynamics, such as balance fitted to "
         "recordings that have time"
     ]
 
 
 def _pressures(model: Block, plant: Plant, rise: Recording) -> list[str]:
-    """Tell of commands that a model was identified at, and that the plant does not let through."""
+    """Return a warning about identified pressures that the plant does not allow."""
     notes = []
     for channel in model.inputs:
         name, known = plain(channel.name), known_ranges(model).get(channel.name)
@@ -84,7 +86,7 @@ def _pressures(model: Block, plant: Plant, rise: Recording) -> list[str]:
 
 
 def _strokes(model: Block, plant: Plant, rise: Recording) -> list[str]:
-    """Tell where a plant's slow rise begins or ends elsewhere than the model's."""
+    """Return a warning if a plant's slow rise starts or ends elsewhere than the model's."""
     if any(plain(channel.name) not in rise for channel in model.inputs):
         return []
     known, within = known_ranges(model), np.ones(len(rise), dtype=bool)
@@ -115,7 +117,7 @@ def _strokes(model: Block, plant: Plant, rise: Recording) -> list[str]:
         if channel.name not in rise:
             continue
         ours, theirs = rise[channel.name][within][[0, -1]], expected[channel.name][[0, -1]]
-        if np.abs(ours - theirs).max() > APART * abs(theirs[1] - theirs[0]):
+        if np.abs(ours - theirs).max() > LARGEST_DIFFERENCE * abs(theirs[1] - theirs[0]):
             notes.append(
                 f"in a slow rise ({ends}), {channel.name} of {plant.name} goes from {_span(*ours)} "
                 f"{channel.unit}, and of the compensator's model from {_span(*theirs)}. {REMEDY}"

@@ -1,4 +1,4 @@
-"""Tuning PID feedback on a plant, so that it is a fair baseline.
+"""Tuning of PID feedback on a plant, as a fair baseline.
 
 A step of every pressure from the middle of its range gives gain, time constant and dead time (at 28 and
 63 % of the response); from them SIMC's rules (Skogestad, "Simple analytic rules for model reduction and
@@ -25,12 +25,15 @@ from mckibben.errors import ModelError
 from mckibben.system.progress import Tell, one_by_one, telling
 
 NEVER = 1e9
-"""Longer than any tuning [s]."""
+"""Time longer than any tuning [s]."""
 
 STEPS = (0.1, 0.2, 0.4)
-"""Of pressure, relative to its range: larger ones only where smaller ones move nothing."""
+"""Steps of pressure, relative to its range; larger ones are used only if smaller ones cause no
+motion.
+"""
 STEEPER = 2.0
-"""How many times steeper than at the step a muscle may be; more, and gains are for the steepest part."""
+"""Largest ratio of slopes, elsewhere to at the step; above it gains are set for the steepest part.
+"""
 
 
 def tune_pid(
@@ -64,7 +67,7 @@ def tune_pid(
     seed : int
         Of the noise.
     progress : bool or callable, optional
-        Whether to show a bar; or who is told the share of the muscles done, and words.
+        Whether to show a bar; or a callback for the share of muscles done, and a text.
 
     Raises
     ------
@@ -111,7 +114,7 @@ def tune_pid(
 def untuned_pid(
     plant: Plant, scheduled: Collection[str] = (), references: Sequence[Channel] = ()
 ) -> PIDFeedback:
-    """Return PID feedback of a plant's channels, without gains; parameters are those of `tune_pid`.
+    """Return PID feedback for a plant's channels, without gains; parameters as in `tune_pid`.
 
     Raises
     ------
@@ -137,7 +140,7 @@ def untuned_pid(
 
 
 def _moved_by(name: str, rig: Plant, driven: Sequence[str]) -> str:
-    """Return the motion that an input of a plant makes: that of its number, or the only one there is."""
+    """Return the motion driven by an input of a plant: that of the same number, or the only one."""
     end = name[name.find("_") :] if "_" in name else ""
     found = [stem + end for stem in MOVED if stem + end in rig.outputs]
     if len(driven) == 1 and not found and isinstance(rig, Twin):
@@ -153,7 +156,7 @@ def _moved_by(name: str, rig: Plant, driven: Sequence[str]) -> str:
 
 
 def _steepest(response: Array, ramp: Array, size: float) -> float:
-    """Return the largest gain over steps of a size, of a response to a ramp up and down."""
+    """Return the largest gain over steps of a size, from the response to a ramp up and down."""
     apart = max(round(size / float(ramp[1] - ramp[0])), 1)
     up, down = np.split(response, 2)
     run = float(ramp[apart] - ramp[0])
@@ -165,7 +168,7 @@ def _settled(response: Array) -> Array:
 
 
 def _moves(response: Array) -> bool:
-    """Tell whether something has moved, by more than it scatters."""
+    """Return whether a signal has moved by more than its scatter."""
     settled = _settled(response)
     return abs(float(settled.mean())) > float(settled.std())
 
@@ -181,7 +184,7 @@ def _simc(
     final = float(_settled(response).mean())
     if not _moves(response):
         raise ModelError(
-            f"{name} moves nothing",
+            f"{name} has no effect",
             remedy=f"check the plant, or its middle {name.partition('_')[0]}",
         )
     way = np.sign(final)  # a displacement that counts stretching falls as pressure rises

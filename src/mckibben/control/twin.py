@@ -1,4 +1,4 @@
-"""A twin: a fitted model where a plant stands, scattering as its band says.
+"""Twin: a fitted model used as a plant, with scatter according to its band.
 
     y[t] = P[u][t] + s sign(g[t]) Q(|g[t]|),   (1 - r / q)² g = c n
 
@@ -32,16 +32,16 @@ from mckibben.recording import Recording
 from mckibben.signals.checking import generator
 
 COMMAND = "command_"
-"""What commands are called in recordings, and not on plants."""
+"""Prefix of commands in recordings, which plants do not use."""
 
 
 def plain(name: str) -> str:
-    """Return what a plant calls a channel."""
+    """Return the plant's name of a channel."""
     return name.removeprefix(COMMAND)
 
 
 class Ends(NamedTuple):
-    """Lowest and highest of a channel."""
+    """Lowest and highest value of a channel."""
 
     low: float
     high: float
@@ -51,7 +51,7 @@ ANY = Ends(-np.inf, np.inf)
 
 
 class Twin:
-    """A fitted model as a plant, on which a compensator can be tried as on a rig.
+    """A fitted model as a plant, for testing a compensator as on a rig.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class Twin:
         self._scatter: _Scatter | None = None
 
     def __repr__(self) -> str:
-        """Name it, its model, and the ends of its commands."""
+        """Return its name, its model, and the limits of its commands."""
         ends = {name: tuple(self._limits[name]) for name in self.inputs if name in self._limits}
         band = f", band {self.model.band.level:g}" if isinstance(self.model, Banded) else ""
         return f"Twin({self.name!r}, {self.forward.title!r}{band}, limits={ends}, held={self.held})"
@@ -157,7 +157,7 @@ class Twin:
 
     @property
     def drawn(self) -> Array:
-        """What the last measurement has beside the model's outputs, shape (outputs,)."""
+        """The scatter of the last measurement, shape (outputs,)."""
         return np.zeros(len(self.outputs)) if self._scatter is None else self._scatter.drawn
 
     def limits(self, name: str) -> Ends:
@@ -176,7 +176,7 @@ class Twin:
         return self._limits[name]
 
     def changed(self, settings: Mapping[str, Any]) -> Self:
-        """Return the same twin with another ``sample_time``, ``scatter_after``, or ``start.NAME`` held.
+        """Return the same twin with another ``sample_time``, ``scatter_after``, or ``start.NAME``.
 
         Raises
         ------
@@ -203,7 +203,7 @@ class Twin:
         )
 
     def reset(self, seed: int = 0) -> Array:
-        """Bring it to rest, lowest commands and all else as held, and return the first measurement."""
+        """Bring it to rest with the lowest commands, and return the first measurement."""
         self._begin(seed)
         self._rest = np.array([self._resting(name) for name in self.inputs])
         return self._measured(self._rest)
@@ -242,7 +242,7 @@ class Twin:
         return self._measured(row)
 
     def run(self, inputs: Recording, seed: int = 0, *, ideal: bool = False) -> Recording:
-        """Run it over a recording of its inputs, as ``model.simulate`` does, with its scatter.
+        """Run it over a recording of its inputs, as ``model.simulate`` does, with scatter.
 
         Parameters
         ----------
@@ -284,7 +284,7 @@ class Twin:
 
     @property
     def driving(self) -> set[str]:
-        """Inputs that a controller drives: commands, or, without any, all that nothing holds."""
+        """Inputs driven by a controller: commands, or, without any, all that are not held."""
         named = {plain(channel.name) for channel in self.forward.inputs if drives(channel)}
         return named or set(self.inputs).difference(self.held)
 
@@ -295,7 +295,7 @@ class Twin:
             raise DataError(
                 "the plant's model needs it, and it is not given",
                 channel=name,
-                remedy="add the column to the reference, or say at what it is held",
+                remedy="add the column to the reference, or set its constant value (held={...})",
             )
         return self.limits(name).low
 
@@ -313,7 +313,7 @@ class Twin:
 
 
 class _Scatter:
-    """What is drawn beside a model's outputs.
+    """Random scatter added to a model's outputs.
 
     The band's scale is read off one of score 1.
     """
@@ -335,7 +335,7 @@ class _Scatter:
         self.drawn = np.zeros(n)
 
     def on(self, found: Array) -> Array:
-        """Return a sample of outputs with what is drawn, and move on."""
+        """Return a sample of outputs with scatter, and advance."""
         y, _, upper = found.reshape(-1, 3).T
         if self._quiet > 0:
             self._quiet -= 1
@@ -357,7 +357,7 @@ class _Scatter:
 
 
 def _keeping(samples: float) -> float:
-    """Return the r with which the integral of the autocorrelation is so many samples."""
+    """Return the autoregression coefficient with an integral correlation time of so many samples."""
     if samples <= 1.0:
         return 0.0
     from scipy.optimize import brentq  # slow to load
@@ -366,7 +366,7 @@ def _keeping(samples: float) -> float:
 
 
 def _quantiles(scores: Array) -> tuple[Array, Array]:
-    """Return levels and scores between which lines are drawn: ends of stairs, and none at level 0.
+    """Return levels and scores between which quantiles are interpolated.
 
     Between these no score is above that of its level, so that the band still holds its share.
     """

@@ -1,4 +1,4 @@
-"""The simplest use of a muscle, beside which a compensator has to show its worth: no compensation.
+"""Baseline without compensation: a static map of the plant.
 
 All that is known of the muscle is one slow rise of its pressure from the lowest to the highest, as every
 lab has it. A reference is read off that curve: a monotone map without memory, so that what goes down
@@ -24,33 +24,35 @@ from mckibben.errors import MckibbenError, ModelError
 from mckibben.recording import Recording
 
 UNCOMPENSATED = "no compensation"
-"""What that is called in tables and pictures."""
+"""Label of that loop in tables and figures."""
 
 RISE = 30.0
-"""Time in which pressures rise [s]: slow beside air and creep of a loop's length."""
+"""Duration of the slow rise of pressure [s]: long compared with air dynamics."""
 
 KNOTS = 65
-"""Of a curve."""
+"""Number of knots of a curve."""
 
 SMALLEST = 1e-3
-"""Weight of a command's size beside what it moves: of all that move alike, the smallest are given."""
+"""Weight of the command's size against the motion error: of equivalent commands the smallest is
+chosen.
+"""
 
 
 @dataclass
 class Rule(Controller):
-    """Commands that a function gives for the reference alone."""
+    """Commands as a static function of the reference."""
 
     commands: Callable[[Array], Array]
 
     def reset(self, sample_time: float) -> None:
-        """Do nothing: it has no memory."""
+        """Do nothing, as there is no state."""
 
     def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
         return self.commands(reference)
 
 
 def straight(rest: Array, slopes: Array, low: Array, high: Array) -> Callable[[Array], Array]:
-    """Return a rule of straight lines, which gives of all commands the smallest.
+    """Return a piecewise-linear rule, with the smallest of all equivalent commands.
 
     At the lowest commands what is followed is at ``rest``, shape (m,), and its slopes have shape (m, n).
     """
@@ -74,7 +76,7 @@ def slow_rise(
     pressure_loop: bool = True,
     seed: int = 0,
 ) -> Recording:
-    """Return what a plant does while its commands rise slowly together, or one of them alone.
+    """Return the plant's response to a slow rise of all commands together, or of one.
 
     Parameters
     ----------
@@ -119,7 +121,7 @@ def slow_rise(
 
 
 def _roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str], list[str]]:
-    """Return what is followed, what is driven, and what is held."""
+    """Return the followed, driven and held channels."""
     return followed_by(plant, reference), *roles(plant, reference)
 
 
@@ -136,7 +138,7 @@ def uncompensated(
     pressure_loop: bool = True,
     seed: int = 0,
 ) -> Controller:
-    """Return what follows a reference without compensation, by a plant's slow rise.
+    """Return the controller without compensation, from a plant's slow rise.
 
     Parameters
     ----------
@@ -167,7 +169,7 @@ def uncompensated(
 
 
 def curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
-    """Return a monotone curve of a slow rise: what is moved, rising, and the command there.
+    """Return the monotonic curve of a slow rise: output, increasing, and command.
 
     Raises
     ------
@@ -192,7 +194,7 @@ def curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Before:
-    """What is to be known before a compensator is believed.
+    """The uncompensated loop, and warnings about the plant.
 
     Parameters
     ----------
@@ -207,7 +209,7 @@ class Before:
     notes: tuple[str, ...]
 
     def beside(self, recording: Recording) -> Recording:
-        """Return a loop's recording with what no compensation gave, as ``uncompensated_...``."""
+        """Return a loop's recording with the uncompensated outputs, as ``uncompensated_...``."""
         if self.tracked is None:
             return recording
         units, without = recording.units, self.tracked.recording
@@ -218,7 +220,7 @@ class Before:
 
 
 def before(compensator: Block, plant: Plant, reference: Recording, **settings: Any) -> Before:
-    """Let a plant follow a reference without compensation, and look whether a compensator is of it.
+    """Run the uncompensated loop on a plant, and check that the compensator fits the plant.
 
     Parameters
     ----------

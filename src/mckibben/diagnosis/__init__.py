@@ -1,4 +1,4 @@
-"""What recordings show of a muscle, as numbers with intervals."""
+"""Characterization and checks of recordings and models, as numbers with intervals."""
 
 from mckibben.diagnosis.characterization import Characterization as Characterization
 from mckibben.diagnosis.characterization import characterize as characterize

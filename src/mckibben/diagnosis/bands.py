@@ -1,4 +1,4 @@
-"""Bands of a model by split conformal prediction: how far off it may be on a run like the calibration's.
+"""Prediction bands of a model by split conformal prediction, for runs like those of the calibration.
 
 What a model missed on some units (runs, or blocks of them longer than the errors are correlated) bounds
 what it misses on the next, if all are exchangeable, whatever the model and its errors are. The quantile
@@ -34,26 +34,30 @@ if TYPE_CHECKING:
 Unit = Literal["auto", "run", "block"]
 
 LEVEL, LEVELS = 0.9, np.linspace(0.0, 1.0, 1001)
-"""Level of a band where none is asked for, or the highest that its units allow; those of the table of
-half widths."""
+"""Default level of a band, reduced to the highest that the number of units allows; levels in the
+table of half widths.
+"""
 
 RUNS = 9
-"""Runs that allow a level of 0.9: from here on runs are the units, below blocks of them."""
+"""Smallest number of runs for a level of 0.9: with fewer, blocks of runs are the exchangeable
+units.
+"""
 
 SHORTEST_BLOCK = 2.0
-"""Correlation lengths of the errors that a block lasts at least."""
+"""Shortest block, in correlation lengths of the errors."""
 
 WIDENINGS, FOLDS = (0.0, 0.3, 1.0, 3.0, 10.0), 5
-"""Shares by which a band may be wider at the mean speed than at rest, and parts of the units that are
-left out in turn to choose one."""
+"""Candidate increases of the width at mean speed, relative to that at rest, and number of
+cross-validation folds that choose among them.
+"""
 
 MARGIN = 0.05
-"""Share of a calibrated range up to which samples beyond it count as inside."""
+"""Share of a calibrated range by which samples may exceed it and count as inside."""
 
 
 @dataclass(frozen=True)
 class Held:
-    """A run that the model was not fitted to.
+    """A run to which the model was not fitted.
 
     Parameters
     ----------
@@ -72,19 +76,19 @@ class Held:
 
     @property
     def errors(self) -> Array:
-        """Of the samples that are scored, shape (scored, outputs)."""
+        """Errors of the scored samples, shape (scored, outputs)."""
         return np.asarray((self.measured - self.modelled)[self.counts])
 
     @property
     def speeds(self) -> Array:
-        """Of the modelled outputs there [unit/s, or per sample], shape (scored, outputs)."""
+        """Speeds of the modelled outputs there [unit/s, or per sample], shape (scored, outputs)."""
         moved = np.abs(np.diff(self.modelled, axis=0, prepend=self.modelled[:1]))
         return np.asarray(moved[self.counts] / (self.sample_time or 1.0))
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """A band, and how wide it is.
+    """A band, and its width.
 
     Parameters
     ----------
@@ -127,7 +131,7 @@ def calibrate(
     fitted: Sequence[Recording] = (),
     progress: bool | Tell | None = None,
 ) -> Banded:
-    """Return a model with a band that holds a share of the samples of a new run like the recordings.
+    """Return a model with a band that covers a share of the samples of new, similar runs.
 
     The model runs free over each recording, and its errors give the half width of the band by split
     conformal prediction. The width is constant, or grows with the speed of the modelled output,
@@ -147,7 +151,7 @@ def calibrate(
     fitted : sequence of Recording, optional
         Those that it was fitted to, to make sure that none is among the recordings.
     progress : bool or callable, optional
-        Whether to show a bar; or who is told the share done, and words.
+        Whether to show a bar; or a callback for the share done, and a text.
 
     Raises
     ------
@@ -179,11 +183,11 @@ def calibration(
     fitted: Sequence[Recording] = (),
     tell: Tell | None = None,
 ) -> tuple[Banded, Calibration]:
-    """Return a model with its band, and how wide that is; see `calibrate`."""
+    """Return a model with its band, and the band's width; see `calibrate`."""
     model = inside(model)
     if commands(model):
         raise ModelError(
-            f"{model.title!r} gives inputs, and bands are of outputs",
+            f"{model.title!r} computes inputs, but bands are of outputs",
             remedy="calibrate the model that was inverted",
         )
     if not recordings:
@@ -205,7 +209,7 @@ def calibration(
 
 
 def held_of(model: Block, recording: Recording) -> Held:
-    """Return a model's free run over a recording; the first sample, which starts it, does not count."""
+    """Return a model's free run on a recording; the first sample, its start, is not scored."""
     outputs = [channel.name for channel in model.outputs]
     modelled, measured = run_free(model, recording, outputs), recording.matrix(outputs)
     refuse_runaway(model, recording, modelled, measured)
@@ -214,7 +218,7 @@ def held_of(model: Block, recording: Recording) -> Held:
 
 
 def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Calibration:
-    """Return the band of a model by its errors on runs that it was not fitted to; two units or more."""
+    """Return the band of a model from its errors on held-out runs; needs two units."""
     runs = [run for run in runs if run.counts.any()]
     errors = [run.errors for run in runs]
     memory = max(correlation_length(one) for one in zip(*(e.T for e in errors), strict=True))
@@ -230,7 +234,7 @@ def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Calibr
     if n < 2:
         raise DataError(
             f"errors are correlated over {numeral(memory, 3)} samples, so {sum(map(len, errors))} of "
-            f"them are one {which}, which gives no band for another",
+            f"them are one {which}, which is too few for a band",
             remedy="calibrate on more, or longer, recordings",
         )
     level = min(LEVEL, n / (n + 1))
@@ -259,7 +263,7 @@ def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Calibr
 def _narrowest(
     errors: Array, speeds: Array, of: NDArray[np.intp], level: float, widenings: Sequence[float]
 ) -> tuple[float, Array, float, float]:
-    """Return widening and half widths at all levels, mean width, and that over a constant band's.
+    """Return widening, half widths at all levels, mean width, and its ratio to a constant band's.
 
     Units, by ``of``, weigh the same; widths are those on units left out of the quantile.
     """
@@ -289,7 +293,7 @@ def _narrowest(
 
 
 def outside(band: Band, samples: Array) -> dict[str, float]:
-    """Return, of channels that leave what calibration covered, the share of samples that do.
+    """Return the share of samples outside the calibrated range, for channels that leave it.
 
     ``samples`` are the model's inputs, then its outputs, shape (n, channels).
     """
@@ -302,7 +306,7 @@ def outside(band: Band, samples: Array) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class TestedBand:
-    """How a band from the training side does on the test.
+    """Coverage of a band, calibrated on training data, on the test.
 
     Parameters
     ----------
@@ -331,7 +335,7 @@ class TestedBand:
 def tested_band(
     block: Block, held: Sequence[Held], outputs: Sequence[Array], data: Data
 ) -> tuple[Banded, TestedBand] | None:
-    """Return a model with its band, and how that does on the test; None where there is no band.
+    """Return a model with its band, and the band's coverage on the test; None without a band.
 
     ``held`` are of models fitted without a part of the training side, on that part; ``outputs``,
     shape (n, k) each, free-running on every training recording, then on every test recording.

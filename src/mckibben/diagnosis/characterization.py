@@ -37,32 +37,34 @@ from mckibben.signals.reversals import whole_cycles
 from mckibben.system.showing import DrawsItself
 
 LEVEL, NO_GAP = 0.01, 0.01
-"""Of the test for a loop; branches whose mean gap is surely below the second share of the output range
-are no loop."""
+"""Significance level of the loop test; mean gap between branches, relative to the output range,
+below which there is no loop.
+"""
 
 EXPLAINED, POSITION = 0.5, 0.1
-"""Share of the output's variance that velocity explains at least, and the input at most, where the
-output follows direction; and that branches explain at least whose shape is measured."""
+"""Variance shares: the velocity's at least, and the input's at most, if the output depends on
+direction only; also the branches' at least, for their shape to be measured.
+"""
 
 REPEATS = 3
-"""Values of which an interval is made, at least."""
+"""Smallest number of values for an interval."""
 
 SHAPE = {
     *("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid"),
     *("dead_zone_upper", "dead_zone_lower", "closure_error", "rate_dependence", "speeds"),
 }
-"""What is measured only where there is a loop."""
+"""Quantities that are measured only if there is a loop."""
 
 BY_POSITION = {
     *("gain", "onset", "saturation", "asymmetry", "width_centroid", "branch_gap", "drift"),
     *("dead_zone_upper", "dead_zone_lower", "creep", "creep_time", "closure_error"),
 }
-"""What has no meaning where the output follows direction."""
+"""Quantities without meaning if the output depends on direction only."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """What is found where other inputs stand still: their channels, levels and units in ``held``."""
+    """Results with other inputs constant: their channels, levels and units in ``held``."""
 
     held: tuple[tuple[str, float, str], ...]
     found: Characterization
@@ -70,7 +72,7 @@ class Level:
 
 @dataclass(frozen=True, kw_only=True)
 class Characterization(DrawsItself):
-    """What a muscle does, from recordings alone; None for what they do not show.
+    """Characterization of a muscle from recordings; None for quantities that they do not determine.
 
     Units are those of the channels; percentages are of the output range. Figures are medians over
     repeats; ``intervals`` has the 95 % intervals of those with three repeats or more, by field.
@@ -87,10 +89,10 @@ class Characterization(DrawsItself):
     loop_width, mid_width : float or None
         Distance of the largest cycles' branches at mid input: e_w [%] and [output unit].
     asymmetry, width_centroid : float or None
-        How far the loop is from its own image, turned by half a turn [%], 0 for classical
+        Distance of the loop from its image rotated by 180° [%], 0 for classical
         Prandtl-Ishlinskii models; where it is wide, from -1 (low input) to 1 (high input).
     loop_area, loop_area_share : float or None
-        Area that it encloses [input unit x output unit], and that over the rectangle round it [%].
+        Enclosed area [input unit x output unit], and its ratio to the bounding rectangle [%].
     dead_zone_upper, dead_zone_lower : float or None
         Change of the input after upper and lower reversals before the output moves [input unit].
     gain, onset, saturation : float or None
@@ -101,26 +103,25 @@ class Characterization(DrawsItself):
         [output unit], and the probability of such gaps without a loop. From four branches on drift
         cancels; of fewer there is no probability.
     creep, creep_time, drift : float or None
-        Change of the output in a hold of all inputs [output unit], over what time [s]; and from one
-        cycle to the next between the same extremes.
+        Change of the output in a hold of all inputs [output unit], and its time [s]; change from
+        one cycle to the next between the same extremes.
     rate_dependence, speeds
-        Growth of e_w at twice the speed [%], and the mean speeds between which it is found [input
-        unit/s].
+        Increase of e_w at twice the speed [%], and the mean speeds compared [input unit/s].
     closure_error : float or None
         Return-point memory: output after a minor loop against that before it [%].
     position_share, direction_share, loop_share : float
         Share of the output's variance that functions of the input alone, of its velocity alone, and of
         the input and its direction together explain.
     n_stretches : int or None
-        Stretches in which other inputs stand still; None where nothing else moves.
+        Segments in which other inputs are constant; None where nothing else moves.
     falls : bool
         Whether the output falls as the input grows.
     effects : tuple of Effect
-        What other inputs do; ``adjusted`` where it is taken away, as they stand still nowhere:
-        gain and branch gap alone are measured then.
+        Effects of other inputs; ``adjusted`` if they are never constant, and their effect was
+        removed: then only gain and branch gap are measured.
     levels : tuple of Level
-        Those at which other inputs stand still. What is found of the loop is that of the one at which
-        the output moves most.
+        Levels at which other inputs are constant. The loop is that of the level of largest output
+        motion.
     """
 
     face: ClassVar[str] = "characterization"
@@ -179,7 +180,7 @@ class Characterization(DrawsItself):
 
     @property
     def has_loop(self) -> bool | None:
-        """Whether branches are apart; False only where they surely are by less than 1 % of the range.
+        """Whether branches differ; False only if their gap is significantly below 1 % of the range.
 
         None where too few branches, or too much noise, leave it open.
         """
@@ -191,14 +192,14 @@ class Characterization(DrawsItself):
 
     @property
     def follows_direction(self) -> bool:
-        """Whether the output follows the direction of motion, as friction does, and not position.
+        """Whether the output depends on the direction of motion, as friction does, and not on position.
 
         Such an output has no onset and no trend over the input, and no inverse by position.
         """
         return self.direction_share >= EXPLAINED and self.position_share <= POSITION
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything for JSON, with None for what could not be measured."""
+        """Return everything for JSON, with None for undetermined quantities."""
         return asdict(self) | {"follows_direction": self.follows_direction}
 
 
@@ -209,15 +210,15 @@ def characterize(
     *,
     beside: Sequence[str] = (),
 ) -> Characterization:
-    """Measure what a muscle does: width and shape of its loop, memory, creep, dependence on rate.
+    """Measure width and shape of the loop, memory, creep and rate dependence of a muscle.
 
-    Sensor noise is averaged away first, over samples within which the input moves by 1 % of its range.
+    Sensor noise is averaged first, over samples within which the input moves by 1 % of its range.
     Ranges are those of all recordings together.
 
-    Where other inputs, such as pressures of other muscles, loads or lengths, stand still, every level
-    of theirs has a loop of its own, and the one at which the output moves most is reported. Where they
-    never do while the input moves, their effect by straight lines is taken away, and gain and mean gap
-    of the branches alone are measured.
+    Other inputs, such as pressures of other muscles, loads or lengths, have a separate loop at
+    every level at which they are constant; the one of largest output motion is reported. If they
+    are never constant while the input moves, their linear effect is removed, and only gain and mean
+    gap of the branches are measured.
 
     Parameters
     ----------
@@ -273,7 +274,7 @@ def characterize(
         found = replace(found, adjusted=True)
     else:
         raise DataError(
-            f"it never moves while {', '.join(others)} stand still, so its effect cannot be identified",
+            f"it never moves while {', '.join(others)} are constant, so its effect cannot be identified",
             file=runs[0].source,
             channel=input,
             remedy="record one in which it moves alone; models of several inputs need no such recording",
@@ -284,7 +285,7 @@ def characterize(
 def _levels(
     runs: Sequence[Recording], given: str, wanted: str, others: Sequence[str]
 ) -> list[Level]:
-    """Return what is found at every level of other inputs that shows a loop, or a recording's gap."""
+    """Return the results at every level of other inputs that shows a loop, or a data gap."""
     levels = []
     low, high = extremes(runs, given)
     span = high - low
@@ -303,7 +304,7 @@ def _levels(
 
 
 def _counts(runs: Sequence[Recording], given: str, wanted: str) -> dict[str, Any]:
-    """Return what is known of recordings without looking at loops."""
+    """Return counts and ranges of recordings."""
     durations, steps = [run.duration for run in runs], {run.sample_time for run in runs}
     return {
         "input_range": extremes(runs, given),
@@ -316,7 +317,7 @@ def _counts(runs: Sequence[Recording], given: str, wanted: str) -> dict[str, Any
 
 
 def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characterization:
-    """Return what is found in recordings in which nothing else moves, whatever their zeros."""
+    """Return the results of recordings in which other inputs are constant, with any zero offsets."""
     several = len(runs) > 1 and all(given in run and wanted in run for run in runs)
     scale, tracks = prepare(levelled(runs, given, wanted) if several else runs, given, wanted)
     loops, branches = loops_of(tracks, scale), branches_of(tracks, scale)
@@ -378,7 +379,7 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
 
 
 def _blanked(found: Characterization, absent: Collection[str]) -> Characterization:
-    """Return what is found without some of its figures."""
+    """Return results without some of their quantities."""
     cycles = () if "loop_width" in absent else found.cycles
     kept = {name: limits for name, limits in found.intervals.items() if name not in absent}
     blank: dict[str, Any] = dict.fromkeys(absent)
@@ -386,7 +387,7 @@ def _blanked(found: Characterization, absent: Collection[str]) -> Characterizati
 
 
 def _interval(values: Sequence[float]) -> Range | None:
-    """Return the 95 % interval of the median of repeated values by Student's t; None of two or fewer.
+    """Return the 95 % interval of the median of repeated values by Student's t; None for one or two.
 
     It does not reach beyond zero where all values are of one sign.
     """

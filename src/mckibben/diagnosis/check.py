@@ -1,4 +1,4 @@
-"""A model checked on recordings: whether what it leaves is noise, and if not, what it follows."""
+"""Model check: whether residuals are noise, and otherwise what they depend on."""
 
 from __future__ import annotations
 
@@ -23,45 +23,47 @@ from mckibben.system.showing import DrawsItself
 from mckibben.system.threads import one_blas_thread
 
 LEVEL = 0.01
-"""How often a right model is said to miss something, all tests of all outputs together (Bonferroni)."""
+"""Probability of a false finding for a correct model, over all tests and outputs (Bonferroni)."""
 
 FEWEST_BLOCKS = 6
-"""Of a recording that is tested."""
+"""Smallest number of blocks of a recording that is tested."""
 
 ROUNDING, STEP = 1e-9, 0.5
-"""Shares of the span and of the sensor's step up to which a residual's root mean square says nothing."""
+"""RMS residuals that are not tested: shares of the span, and of the sensor's resolution."""
 
 UNMOVED, OFF_GRID = 0.05, 0.01
-"""A sensor shows its steps where so many samples equal the one before and none is further off a step."""
+"""A sensor is quantised if this share of samples equals the preceding one and none is further than
+this from the grid.
+"""
 
 AGAINST = {"curve": "input", "load": "load", "hysteresis": "branch"}
-"""What residuals are averaged over, by kind of group."""
+"""Axis over which residuals are averaged, by kind of group."""
 
 LAST = ("runs", "offset")
-"""Groups that have no shape: whatever else is missed shifts the mean, so they are tested beside it."""
+"""Groups without a shape, tested with the others: any other misfit shifts the mean."""
 
 ALONE = ("drift", "offset")
-"""Groups that are no finding beside others: what a wrong model leaves has a mean and a trend as well."""
+"""Groups that count as findings only if no other does: any misfit has a mean and a trend."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that a residual was tested for.
+    """A tested cause of a residual.
 
     Parameters
     ----------
     kind, channel : str
         As `mckibben.diagnosis.suspects.Group` has them.
     p_value : float
-        Probability of noise that looks so, beside what was found before.
+        p-value of noise alone, given the findings before.
     share : float
-        Of the residual's variance that it explains, 0 to 1, beside what was found before.
+        Share of the residual's variance explained, 0 to 1, given the findings before.
     size : float
         The same as a root mean square, unit of the output.
     coefficient : float or None
         The offset [unit of the output], or how much later measured motion is than modelled [samples].
     or_causes : tuple of (str, str)
-        What it may be as well: beside them it is not certain.
+        Alternatives from which it is not distinguished.
     """
 
     kind: str
@@ -75,7 +77,7 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class OutputCheck:
-    """What a model leaves of one output.
+    """Residual of one output.
 
     Parameters
     ----------
@@ -117,12 +119,12 @@ class OutputCheck:
 
     @property
     def useless(self) -> bool:
-        """Whether the mean is about as good; see `mckibben.comparison.choosing.useful`."""
+        """Whether the mean predicts about as well; see `mckibben.comparison.choosing.useful`."""
         return not useful(self.rmse, self.mean_error)
 
     @property
     def right(self) -> bool:
-        """Whether nothing is found that the model misses."""
+        """Whether no cause is significant."""
         return self.exact or not (self.missing or self.useless)
 
     def to_dict(self) -> dict[str, Any]:
@@ -134,7 +136,7 @@ class OutputCheck:
 
 @dataclass(frozen=True, eq=False)
 class Validation(DrawsItself):
-    """Whether a model is right on recordings, and what it misses.
+    """Result of a model check on recordings.
 
     Parameters
     ----------
@@ -144,7 +146,7 @@ class Validation(DrawsItself):
         Names of what it was checked on.
     outputs : tuple of OutputCheck
     untested : tuple of str
-        Names of recordings too short beside the others to be tested.
+        Names of recordings too short to be tested.
     runs : tuple of Run
         The recordings, and what the model makes of them; not in ``to_dict``.
     description : ModelDescription or None
@@ -162,7 +164,7 @@ class Validation(DrawsItself):
 
     @property
     def right(self) -> bool:
-        """Whether nothing is found that the model misses."""
+        """Whether no cause is significant."""
         return all(one.right for one in self.outputs)
 
     def to_dict(self) -> dict[str, Any]:
@@ -183,7 +185,7 @@ def check(
     *,
     progress: bool | Tell | None = None,
 ) -> Validation:
-    """Test whether a model is right on recordings, and what it misses if it is not.
+    """Check a model on recordings, and find what its residuals depend on.
 
     The model runs free, from an honest start of its memory. What it leaves is tested for following a
     lag of the output, inputs, their branches by region (hysteresis that is left), recorded loads, time,
@@ -220,7 +222,7 @@ def check(
 def check_runs(
     model: Block, runs: Sequence[Run], tell: Tell | None = None, means: Array | None = None
 ) -> Validation:
-    """Check a model by what it made of recordings, running free; see `check`.
+    """Check a model by its free runs on recordings; see `check`.
 
     Parameters
     ----------
@@ -297,7 +299,7 @@ def _output(
 
 
 class _Search:
-    """Groups that a residual follows, taken one by one, the most important first."""
+    """Forward selection of groups that explain a residual, the most important first."""
 
     def __init__(
         self,
@@ -312,7 +314,7 @@ class _Search:
         self.residual = np.concatenate(left)
 
     def missing(self) -> tuple[Finding, ...]:
-        """Return what is certain, each beside those before."""
+        """Return the significant groups, each given those before."""
         found: list[Finding] = []
         known: tuple[int, ...] = ()
         for kinds in ({g.kind for g in self.groups} - set(LAST), *({kind} for kind in LAST)):
@@ -337,7 +339,7 @@ class _Search:
     def finding(
         self, group: Group, known: tuple[int, ...] = (), others: tuple[tuple[str, str], ...] = ()
     ) -> Finding:
-        """Return what a group explains beside others."""
+        """Return what a group explains in addition to others."""
         test = self._test(group, known)
         coefficient, about = None, float(self.residual.mean())
         if group.kind == "lag":
@@ -361,7 +363,7 @@ class _Search:
         return self._test(group, known).p_value <= self.level
 
     def _gain(self, group: Group, known: tuple[int, ...]) -> float:
-        """Return how much more a group explains than noise would, by Mallows' C_p.
+        """Return the variance that a group explains beyond noise, by Mallows' C_p.
 
         Beside mean and start, and with what it is beside: a branch by region may move the curve, too.
         """
@@ -376,7 +378,7 @@ def _rms(pieces: Sequence[Array]) -> float:
 
 
 def _resolution(measured: Sequence[Array]) -> float:
-    """Return the step of a measured output whose samples are all whole steps apart; else 0."""
+    """Return the resolution of a quantised output; otherwise 0."""
     values = np.unique(np.concatenate(measured))
     steps = np.diff(values)
     steps = steps[steps > ROUNDING * (values[-1] - values[0])]

@@ -1,4 +1,4 @@
-"""Other inputs, such as loads and lengths: where they stand still, and what they do."""
+"""Other inputs, such as loads and lengths: segments in which they are constant, and their effects."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from mckibben.signals.holds import STILL, holds, moves
 from mckibben.statistics import correlation_length, dependence, hats
 
 ALIKE, COVERS = 0.02, 0.5
-"""Share of all that another input does within which levels are one, and of the input range over which
-the input moves in a stretch that is measured."""
+"""Share of another input's range within which its levels are equal, and share of the input range
+that a segment must cover.
+"""
 
 FOLLOWS = 0.9
-"""Share of an input's variance (R²) that others explain, from which their effects are not separate."""
+"""R² of an input's regression on the others above which their effects are not separable."""
 
 MOST, KNOTS = 2000, 12
-"""Samples of a recording by which effects are found, and knots of the curve of the input beside it."""
+"""Largest number of samples per recording for effects, and number of knots of the input's curve."""
 
 
 @dataclass(frozen=True)
 class Effect:
-    """How far another input that goes from ``low`` to ``high`` moves the output at equal input.
+    """Effect of another input, from ``low`` to ``high``, on the output at equal input.
 
     By straight lines: the ``change`` of the output and that of its slope, ``gain_change``, each with its
     95 % interval; None where recordings do not tell the latter.
@@ -46,29 +47,31 @@ class Effect:
 def others_of(
     recordings: Sequence[Recording], given: str, wanted: str, asked: Sequence[str]
 ) -> list[str]:
-    """Return other inputs that move in or between recordings.
+    """Return other inputs that vary within or between recordings.
 
     Those asked for, other channels of the input's quantity, what schedules models, and channels that
     every recording holds.
     """
     quantity = given.rstrip("0123456789")
     seen = [name for name in recordings[0].channels if all(name in one for one in recordings)]
-    told = [
+    candidates = [
         *asked,
         *(n for n in seen if given != quantity and n.rstrip("0123456789") == quantity),
         *(n for n in schedules(recordings) if n in seen),
         *(n for n in seen if all(np.ptp(one[n]) == 0 for one in recordings)),
     ]
-    named = [n for n in dict.fromkeys(told) if n not in (given, wanted)]
+    named = [n for n in dict.fromkeys(candidates) if n not in (given, wanted)]
     return [n for n in named if moves([one[n] for one in recordings])]
 
 
 Group = tuple[tuple[float, ...], list[tuple[int, Recording]]]
-"""Levels at which other inputs stand still; numbers of the recordings, and stretches where they do."""
+"""Levels at which the other inputs are constant, with the recordings and segments in which they
+are.
+"""
 
 
 def standing(recordings: Sequence[Recording], given: str, others: Sequence[str]) -> list[Group]:
-    """Return stretches in which all other inputs stand still and the input moves, by level."""
+    """Return segments in which all other inputs are constant and the input moves, by level."""
     span = max(float(np.ptp(one[given])) for one in recordings)
     ranges = np.ptp(np.concatenate([one.matrix(others) for one in recordings]), axis=0)
     found: list[tuple[Array, int, Recording]] = []
@@ -91,7 +94,7 @@ def standing(recordings: Sequence[Recording], given: str, others: Sequence[str])
 
 
 def levelled(recordings: Sequence[Recording], given: str, wanted: str) -> list[Recording]:
-    """Return recordings whose outputs are one curve of the input as nearly as offsets make them."""
+    """Return recordings whose outputs are shifted onto one curve of the input."""
     seen = [one.matrix((given, wanted))[:: -(-len(one) // MOST)] for one in recordings]
     own = np.repeat(np.eye(len(seen)), [len(part) for part in seen], axis=0)
     x, y = np.concatenate(seen).T
@@ -106,7 +109,7 @@ def levelled(recordings: Sequence[Recording], given: str, wanted: str) -> list[R
 def effects(
     recordings: Sequence[Recording], given: str, wanted: str, others: Sequence[str]
 ) -> tuple[Effect, ...]:
-    """Return how far other inputs move an output at equal input; none where they move together.
+    """Return the effects of other inputs at equal input; none if they are collinear.
 
     By least squares beside a curve of the input, each with a straight line, and that times the input.
     """
@@ -152,7 +155,7 @@ def effects(
 
 
 def _together(parts: Sequence[Array], hats: Array, k: int) -> bool:
-    """Return whether another input follows from the input and the others, within recordings.
+    """Return whether another input is determined by the remaining inputs within recordings.
 
     What moves only between recordings is separate.
     """
@@ -165,7 +168,7 @@ def _together(parts: Sequence[Array], hats: Array, k: int) -> bool:
 def without(
     recordings: Sequence[Recording], given: str, wanted: str, moved: Sequence[Effect]
 ) -> list[Recording]:
-    """Return recordings whose output is what it would be with other inputs amid their ranges."""
+    """Return recordings with the outputs corrected to mid-range of the other inputs."""
     ends = [float(end(one[given])) for one in recordings for end in (np.min, np.max)]
     middle, found = 0.5 * (min(ends) + max(ends)), []
     for one in recordings:

@@ -1,4 +1,4 @@
-"""How far every input moves every output, and which input is an output's own."""
+"""Coupling: effect of every input on every output, and the main input of each output."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mckibben.statistics import dependence
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
-    """How far every input moves every output, by one straight line through all inputs.
+    """Effect of every input on every output, by linear regression.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Coupling:
     explained: tuple[float, ...]
 
     def own(self, output: str, recordings: Sequence[Recording] = ()) -> str:
-        """Return the input that is an output's own: of as many its pair, else what moves it most.
+        """Return the main input of an output: its pair, or the one of largest effect.
 
         Where recordings are given, it is one that moves in them, if any does.
         """
@@ -52,7 +52,7 @@ class Coupling:
         return self.inputs[moving[int(np.argmax(np.nan_to_num(effects)))]]
 
     def pairs(self, recordings: Sequence[Recording]) -> tuple[tuple[str, str], ...]:
-        """Return what every output of recordings is drawn over, and the output.
+        """Return the abscissa of every output in figures, and the output.
 
         That is the input that is its own; where all are held, what else drives and moves.
         """
@@ -72,7 +72,7 @@ class Coupling:
 def coupling(
     recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
 ) -> Coupling:
-    """Return how far inputs move outputs over all recordings, each of which may rest elsewhere.
+    """Return the effects of inputs on outputs over all recordings, with separate offsets.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def coupling(
 
 
 def fullest(recordings: Sequence[Recording], inputs: Sequence[str]) -> Recording:
-    """Return the recording whose least moved input moves the most; of equals the first."""
+    """Return the recording whose least varying input varies most."""
 
     def least(recording: Recording) -> float:
         return float(min(np.ptp(recording[name]) / whole[name] for name in inputs))

@@ -1,4 +1,4 @@
-"""Data gaps: what recordings cannot identify, the number that shows it, and the run that would.
+"""Data gaps: what recordings cannot identify, the number that shows it, and the run that closes it.
 
 Every rule is a function of the excitation of the recordings and gives a number by channels; the table
 `RULES` says from which value on nothing is missing.
@@ -28,30 +28,37 @@ if TYPE_CHECKING:
     from mckibben.comparison.channels import Names
 
 FEWEST_SAMPLES, MOST_SAMPLES = 10, 20_000
-"""Samples of a recording at least, and those in which correlations and sensor steps are looked for."""
+"""Smallest number of samples of a recording, and largest number used for correlations and sensor
+resolution.
+"""
 
 AT_END, OFF_REST = 0.1, 0.1
-"""Shares of a range: turning points this close to an end are at it; a channel this far off its most
-frequent value is off it."""
+"""Shares of a range: distance from an end for a turning point to be at it; distance from the most
+frequent value to be away from rest.
+"""
 
 LARGE, SIMILAR, FEWEST_BRANCHES = 0.25, 1.5, 4
-"""Speeds are compared of branches over this share of the range, that differ in length by this factor at
-most, and are so many at least; cycles of branches as long."""
+"""Speeds are compared among branches over this share of the range, whose lengths differ by at most
+this factor, if there are this many.
+"""
 
 REPEATED, LASTING, CYCLE_POINTS = 0.02, 1.1, 9
-"""Cycles are the same where channels are within this share of their ranges at so many points, and times
-within this factor."""
+"""Two cycles are equal if channels agree within this share of their ranges at this many points, and
+durations within this factor.
+"""
 
 OWN_NOISE = 3.0
-"""Scatter of an output over that of the inputs, in shares of their ranges, that is noise of its own."""
+"""Scatter of an output, relative to that of the inputs (in shares of their ranges), that counts as
+its own noise.
+"""
 
 Found = Iterator[tuple[float, tuple[str, ...]]]
-"""A number and the channels that it is of."""
+"""A value and the channels it belongs to."""
 
 
 @dataclass(frozen=True)
 class Gap:
-    """Something that recordings cannot identify.
+    """A property that recordings cannot identify.
 
     Parameters
     ----------
@@ -82,7 +89,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Rule:
-    """A row of the table: a gap is named where ``beyond(number, needed)`` is true.
+    """A rule: there is a gap if ``beyond(number, needed)`` is true.
 
     ``number`` gives numbers by channels; ``timed`` rules need time; the others are as of `Gap`.
     """
@@ -103,7 +110,7 @@ def data_gaps(
     *,
     tests: Sequence[Recording] = (),
 ) -> tuple[Gap, ...]:
-    """Return what recordings cannot identify of a muscle, most important first.
+    """Return the data gaps of recordings, most important first.
 
     Parameters
     ----------
@@ -139,7 +146,7 @@ def data_gaps(
 
 
 def gaps_of(known: Excitation) -> tuple[Gap, ...]:
-    """Return the gaps of what recordings contain, most important first."""
+    """Return the data gaps for given excitation, most important first."""
     found = [gap for rule in RULES if known.timed or not rule.timed for gap in _gaps(rule, known)]
     still = [gap for gap in found if gap.what == "still"]
     return tuple(still or sorted(found, key=lambda gap: -gap.severity))
@@ -151,7 +158,7 @@ def excitation(
     outputs: Names = None,
     tests: Sequence[Recording] = (),
 ) -> Excitation:
-    """Return what recordings contain; parameters and errors are those of `data_gaps`."""
+    """Return the excitation of recordings; parameters and errors as in `data_gaps`."""
     every = listed(recordings)
     if not every:
         raise DataError("there are no recordings to judge", remedy="give at least one")
@@ -164,7 +171,7 @@ def excitation(
     for recording in every:
         if len(recording) < FEWEST_SAMPLES:
             raise DataError(
-                f"{len(recording)} samples identify nothing",
+                f"{len(recording)} samples are too few for any model",
                 file=recording.source,
                 remedy=f"give recordings of {FEWEST_SAMPLES} samples or more",
             )
@@ -175,14 +182,14 @@ def excitation(
                 channel=absent[0],
                 remedy="name them with `input` and `output`, or give recordings with the same channels",
             )
-    told = dict.fromkeys((*(found.scheduling or ()), *schedules(every, names)))
-    loads = tuple(name for name in told if all(name in recording for recording in every))
+    further = dict.fromkeys((*(found.scheduling or ()), *schedules(every, names)))
+    loads = tuple(name for name in further if all(name in recording for recording in every))
     kept = tuple(without_copies(every, driven, found.outputs))
     return Excitation(kept, tuple(tests), driven, loads, found.outputs)
 
 
 def _gaps(rule: Rule, known: Excitation) -> Iterator[Gap]:
-    """Give the gap of a rule: its worst number, with the channels of all that are beyond."""
+    """Yield the gap of a rule: its worst number, with the channels of all that exceed it."""
     numbers = rule.number(known)
     beyond = [(value, names) for value, names in numbers if rule.beyond(value, rule.needed)]
     if beyond:
@@ -197,14 +204,14 @@ def _gaps(rule: Rule, known: Excitation) -> Iterator[Gap]:
 
 
 def _still(known: Excitation) -> Found:
-    """Give the outputs that are constant, or the inputs where all are."""
+    """Yield the outputs that are constant, or all inputs if they are."""
     names = [name for name in known.outputs if known.constant(name)]
     for name in names or (known.driven if all(map(known.constant, known.driven)) else ()):
         yield 0.0, (name,)
 
 
 def _constant(channels: Callable[[Excitation], Sequence[str]]) -> Callable[[Excitation], Found]:
-    """Return the rule of channels that stay at one value, beside others that move."""
+    """Return the rule of channels that are constant while others move."""
 
     def number(known: Excitation) -> Found:
         for name in channels(known) if known.moving else ():
@@ -214,13 +221,13 @@ def _constant(channels: Callable[[Excitation], Sequence[str]]) -> Callable[[Exci
 
 
 def _reversals(known: Excitation) -> Found:
-    """Give the number of turning points of every input."""
+    """Yield the number of turning points of every input."""
     for name in known.swinging:
         yield sum(turns.size - 2 for turns in known.turns[name]), (name,)
 
 
 def _inner_reversals(known: Excitation) -> Found:
-    """Give the number of turning points inside the range, upper or lower, whichever are fewer."""
+    """Yield the number of turning points inside the range, upper or lower, whichever is smaller."""
     for name in known.swinging:
         counts = np.zeros(2, dtype=int)
         for recording, turns in zip(known.recordings, known.turns[name], strict=True):
@@ -233,7 +240,7 @@ def _inner_reversals(known: Excitation) -> Found:
 
 
 def _speed_ratio(known: Excitation) -> Found:
-    """Give how many times faster some branches of an input are than others of like length.
+    """Yield the ratio of speeds among similar branches of an input.
 
     Quantiles are of the time of motion, so that a few ways to where something is held do not count.
     """
@@ -254,13 +261,13 @@ def _speed_ratio(known: Excitation) -> Found:
 
 
 def _hold(known: Excitation) -> Found:
-    """Give the longest hold [s]."""
+    """Yield the longest hold [s]."""
     if known.moving:
         yield known.longest_hold, known.moving
 
 
 def _beyond_range(known: Excitation) -> Found:
-    """Give how far tests go beyond the range of an input or a load, as a share of it."""
+    """Yield how far tests exceed the recorded range of an input or load, as a share of it."""
     for name in known.moving:
         if any(name in test for test in known.tests):
             (low, high), (lowest, highest) = known.ranges[name], extremes(known.tests, name)
@@ -268,7 +275,7 @@ def _beyond_range(known: Excitation) -> Found:
 
 
 def _dependence(known: Excitation) -> Found:
-    """Give the share of the variance within recordings of an input that follows from others (R²)."""
+    """Yield the R² of an input on the others within recordings."""
     names = [name for name in known.moving if known.branches[name]]
     if len(names) < 2:
         return
@@ -281,7 +288,7 @@ def _dependence(known: Excitation) -> Found:
 
 
 def _load_by_output(known: Excitation) -> Found:
-    """Give the share of a load's variance that is linear in one output (R²), as a spring's."""
+    """Yield the R² of a load on one output, as for a spring."""
     for load in known.loads:
         for output in known.outputs:
             if known.moves(load) and known.moves(output):
@@ -290,7 +297,7 @@ def _load_by_output(known: Excitation) -> Found:
 
 
 def _together(known: Excitation) -> Found:
-    """Give the share of samples in which two channels are both off their most frequent values."""
+    """Yield the share of samples in which two channels are both away from their most frequent values."""
     if len(known.moving) < 2:
         return
     samples = known.pooled(known.moving)[:: max(1, sum(map(len, known.recordings)) // MOST_SAMPLES)]
@@ -305,7 +312,7 @@ def _together(known: Excitation) -> Found:
 
 
 def _samples_of_branch(known: Excitation) -> Found:
-    """Give the samples of a branch, as the median over the way that an input goes."""
+    """Yield the number of samples per branch, as the median over the input's travel."""
     for name in known.swinging:
         branches = sorted(known.branches[name], key=lambda branch: branch.last - branch.first)
         way = np.cumsum([branch.travel for branch in branches])
@@ -315,7 +322,7 @@ def _samples_of_branch(known: Excitation) -> Found:
 
 
 def _resolution(known: Excitation) -> Found:
-    """Give the noise of an output, or the step of its sensor if larger, as a share of its range."""
+    """Yield the noise of an output, or its sensor's resolution if larger, as a share of its range."""
     first = known.recordings[0]
 
     def scatter(name: str) -> float:
@@ -332,7 +339,7 @@ def _resolution(known: Excitation) -> Found:
 
 
 def _clipped(known: Excitation) -> Found:
-    """Give the samples in a row at one end of the range of an output that has noise elsewhere."""
+    """Yield the number of successive samples at one end of the range of a noisy output."""
     for name in known.outputs:
         steps = np.abs(np.diff(known.pooled([name])[:MOST_SAMPLES, 0]))
         if known.moves(name) and known.noise[name] > steps[steps > 0].min(initial=np.inf):
@@ -341,12 +348,12 @@ def _clipped(known: Excitation) -> Found:
 
 
 def _untimed(known: Excitation) -> Found:
-    """Give the share of recordings with time."""
+    """Yield the share of recordings with time."""
     yield float(np.mean([one.sample_time is not None for one in known.recordings])), known.inputs
 
 
 def _repeated_cycles(known: Excitation) -> Found:
-    """Give the number of cycles of an input that come again, with all else that drives as before."""
+    """Yield the number of repeated cycles of an input, with all other driving channels equal."""
     from scipy.spatial import cKDTree
 
     pairs = 0
@@ -387,4 +394,4 @@ RULES = (
     Rule("resolution", _resolution, operator.gt, 0.02, "sensor", 0.45),
     Rule("repeats", _repeated_cycles, operator.lt, 1, "repeats", 0.2),
 )
-"""Numbers on which gaps rest, from which value on nothing is missing, and the run that identifies it."""
+"""Data gaps: the value computed, its threshold, and the run that closes the gap."""

@@ -1,4 +1,4 @@
-"""A model described on recordings: equations, numbers and how sure they are, frequency response."""
+"""Description of a model on recordings: equations, parameters with uncertainty, frequency response."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ from mckibben.recording import Recording
 from mckibben.system.atomic import plain
 
 LEVEL = 0.95
-"""Of intervals."""
+"""Confidence level of intervals."""
 
 MOST_PARAMETERS = 300
-"""Above which no parameter means anything alone."""
+"""Number of parameters above which single parameters are not interpreted."""
 
 MOST_OPERATIONS = 200_000_000
-"""Of all sensitivities; of longer recordings the beginnings are used, as if the rest were like them."""
+"""Limit of operations for all sensitivities; longer recordings are truncated."""
 
 
 @dataclass(frozen=True)
 class Parameter(Quantity):
-    """One number of a model.
+    """One parameter of a model.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Parameter(Quantity):
 
 @dataclass(frozen=True, eq=False)
 class ModelDescription:
-    """What a model is, and how sure.
+    """Description of a model, with uncertainties.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class ModelDescription:
     fitted: bool
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as a JSON-ready dict; what is not known is None."""
+        """Return it as a JSON-ready dict, with None for unknown values."""
         found: dict[str, Any] = plain(self)
         return found
 
@@ -95,7 +95,7 @@ class ModelDescription:
 def describe(
     block: Block, recordings: Sequence[Recording], *, fitted: bool = True
 ) -> ModelDescription:
-    """Describe a model on recordings, usually those it was fitted to.
+    """Describe a model on recordings, usually its training data.
 
     Standard errors are those of a least-squares fit of the free run to these recordings, as a fit has
     them in its diagnostics: they hold where residuals are autocorrelated.
@@ -131,7 +131,7 @@ def describe(
 
 
 def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, float]:
-    """Return the covariance of a model's parameters, and independent samples; NaN where not known."""
+    """Return the covariance of a model's parameters, and independent samples; NaN if unknown."""
     outputs, inputs = ([c.name for c in some] for some in (block.outputs, block.inputs))
     share = min(1.0, MOST_OPERATIONS / max(_operations(block, recordings), 1.0))
     kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
@@ -158,7 +158,7 @@ def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, f
 
 
 def parameters(block: Block, covariance: Array, half_width: float) -> tuple[Parameter, ...]:
-    """Return every number of ``block.pack()``, in its order, with what it is and how sure it is.
+    """Return every entry of ``block.pack()``, in order, with its meaning and uncertainty.
 
     What is rounding beside the others, as a weight of 1e-17, is shown as 0.
     """
@@ -179,19 +179,19 @@ def parameters(block: Block, covariance: Array, half_width: float) -> tuple[Para
 
 
 def fixed(block: Block) -> NDArray[np.bool_]:
-    """Return which parameters no fit finds: 0 or 1 exactly, or the point about which it is linear."""
+    """Return the parameters that are not fitted: exactly 0 or 1, or the operating point."""
     values = block.pack()
     about = [name.endswith("input offset") for name in block.parameter_names]
     return np.asarray(vanishing(values) | (values == 1) | about)
 
 
 def _means_nothing(block: Block) -> bool:
-    """Return whether standard errors of a model would mean nothing, as of a large network's."""
+    """Return whether standard errors of single parameters are meaningless, as in large networks."""
     return not 0 < block.n_parameters <= MOST_PARAMETERS or commands(block)
 
 
 def _operations(block: Block, recordings: Sequence[Recording]) -> float:
-    """Return what all sensitivities cost."""
+    """Return the cost of all sensitivities."""
     try:
         usual = float(block.cost(recordings[0].sample_time).usual)
     except ModelError:

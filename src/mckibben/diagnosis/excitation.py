@@ -1,4 +1,4 @@
-"""Excitation of recordings: ranges, noise, branches and holds of everything that drives a muscle."""
+"""Excitation of recordings: ranges, noise, branches and holds of all driving channels."""
 
 from __future__ import annotations
 
@@ -23,21 +23,25 @@ from mckibben.signals.reversals import (
 )
 
 MOVES, LOAD_MOVES = 0.01, 0.1
-"""Range, over the largest magnitude, from which a channel moves; a load, which inertia shakes."""
+"""Range, relative to the largest magnitude, above which a channel varies; the second is for loads,
+which inertia disturbs.
+"""
 
 BRANCH = 0.1
-"""Share of its range that a channel covers in a branch, at least."""
+"""Smallest share of its range that a channel covers in a branch."""
 
 MOST_BRANCHES, NOISY_RECORDINGS = 2000, 8
-"""Branches of a channel that are kept, and recordings in which noise is estimated, evenly taken."""
+"""Largest number of branches stored per channel, and of recordings used to estimate noise, evenly
+spaced.
+"""
 
 CROSSINGS = np.linspace(0.1, 0.9, 9)
-"""Shares of a branch between which its speed is taken."""
+"""Shares of a branch between which its speed is measured."""
 
 
 @dataclass(frozen=True)
 class Branch:
-    """A channel on its way from one turning point to the next: recording, samples, values there."""
+    """A channel between two turning points: recording, samples, values there."""
 
     recording: int
     first: int
@@ -47,18 +51,18 @@ class Branch:
 
     @property
     def travel(self) -> float:
-        """How far it goes."""
+        """Distance covered."""
         return abs(self.end - self.start)
 
     def middle(self, u: Array) -> int:
-        """Return the sample of a channel at which it is half-way."""
+        """Return the sample of a channel at its midpoint."""
         gone = np.abs(u[self.first : self.last + 1] - self.start)
         return self.first + int(np.argmax(gone >= 0.5 * self.travel))
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """What recordings contain of everything that drives a muscle.
+    """Excitation of all driving channels in recordings.
 
     Parameters
     ----------
@@ -90,19 +94,19 @@ class Excitation:
 
     @cached_property
     def noise(self) -> Mapping[str, float]:
-        """Standard deviation of the white noise of every channel, 0 where motion hides it."""
+        """Standard deviation of the white noise of every channel, 0 if motion hides it."""
         every = self.recordings[:: -(-len(self.recordings) // NOISY_RECORDINGS)]
         found = {name: [_white(one[name]) for one in every] for name in self.ranges}
         return {name: float(np.median(values)) for name, values in found.items()}
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
-        """Inputs and loads that move, within a recording or between them."""
+        """Inputs and loads that vary, within a recording or between them."""
         return tuple(name for name in self.driven if self.moves(name))
 
     @property
     def swinging(self) -> tuple[str, ...]:
-        """Inputs that move within a recording; all that move where none does."""
+        """Inputs that vary within a recording; all varying ones if none does."""
         found = [name for name in self.moving if name in self.inputs]
         return tuple(name for name in found if self.branches[name]) or tuple(found)
 
@@ -112,11 +116,11 @@ class Excitation:
         return high - low
 
     def moves(self, channel: str) -> bool:
-        """Return whether a channel moves by more than its noise and a small share of its size."""
+        """Return whether a channel varies by more than its noise and a small share of its magnitude."""
         return not self.constant(channel) and self.span(channel) > 10 * self.noise[channel]
 
     def constant(self, channel: str) -> bool:
-        """Return whether a channel moves by a small share of its size at most."""
+        """Return whether a channel varies by at most a small share of its magnitude."""
         share = LOAD_MOVES if channel in self.loads else MOVES
         return self.span(channel) <= max(share * max(map(abs, self.ranges[channel])), NARROWEST)
 
@@ -126,7 +130,7 @@ class Excitation:
 
     @cached_property
     def turns(self) -> Mapping[str, tuple[NDArray[np.int64], ...]]:
-        """Turning points of everything that moves, with both ends, of every recording."""
+        """Turning points of all varying channels, with both ends, of every recording."""
 
         def found(name: str, u: Array) -> NDArray[np.int64]:
             noise = swing_threshold(self.noise[name], 0.0, u.size)
@@ -138,7 +142,7 @@ class Excitation:
 
     @cached_property
     def branches(self) -> Mapping[str, tuple[Branch, ...]]:
-        """Branches of everything that moves."""
+        """Branches of all varying channels."""
         found = {}
         for name in self.moving:
             every = [
@@ -152,7 +156,7 @@ class Excitation:
         return found
 
     def speed(self, name: str, branch: Branch) -> float:
-        """Return the speed of a branch, whatever is held on the way [unit/s]."""
+        """Return the speed of a branch, excluding holds [unit/s]."""
         recording = self.recordings[branch.recording]
         u = recording[name][branch.first : branch.last + 1]
         reached = np.maximum.accumulate((u - branch.start) * np.sign(branch.end - branch.start))
@@ -168,7 +172,7 @@ class Excitation:
 
     @cached_property
     def longest_hold(self) -> float:
-        """Longest time in which all inputs and loads stand still, after having moved [s]."""
+        """Longest time in which all inputs and loads are constant after a motion [s]."""
         spans = [self.span(name) for name in self.moving]
         lasting = [
             (hold.stop - hold.start) * (recording.sample_time or 0.0)

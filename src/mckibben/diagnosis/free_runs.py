@@ -1,4 +1,4 @@
-"""What a model makes of recordings, running free; or why they say nothing of it."""
+"""Free runs of a model on recordings, for its check."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from mckibben.errors import DataError
 from mckibben.recording import Recording
 
 FEWEST, SHORTEST = 60, 10
-"""Samples that can be tested at least, of all recordings together and of each."""
+"""Smallest number of samples that can be tested, in total and per recording."""
 
 SHIFTS = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
-"""Root mean squares of the residual by which the first measured output may be off."""
+"""Largest error of the first measured output, in RMS residuals."""
 
 SAME_TIME = 1e-3
 """Relative difference up to which sample times are equal."""
@@ -27,7 +27,7 @@ SAME_TIME = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One recording, and what the model makes of it.
+    """One recording, and the model's free run.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Run:
 
     @property
     def residual(self) -> Array:
-        """Measured less modelled, shape (n, m)."""
+        """Measured minus modelled output, shape (n, m)."""
         return self.measured - self.modelled
 
 
@@ -77,7 +77,7 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
 
 
 def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
-    """Refuse recordings that say nothing of a model; see `runs_of`."""
+    """Raise an error for recordings that cannot test a model; see `runs_of`."""
     if not recordings:
         raise DataError("there is no recording to check the model on", remedy="give at least one")
     for recording in recordings:
@@ -104,7 +104,7 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
 def _modelled(
     block: Block, recording: Recording, outputs: Sequence[str], recordings: Sequence[Recording]
 ) -> Array:
-    """Return modelled outputs, from the start of the memory that explains the whole recording best.
+    """Return modelled outputs, with the start state that best explains the whole recording.
 
     The excursion before the first sample that explains the first measured output is known no better
     than that one sample, and a memory may keep the error for long. So outputs about the first one are
@@ -131,7 +131,7 @@ def _refuse(recording: Recording, block: Block, step: float | None) -> None:
     check_units(recording, (*block.inputs, *block.outputs))
     if len(recording) < SHORTEST:
         raise DataError(
-            f"{len(recording)} samples are too few: what a residual remembers is longer",
+            f"{len(recording)} samples are too few: the residual is correlated over longer times",
             file=recording.source,
             remedy=f"leave this recording out, or record at least {SHORTEST} samples",
         )

@@ -1,4 +1,4 @@
-"""Loops: output over input along rising and falling branches, and what can be read off them."""
+"""Hysteresis loops: output over input along rising and falling branches, and their shape."""
 
 from __future__ import annotations
 
@@ -15,26 +15,27 @@ from mckibben.signals.holds import STILL
 from mckibben.signals.reversals import whole_cycles
 
 SHARES = np.linspace(0.02, 0.98, 49)
-"""Input levels of a curve, as shares of its range; the middle one is mid input."""
+"""Input levels of a curve, as shares of the input range; the middle one is mid input."""
 
 WINDOW, FEWEST = 0.025, 8
-"""Samples this close to a level, as a share of the range, make the curve there; a branch whose shape is
-measured has this many at least."""
+"""Half width of the window of a curve's point, as a share of the range; smallest number of samples
+in it.
+"""
 
 LARGE, CLOSED = 0.9, 0.02
-"""Amplitudes from this share of the largest on are as large, or cover the input range; a closed loop
-ends within this share of its amplitude of where it began."""
+"""Share of the largest amplitude above which a cycle is a largest one; largest closure error of a
+closed loop, relative to its amplitude.
+"""
 
 PART, SLIGHT = 0.5, 0.005
 """Share of the other branch that a branch at either end of a recording must have to make a loop; mean
 width over the output range below which it is not measured where a loop is wide."""
 
 FLAT, REACH = 0.2, 2
-"""Share of the mean slope below which the output hardly follows the input; levels on either side
-over which a slope is taken."""
+"""Share of the mean slope below which the output saturates; half width of a slope's window."""
 
 BINS = 12
-"""Of input or velocity, by which variance is explained."""
+"""Number of bins of input or velocity, for explained variance."""
 
 
 @dataclass(frozen=True)
@@ -54,17 +55,19 @@ class Cycle:
 
     @property
     def amplitude(self) -> float:
-        """High less low."""
+        """Highest minus lowest input."""
         return self.high - self.low
 
     def like(self, other: Cycle, within: float) -> bool:
-        """Tell whether another has the same extremes, within a share of the amplitude."""
+        """Return whether another cycle has the same extremes, within a share of the amplitude."""
         apart = max(abs(self.low - other.low), abs(self.high - other.high))
         return apart <= within * self.amplitude
 
 
 FIGURES = ("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid")
-"""Of a loop, as in `Characterization`; asymmetry of closed ones, the centroid not of slight ones."""
+"""Quantities of a loop, as in `Characterization`; asymmetry only of closed loops, centroid only of
+wide ones.
+"""
 
 
 @dataclass(frozen=True)
@@ -129,7 +132,7 @@ def _loop(number: int, track: Track, piece: slice, scale: Scale) -> Loop | None:
 
 
 def largest_of(loops: Sequence[Loop]) -> list[Loop]:
-    """Return the largest loops, closed ones where there are any.
+    """Return the largest loops, closed ones if there are any.
 
     The first of a recording, which starts from an unknown memory, counts where there is no other.
     """
@@ -161,7 +164,7 @@ def curve(u: Array, y: Array, levels: Array, half: float) -> Array:
 
 
 def _half(scale: Scale, amplitude: float) -> float:
-    """Return how near samples make a curve: over several steps of a coarse sensor."""
+    """Return the half width of a curve's window: several steps of a coarse sensor."""
     steps = max(spread.step / spread.span for spread in (scale.u, scale.y))
     return max(WINDOW * amplitude, min(2 * steps, 0.25) * scale.u.span)
 
@@ -183,14 +186,14 @@ class Branches:
 
 
 def _mean(x: Array, axis: int) -> Array:
-    """Return the mean of what is known along an axis, NaN where nothing is."""
+    """Return the mean of known values along an axis, NaN if there are none."""
     known = np.isfinite(x)
     count = np.where(known.any(axis=axis), known.sum(axis=axis), np.nan)
     return np.asarray(np.where(known, x, 0.0).sum(axis=axis) / count)
 
 
 def branches_of(tracks: Sequence[Track], scale: Scale) -> Branches:
-    """Return the curves of all major branches of three samples or more.
+    """Return the curves of all major branches with at least three samples.
 
     The first of five or more of a recording, which starts from an unknown memory, is left out.
     """
@@ -207,7 +210,7 @@ def branches_of(tracks: Sequence[Track], scale: Scale) -> Branches:
 
 
 def gap_of(found: Branches, sign: float) -> tuple[float | None, Range | None, float | None]:
-    """Return how far falling branches lie from rising ones, its 95 % interval, and p without a loop.
+    """Return the gap between falling and rising branches, its 95 % interval, and p without a loop.
 
     Every branch is compared with the mean of those before and after, so that drift cancels. The error
     is that of branches which differ as much as those of one direction do: a t-test. That direction
@@ -247,7 +250,7 @@ Curve = tuple[float | None, float | None, float | None]
 
 
 def curves_of(found: Branches, loops: Sequence[Loop], scale: Scale) -> list[Curve]:
-    """Return gain, onset and saturation of rising and falling output, where they show.
+    """Return gain, onset and saturation of rising and falling output, if determined.
 
     Of the largest loops where they cover the input range, else of all branches. The gain is the mean
     slope of both at mid input over a fifth of the range; below the onset and above the saturation the

@@ -1,4 +1,4 @@
-"""Memory and time: dead zones, minor loops, creep in holds, dependence of the loop width on speed."""
+"""Memory and rate: dead zones, minor loops, creep in holds, loop width by speed."""
 
 from __future__ import annotations
 
@@ -13,19 +13,22 @@ from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, shortest_hold
 
 MOVED = 0.02
-"""Output change, as a share of its range, from which the output is taken to have moved."""
+"""Output change, relative to its range, above which the output has moved."""
 
 SAME, HUNTED, MINOR = 0.01, 0.05, 0.9
-"""Shares of the input range: a level is passed beyond the first; a regulator hunts over the second; a
-loop larger than the third is a major one."""
+"""Shares of the input range: hysteresis of a level crossing; amplitude of a regulator's hunting;
+largest minor loop.
+"""
 
 DENSE, SETTLED = 8, 0.1
-"""Samples that a branch must have for the output on it to be read between samples; share of a hold that
-is left out at its start, so that the lag of a jump is not taken for creep."""
+"""Smallest number of samples of an interpolated branch; share of a hold that is discarded at its
+start, so that lag does not count as creep.
+"""
 
 ALIKE, SPEED_RATIO = 0.05, 1.5
-"""Cycles are compared whose extremes differ by this share of the amplitude at most, where their speeds
-differ by this ratio at least."""
+"""Cycles are compared if their extremes differ by at most this share of the amplitude, and their
+speeds by at least this ratio.
+"""
 
 
 def dead_zones(tracks: Sequence[Track], scale: Scale) -> tuple[list[float], list[float]]:
@@ -94,13 +97,13 @@ def minor_loop_errors(tracks: Sequence[Track], scale: Scale) -> list[float]:
 
 
 def _branch(track: Track, k: int) -> tuple[slice, float]:
-    """Return the samples from a turning point to the next, and the sign of the way."""
+    """Return the samples from a turning point to the next, and the direction."""
     start, stop = track.turns[k : k + 2]
     return slice(start, stop + 1), float(np.sign(track.u[stop] - track.u[start]))
 
 
 def _first_reach(wanted: Array, x: Array, limit: float) -> float | None:
-    """Return ``wanted`` where ``x`` first reaches a limit, between samples; None if it never does."""
+    """Return ``wanted`` where ``x`` first reaches a limit, interpolated; None if it never does."""
     i = int(np.argmax(x >= limit))
     if not x[i] >= limit:
         return None
@@ -139,7 +142,7 @@ def creep(
 
 
 def rate_dependence(loops: Sequence[Loop]) -> tuple[float, Range, Range] | None:
-    """Return how much wider the loop is at twice the speed [%], its 95 % interval, and between which.
+    """Return the increase of loop width at twice the speed [%], its 95 % interval, and the speeds.
 
     By a straight line over the logarithm of the mean speed, of three or more closed cycles between like
     extremes that differ most in speed; the first of a recording, which starts from an unknown memory,

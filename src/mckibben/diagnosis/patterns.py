@@ -1,4 +1,4 @@
-"""A residual in figures: its autocorrelation, and its means over what it should not depend on."""
+"""Figures of residuals: autocorrelation, and means over variables."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from mckibben.diagnosis.regression import Regression
 from mckibben.statistics import NORMAL_95
 
 TESTED, PER_LAG = 12, 20
-"""Lags that are tested together at most, and samples of all recordings to one of them at least."""
+"""Largest number of lags tested together, and samples needed per lag."""
 
 SHOWN, PAIRS = 50, 5
-"""Lags that are drawn one by one at most; pairs of samples of a recording to a lag, as its multiple."""
+"""Largest number of single lags drawn; samples needed per lag, as its multiple."""
 
 NORMAL_99 = 2.5758
-"""Standard deviations in which 99 % of a normal distribution lie."""
+"""Half width, in standard deviations, of the central 99 % of a normal distribution."""
 
 BINS = 10
-"""Bins of as many samples each."""
+"""Number of bins, of equal numbers of samples."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Whiteness:
 
 @dataclass(frozen=True)
 class Bin:
-    """Mean residual of ``n`` samples between two ends, and its 95 % interval where noise is correlated.
+    """Mean residual of ``n`` samples between two ends, and its 95 % interval for correlated noise.
 
     ``label`` is the branch, "rising" or "falling", where there are two.
     """
@@ -64,7 +64,7 @@ class Bin:
 
 @dataclass(frozen=True)
 class Pattern:
-    """A residual against one thing.
+    """Mean residual over one variable.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Pattern:
 
 
 def whiteness(residuals: Sequence[Array]) -> Whiteness:
-    """Return the autocorrelation of a residual, pieces (n,), and whether it is that of white noise.
+    """Return the autocorrelation of a residual, pieces (n,), and whether it is white noise.
 
     Products of samples at a lag are compared with their own scatter, so that white noise whose size
     depends on the input or the run passes as what it is.
@@ -116,7 +116,7 @@ def bins(
     regression: Regression,
     branches: Sequence[Array] | None = None,
 ) -> tuple[Bin, ...]:
-    """Return means of a residual where values are in bins of as many samples each.
+    """Return means of a residual in bins of equal numbers of samples.
 
     Parameters
     ----------

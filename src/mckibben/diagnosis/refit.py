@@ -1,4 +1,4 @@
-"""The same kind of model fitted to a log, compared with the old one on parts held out."""
+"""Refit of a model to a log, compared with the old model on held-out parts."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from mckibben.recording import Recording
 from mckibben.statistics import BlockBootstrap, correlation_length, interval
 
 N_FOLDS = 4
-"""Parts of a log held out in turn."""
+"""Number of cross-validation folds of a log."""
 
 
 @dataclass(frozen=True, eq=False)
 class Refit:
-    """The same kind of model, fitted to the log and to older data where there are any.
+    """Model of the same kind, refitted to the log and to older data if there are any.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Refit:
 
     @property
     def recommended(self) -> bool:
-        """Whether it is better than the old model by more than chance."""
+        """Whether it is significantly better than the old model."""
         return self.ratio[1] < 1
 
     def to_dict(self) -> dict[str, Any]:
@@ -69,7 +69,7 @@ class Refit:
 def refitted(
     old: Block, logs: Sequence[Recording], older: Sequence[Recording], *, seed: int = 0
 ) -> Refit | str:
-    """Fit the same kind of model to logs, or say why that cannot be done.
+    """Refit a model of the same kind to logs, or return why that is not possible.
 
     ``older`` recordings are fitted beside the logs; those without its channels are left out.
     """

@@ -1,4 +1,4 @@
-"""Regression of residuals on what they may depend on, where neighbours are alike and variances differ.
+"""Regression of residuals on possible causes, with autocorrelated noise of varying variance.
 
 Noise is an autoregression of the greatest restricted likelihood beside *all* columns (Harville, JASA 72,
 1977), so that the freedom that columns take makes it look no rougher than it is. A test has the larger
@@ -19,25 +19,28 @@ from mckibben.arrays import Array
 from mckibben.statistics import Autoregression, autoregression
 
 MOST_ORDER, SAMPLES_PER_TERM = 6, 16
-"""Of the noise model: the largest order, and samples to a term beside those that columns take."""
+"""Largest order of the noise model, and samples needed per term."""
 
 SMOOTHEST = 3.8
-"""Partial correlations of noise are at most the tanh of this: 0.999."""
+"""Bound of partial correlations of the noise: at most the tanh of this, 0.999."""
 
 STEP, LEAST_CURVATURE = 0.02, 0.1
-"""Of the likelihood: step of finite differences, and the least curvature along a partial correlation."""
+"""Step of finite differences of the likelihood, and smallest curvature along a partial correlation.
+"""
 
 DEPENDENT, ROUNDING = 1e-9, 1e-12
-"""Shares of the energy of columns: what adds less to others adds nothing; what is added to every one."""
+"""Shares of a column's energy: below the first it is linearly dependent; the second is added for
+regularisation.
+"""
 
 MOST_LEVERAGE = 0.9
-"""Share of a sample in its own fit that is corrected for."""
+"""Largest leverage of a sample that is corrected for."""
 
 Places = tuple[int, ...]
 
 
 class FTest(NamedTuple):
-    """A test of columns beside others.
+    """F test of columns in addition to others.
 
     Parameters
     ----------
@@ -53,7 +56,7 @@ class FTest(NamedTuple):
 
 
 class Regression:
-    """Pieces of a series, what they may depend on, and the noise beside.
+    """Pieces of a series, candidate regressors, and the noise model.
 
     Parameters
     ----------
@@ -90,7 +93,7 @@ class Regression:
         self.test = cache(self._test)
 
     def _test(self, chosen: Places, beside: Places = ()) -> FTest:
-        """Test some of the columns beside others, all given by their places."""
+        """Test some of the columns in addition to others, by index."""
         from scipy.special import fdtrc
 
         plain = _added(self._plain, chosen, beside)
@@ -114,20 +117,20 @@ class Regression:
         return FTest(float(max(alike, differing)), explained, by_noise)
 
     def coefficient(self, place: int) -> float:
-        """Return the coefficient of a column that follows the whitened series best, alone."""
+        """Return the coefficient of the single column that best explains the whitened series."""
         column = self._white[:, place]
         along = column @ self._white[:, -1] / (column @ column)
         return float(along * self._size[-1] / self._size[place])
 
     def deviation(self, weights: Sequence[Array]) -> float:
-        """Return the standard deviation that noise gives to a weighted sum of pieces, (n,) each."""
+        """Return the standard deviation, due to noise, of a weighted sum of pieces, (n,) each."""
         return float(np.sqrt(self._variance_along(weights)))
 
     def _variance_along(self, ways: Sequence[Array]) -> float:
         return float(sum(np.sum(self.noise.coloured(way) ** 2) for way in ways))
 
     def _fitted_noise(self) -> tuple[Array, Array]:
-        """Return what the noise's partial correlations are the tanh of, and its covariance."""
+        """Return the artanh of the noise's partial correlations, and their covariance."""
         from scipy.optimize import approx_fprime, minimize
 
         fitted = _basis(self._plain[:, :-1])
@@ -166,7 +169,7 @@ class Regression:
         return at, np.asarray(2 * (ways / np.maximum(energies, LEAST_CURVATURE)) @ ways.T)
 
     def _unsure(self, chosen: Places, beside: Places, q: int) -> float:
-        """Return the variance of the logarithm of the noise's power where columns have theirs."""
+        """Return the variance of the logarithm of the noise's power with columns fitted."""
         from scipy.optimize import approx_fprime
 
         if not self._partial.size:
@@ -182,7 +185,7 @@ class Regression:
 
 
 def _independent(columns: Array, energy: float = 0.0) -> Array:
-    """Return the weights, (k, rank), by which columns make an orthonormal basis."""
+    """Return the weights, (k, rank), that orthonormalise columns."""
     energies, ways = np.linalg.eigh(columns.T @ columns)
     kept = energies > DEPENDENT * (energy or float(energies.max(initial=1e-300)))
     return np.asarray(ways[:, kept] / np.sqrt(energies[kept]))
@@ -194,7 +197,7 @@ def _basis(columns: Array) -> Array:
 
 
 def _added(table: Array, chosen: Places, beside: Places) -> Array:
-    """Return an orthonormal basis of what chosen columns add to others, shape (n, rank)."""
+    """Return an orthonormal basis of chosen columns, after projection on others."""
     known, new = _basis(table[:, list(beside)]), table[:, list(chosen)]
     rest = new - known @ (known.T @ new)
     return rest @ _independent(rest, float((new**2).sum()))
@@ -212,7 +215,7 @@ def _lagged(tables: Sequence[Array], order: int) -> Array:
 
 
 def _whitener(partial: Array) -> Array:
-    """Return a stable autoregression's filter from what its partial correlations are the tanh of."""
+    """Return a stable autoregressive filter from the artanh of its partial correlations."""
     found = np.ones(1)
     for value in np.tanh(partial):
         longer = np.append(found, 0.0)
@@ -221,7 +224,7 @@ def _whitener(partial: Array) -> Array:
 
 
 def _partial(coefficients: Array) -> Array:
-    """Return the inverse of `_whitener`, from its coefficients less the first, of other sign."""
+    """Return the inverse of `_whitener`, from its coefficients after the first, negated."""
     found, whitener = [], np.concatenate([[1.0], -coefficients])
     while whitener.size > 1:
         value = -whitener[-1]
@@ -231,13 +234,13 @@ def _partial(coefficients: Array) -> Array:
 
 
 def _filtered(lagged: Array, partial: Array) -> Array:
-    """Return the products of columns that a noise model has whitened."""
+    """Return the products of columns whitened by a noise model."""
     whitener = _whitener(partial)
     return np.asarray(np.tensordot(np.outer(whitener, whitener), lagged, 2))
 
 
 def _sizes(lagged: Array, partial: Array) -> tuple[float, float]:
-    """Return the logarithms of the determinant of whitened columns, and of what they leave."""
+    """Return the log determinants of whitened columns, and of their residuals."""
     products = _filtered(lagged, partial)
     products += ROUNDING * np.eye(len(products))
     columns = np.linalg.slogdet(products[:-1, :-1])[1]
@@ -245,6 +248,6 @@ def _sizes(lagged: Array, partial: Array) -> tuple[float, float]:
 
 
 def _log_size(products: Array, chosen: Places) -> float:
-    """Return the logarithm of the determinant of some columns, without what is rounding."""
+    """Return the log determinant of columns, without rounding."""
     energies = np.linalg.eigvalsh(products[np.ix_(list(chosen), list(chosen))])
     return float(np.log(energies[energies > DEPENDENT * energies.max(initial=1e-300)]).sum())

@@ -1,4 +1,4 @@
-"""The frequency responses of linear models, beside what was measured."""
+"""Frequency responses of linear models, with measured ones."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from mckibben.estimators.core.uncertainty import DIFFERENCE, relative_sizes
 from mckibben.recording import Recording
 
 FREQUENCIES, COHERENT = 80, 0.6
-"""How many there are, and the coherence above which what was measured is shown."""
+"""Number of frequencies, and smallest coherence of measurements that are shown."""
 
 LEAST, MOST = 16, 4096
-"""Samples of a segment of Welch's method."""
+"""Smallest and largest segment of Welch's method [samples]."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
-    """Of a linear model, from one input to one output.
+    """Frequency response of a linear model from one input to one output.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class FrequencyResponse:
 def frequency_responses(
     block: Block, recordings: Sequence[Recording], covariance: Array, half_width: float
 ) -> tuple[FrequencyResponse, ...]:
-    """Return the frequency response of every output to its own input; none of a model not linear.
+    """Return the frequency response of every output to its main input; none for a nonlinear model.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def frequency_responses(
 def _welch(
     recordings: Sequence[Recording], given: str, wanted: str, step: float
 ) -> tuple[Array, Array, Array]:
-    """Return frequency, gain and angle as measured, where coherence is high."""
+    """Return measured frequency, gain and angle, where coherence is high."""
     from scipy.signal import csd
 
     length = min(max(map(len, recordings)) // 4, MOST)

@@ -1,4 +1,4 @@
-"""A robot's own log: how far the loop was off its reference, and by how much each link of it.
+"""Review of a loop's log: tracking error, and the contribution of every link.
 
 With M the model, running free, the error is, sample by sample, what the model misses of the measured
 pressures (y - M[p]), what these do otherwise than the commands (M[p] - M[c]), and what the commands
@@ -29,11 +29,12 @@ from mckibben.statistics import NORMAL_95, block_length, correlation_length
 from mckibben.system.showing import DrawsItself
 
 REFERENCE = "reference_"
-"""What names of channels of a desired motion begin with."""
+"""Prefixes of the names of references."""
 
 LONGEST, HELD = 1.0, 3
-"""Delay that is looked for [s], an eighth of the log at most; samples in a row at an extreme, while the
-reference moves, from which a command is at a limit."""
+"""Longest delay searched [s], at most an eighth of the log; number of successive samples at an
+extreme, while the reference moves, above which a command is at a limit.
+"""
 
 ROUNDING = 1e-9
 """Share of a range up to which values are equal."""
@@ -41,7 +42,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Delay:
-    """How much later one signal is than another, by dead time and lag together.
+    """Delay of one signal after another, dead time and lag together.
 
     ``where`` says which is later than which; ``seconds`` is positive where the first comes later, and
     ``interval`` its interval of 95 % [s].
@@ -54,7 +55,7 @@ class Delay:
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """How one output followed its reference: root mean squares, in its unit.
+    """Tracking of one output: root mean square errors, in its unit.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ class Followed:
 
 @dataclass(frozen=True, eq=False)
 class Review(DrawsItself):
-    """What a robot's log says of the compensator that ran.
+    """Review of the log of a running compensator.
 
     Parameters
     ----------
@@ -138,7 +139,7 @@ def review(
     refit: bool = True,
     seed: int = 0,
 ) -> Review:
-    """Find how far a loop was off its reference, by which link, and whether a refit is better.
+    """Find the tracking error of a loop, the contribution of each link, and whether a refit is better.
 
     Parameters
     ----------
@@ -188,12 +189,12 @@ def review(
 
 
 def has_reference(recording: Recording) -> bool:
-    """Tell whether a recording is a loop's log."""
+    """Return whether a recording is a loop's log."""
     return any(name.startswith(REFERENCE) for name in recording.channels)
 
 
 def _ran(model: Block | None, compensator: Block | None) -> tuple[Block, Block | None]:
-    """Return the model and the compensator that ran; None where the model has no inverse."""
+    """Return the model and the compensator of the run; None if the model has no inverse."""
     if isinstance(compensator, FeedforwardFeedback):
         compensator = compensator.compensator
     if model is None and compensator is not None:
@@ -213,17 +214,17 @@ def _ran(model: Block | None, compensator: Block | None) -> tuple[Block, Block |
         raise ModelError(
             f"the compensator gives {', '.join(c.name for c in compensator.outputs)}, "
             f"but the model takes {', '.join(sorted(driven))}",
-            remedy="give a compensator and the model that it undoes",
+            remedy="give a compensator and the model that it inverts",
         )
     return model, compensator
 
 
 def _check(logs: Sequence[Recording], model: Block, inputs: Sequence[str], followed: bool) -> None:
-    """Refuse logs in which something is absent."""
+    """Raise an error for logs with missing channels."""
     if not logs or not followed:
         name = REFERENCE + model.outputs[0].name
         raise DataError(
-            f"there is no {name} beside what the model gives",
+            f"there is no {name} to compare with the model's",
             file=logs[0].source if logs else None,
             remedy=f"map its column, as in `columns[{name}]=COLUMN`",
         )
@@ -236,7 +237,7 @@ def _check(logs: Sequence[Recording], model: Block, inputs: Sequence[str], follo
 
 @dataclass(frozen=True, eq=False)
 class _Link:
-    """The scored samples of a log, and what the model gives for measured pressures and for commands."""
+    """The scored samples of a log, and the model's outputs for measured pressures and for commands."""
 
     log: Recording
     modelled: Recording
@@ -285,7 +286,7 @@ def _link(log: Recording, model: Block, compensator: Block | None, inputs: Seque
 def _commands(
     log: Recording, model: Block, compensator: Block | None, inputs: Sequence[str]
 ) -> tuple[dict[str, Array] | None, str]:
-    """Return the commands by input, logged or given by the compensator, and which; None if unknown."""
+    """Return the commands by input, logged or computed, and which; None if unknown."""
     asked = _asked(log, model, compensator, inputs)
     if any(COMMAND + name not in log for name in inputs):
         return asked, "" if asked is None else "compensator"
@@ -303,7 +304,7 @@ def _commands(
 def _asked(
     log: Recording, model: Block, compensator: Block | None, inputs: Sequence[str]
 ) -> dict[str, Array] | None:
-    """Return what a compensator gives for the reference; None where that is not all it takes."""
+    """Return a compensator's outputs for the reference; None if it needs other inputs."""
     wanted = [channel.name for channel in model.outputs]
     if compensator is None or any(REFERENCE + name not in log for name in wanted):
         return None
@@ -371,7 +372,7 @@ def _slope(series: Sequence[Array], step: float) -> tuple[float, float]:
 
 
 def _delay(where: str, first: Array, then: Array, step: float) -> Delay | None:
-    """Return by how much a signal is later than another, of any gain and level, by least squares.
+    """Return the delay of a signal after another, with any gain and offset, by least squares.
 
     The standard error is that of sums over blocks that are long against the correlation of errors.
     """
@@ -407,7 +408,7 @@ def _delay(where: str, first: Array, then: Array, step: float) -> Delay | None:
 
 
 def _shifted(x: Array, samples: float) -> Array:
-    """Return a signal (n,) so many samples later; beyond its ends it is as there."""
+    """Return a signal (n,) shifted by so many samples, extended by its end values."""
     at = np.arange(len(x)) - samples
     return np.interp(at, np.arange(len(x)), x)
 

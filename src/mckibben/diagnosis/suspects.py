@@ -1,4 +1,4 @@
-"""What a residual may follow: columns, in groups with a name, each what a model can lack.
+"""Possible causes of a residual: groups of regressors, each for a missing effect.
 
 They are computed of every sample and then averaged over blocks, which loses nothing of what is as slow
 as a branch of the loop, and makes noise short. All are made of inputs, loads, the modelled output and
@@ -21,34 +21,36 @@ from mckibben.signals.reversals import reversals
 from mckibben.statistics import hats
 
 PER_BRANCH, PER_COLUMN = 24, 6
-"""Blocks to a usual branch of the input, and to a column at least."""
+"""Smallest number of blocks per typical branch of the input, and per column."""
 
 FEWEST, MOST = 400, 6000
-"""Blocks looked at, at least where there are as many samples, and at most."""
+"""Smallest and largest number of blocks, if there are as many samples."""
 
 KNOTS = 8
-"""Of curves over inputs, shared among them."""
+"""Total number of knots of curves over the inputs."""
 
 COVERED, START = (0.25, 0.75), 8
-"""Quantiles of an input that it has passed when memory from before a run no longer acts, within the
-first of so many parts of it."""
+"""Quantiles that an input must have passed for its earlier memory to be erased, and the first part
+of a run in which it must.
+"""
 
 WAYS = (0.05, 0.2, 0.6)
-"""Parts of half its range by which an input moves back until it is on the other branch."""
+"""Distances of reversal, in shares of half the range, after which the input is on the other branch.
+"""
 
 HELD = 0.15
-"""Share of the samples in holds from which creep is told from the loop."""
+"""Share of samples in holds above which creep is distinguished from the loop."""
 
 MOST_DELAY, LONGER = 50, 8
-"""Samples that outputs are shifted by at most, and the shortest recording as a multiple of that."""
+"""Largest shift of outputs [samples], and the shortest recording as its multiple."""
 
 CAUSES = ("pressure", "voltage", "force", "torque")
-"""Channels of which a residual can be the effect, though the model does not read them."""
+"""Channels that may explain a residual although the model does not use them."""
 
 
 @dataclass(frozen=True)
 class Group:
-    """Columns that belong together.
+    """Regressors of one cause.
 
     Parameters
     ----------
@@ -82,7 +84,7 @@ def averaged(samples: Array, every: int) -> Array:
 def suspects(
     block: Block, runs: Sequence[Run], output: int, every: int
 ) -> tuple[tuple[Group, ...], list[Array]]:
-    """Return what the residual of an output may follow: groups, and columns (blocks, k) of every run.
+    """Return the groups of possible causes of an output's residual, and columns (blocks, k) per run.
 
     Columns are means over blocks of so many samples. Groups that come first have room first where
     recordings are short.
@@ -134,7 +136,7 @@ def suspects(
 
 
 def block_length(block: Block, runs: Sequence[Run]) -> int:
-    """Return how many samples make a block: few beside a branch, and not too many blocks in all."""
+    """Return the number of samples per block: short compared with a branch, with a limited total."""
     sizes = [len(run.inputs) for run in runs]
     branches = _branch_lengths(block, runs)
     usual = int(np.median(branches)) // PER_BRANCH if branches else 1
@@ -153,7 +155,7 @@ def _driven(block: Block) -> list[str]:
 
 
 def _moving(block: Block, runs: Sequence[Run]) -> list[str]:
-    """Return the names of inputs, and of recorded causes that the model does not read, if they move."""
+    """Return the inputs, and recorded causes that the model does not use, that vary."""
     inputs, outputs = ([c.name for c in channels] for channels in (block.inputs, block.outputs))
     others = [
         name
@@ -175,7 +177,7 @@ def _scaled(parts: Sequence[Array]) -> list[Array]:
 
 
 def _start(inputs: Sequence[Array]) -> Array:
-    """Return where memory from before a run may act: until inputs have covered half of their range.
+    """Return the part of a run in which earlier memory may act: until inputs cover half their range.
 
     At most an eighth of a run: over one cycle, more would be a branch.
     """
@@ -188,26 +190,26 @@ def _start(inputs: Sequence[Array]) -> Array:
 
 
 def _hats(parts: Sequence[Array], knots: int) -> list[Array]:
-    """Return piecewise-linear functions of all parts, but for the first, which the mean makes up for."""
+    """Return piecewise-linear basis functions, without the first, which the mean replaces."""
     found = hats(np.concatenate(parts), knots)[:, 1:]
     return np.split(found, np.cumsum([len(part) for part in parts])[:-1])
 
 
 def _branches(x: Array) -> Array:
-    """Return the branch of an input, from -1 to 1 after some way into it, and that times the input."""
+    """Return the branch of an input, from -1 to 1 after a distance, and its product with the input."""
     ways = [(x - PI(thresholds=(way,), weights=(1.0,)).simulate(x)) / way for way in WAYS]
     return np.column_stack([part for way in ways for part in (way, way * x)])
 
 
 def _lagging(modelled: Array, delay: int) -> Array:
-    """Return how fast the modelled output moves, and how far it is from itself when it is delayed."""
+    """Return the speed of the modelled output, and its change under a delay."""
     slope = np.gradient(modelled)
     places = np.clip(np.arange(modelled.size) - delay, 0, modelled.size - 1)
     return np.column_stack([slope, modelled[places] - modelled])
 
 
 def _best_delay(runs: Sequence[Run], output: int) -> int:
-    """Return by how many samples the modelled output is best shifted."""
+    """Return the best shift of the modelled output in samples."""
     most = min(MOST_DELAY, min(len(run.inputs) for run in runs) // LONGER)
 
     def left(delay: int) -> float:
@@ -222,14 +224,14 @@ def _best_delay(runs: Sequence[Run], output: int) -> int:
 
 
 def _trends(modelled: Sequence[Array]) -> list[Array]:
-    """Return a line, a parabola and a change of gain over time, anew in every recording."""
+    """Return linear and quadratic trends, and a change of gain over time, for every recording."""
     longest = max(map(len, modelled))
     times = [np.arange(len(y)) / longest for y in modelled]
     return [np.column_stack([t, t**2, t * y]) for t, y in zip(times, modelled, strict=True)]
 
 
 def _speeds(modelled: Array) -> Array:
-    """Return functions of the modelled output's speed; what is linear in it is a lag."""
+    """Return functions of the modelled output's speed; a linear one is a lag."""
     rate = np.gradient(modelled)
     rate = rate / (np.sqrt(np.mean(rate**2)) or 1.0)
     root = np.sign(rate) * np.sqrt(np.abs(rate))
@@ -237,7 +239,7 @@ def _speeds(modelled: Array) -> Array:
 
 
 def _longest_hold(block: Block, runs: Sequence[Run], names: Sequence[str]) -> int:
-    """Return the samples of the longest hold of all inputs and loads; 0 where little is held."""
+    """Return the samples of the longest hold of all inputs and loads; 0 if holds are rare."""
     shortest = max(int(np.median(_branch_lengths(block, runs))) // 2, 10)
     tables = [run.recording.matrix(names) for run in runs]
     spans = np.ptp(np.concatenate(tables), axis=0).tolist()
@@ -246,7 +248,7 @@ def _longest_hold(block: Block, runs: Sequence[Run], names: Sequence[str]) -> in
 
 
 def _creeping(modelled: Array, longest: int) -> Array:
-    """Return how far the modelled output is ahead of its own slow lags."""
+    """Return the difference of the modelled output from its own slow lags."""
     from scipy.signal import lfilter
 
     found = []

@@ -1,4 +1,4 @@
-"""Recordings made ready to be measured: noise averaged away, turning points found."""
+"""Preparation of recordings for measurement: noise averaging and turning points."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ from mckibben.signals.reversals import branches_between, noise_level, reversals,
 Range = tuple[float, float]
 
 QUIET, ROUNDING = 1e-3, 1e-12
-"""Shares of the range: noise below the first is not averaged away, below the second is rounding."""
+"""Shares of the range: noise below the first is not averaged; below the second it is rounding."""
 
 MAJOR, FEWEST = 0.1, 10
-"""Swings of the input below this share of its range do not separate cycles; samples of all recordings,
-at least."""
+"""Smallest swing of the input, as a share of its range, that separates cycles; smallest number of
+samples in all recordings.
+"""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Extremes of a channel over all recordings, and what its sensor adds.
+    """Extremes of a channel over all recordings, and its sensor noise.
 
     Noise is the standard deviation of a sample, NaN for unknown; a step is the least distance between
     two readings.
@@ -44,7 +45,7 @@ class Spread:
 
     @classmethod
     def of(cls, signals: Sequence[Array], source: str | None, channel: str) -> Spread:
-        """Return that of the pieces of a channel, which has to move."""
+        """Return that of the pieces of a channel, which must vary."""
         readings = np.unique(np.concatenate(signals))
         low, high = float(readings[0]), float(readings[-1])
         span = high - low
@@ -92,7 +93,7 @@ class Track:
 
     @property
     def branches(self) -> list[tuple[slice, int]]:
-        """Samples between major turning points, and 1 where the input rises, else -1."""
+        """Samples between major turning points, with 1 if the input rises, else -1."""
         found = branches_between(self.u, self.major_turns)
         return [(slice(start, stop), way) for start, stop, way in found]
 
@@ -100,7 +101,7 @@ class Track:
 def prepare(
     recordings: Sequence[Recording], input_name: str, output_name: str
 ) -> tuple[Scale, list[Track]]:
-    """Return the common scale of recordings, and each of them ready to be measured.
+    """Return the common scale of recordings, and each of them prepared for measurement.
 
     Raises
     ------
@@ -155,6 +156,6 @@ def _track(u: Array, y: Array, sample_time: float | None, scale: Scale) -> Track
 
 
 def _closes(x: Array, noise: float) -> bool:
-    """Tell whether a signal goes from its end to its beginning as from one sample to the next."""
+    """Return whether a signal is periodic: its end continues at its beginning."""
     usual = float(np.quantile(np.abs(np.diff(x)), 0.99)) if x.size > FEWEST else 0.0
     return bool(abs(x[0] - x[-1]) <= max(1.5 * usual, 4 * np.nan_to_num(noise)))

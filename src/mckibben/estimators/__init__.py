@@ -1,1 +1,1 @@
-"""How blocks are found from recordings, one file per model family."""
+"""Identification of blocks from recordings, one file per model family."""

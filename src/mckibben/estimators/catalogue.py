@@ -1,4 +1,4 @@
-"""The models on offer: what each is, and how it can be set."""
+"""Catalogue of the available models and their settings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mckibben.estimators.core.settings import check_settings
 
 @dataclass(frozen=True)
 class Need:
-    """What some models are for.
+    """Purpose of a group of models.
 
     Parameters
     ----------
@@ -33,16 +33,16 @@ class Need:
 
 NEEDS: dict[Purpose | None, tuple[str, str]] = {
     "memory": (
-        "Memory: loops of one muscle",
-        "From where an input turned, whatever the speed: pressure to displacement.",
+        "Hysteresis of one muscle",
+        "Rate-independent hysteresis, pressure to displacement.",
     ),
     "rate": (
-        "Rate: lags, creep and dynamics",
-        "What a muscle does depends on how fast, and goes on while pressure is held.",
+        "Dynamics: lag, creep and rate dependence",
+        "The response depends on speed, or continues while pressure is constant.",
     ),
     "several": (
-        "Several muscles, and loads",
-        "Muscles that move one another, or a muscle under a load that varies.",
+        "Several muscles and loads",
+        "Coupled muscles, or a muscle under a varying load.",
     ),
     "force": (
         "Force and activation pressure",
@@ -54,7 +54,7 @@ NEEDS: dict[Purpose | None, tuple[str, str]] = {
 
 
 def needs() -> tuple[Need, ...]:
-    """Return all models by what they are for."""
+    """Return all models by purpose."""
     models = {name: declared(name) for name in registry.names("estimators")}
     usual = sorted(models, key=lambda name: (not models[name].quick, models[name].effort, name))
     groups = {
@@ -65,7 +65,7 @@ def needs() -> tuple[Need, ...]:
 
 
 def declared(model: str) -> type[Estimator]:
-    """Return the estimator on which a model declares itself; the defaults if it cannot be loaded."""
+    """Return the estimator class of a model; defaults if it cannot be loaded."""
     try:
         found: type[Estimator] = registry.load("estimators", model)
     except ModelError:
@@ -74,7 +74,7 @@ def declared(model: str) -> type[Estimator]:
 
 
 def full_name(model: str) -> str:
-    """Return a model's full name, or its short one where no other is known.
+    """Return a model's full name, or its short one.
 
     >>> full_name("pi"), full_name("mine")
     ('Prandtl–Ishlinskii model (PI)', 'mine')
@@ -83,10 +83,10 @@ def full_name(model: str) -> str:
 
 
 def caution(model: str) -> str | None:
-    """Return why a model is good only near what it was trained on, or None where nothing says so.
+    """Return why a model is reliable only near its training data, or None.
 
     A model that interpolates well may lead every ranking on motions like those of its training, and be
-    far off elsewhere: that is told beside its errors.
+    far off elsewhere: it is shown with its errors.
 
     >>> caution("gpi") is None, caution("narx")
     (True, 'a polynomial of past values leaves all bounds beyond them')
@@ -95,7 +95,7 @@ def caution(model: str) -> str | None:
 
 
 def ability(model: str) -> str:
-    """Return what a model represents, in a sentence."""
+    """Return what a model represents, in one sentence."""
     known = declared(model)
     return known.can or (known.__doc__ or "").strip().partition("\n")[0]
 
@@ -110,7 +110,7 @@ def summary(model: str) -> str:
 
 
 def default_model(use: DefaultFor) -> str:
-    """Return the model that is used somewhere without being named.
+    """Return the default model of a use.
 
     >>> default_model("load")
     'mpi'
@@ -119,13 +119,13 @@ def default_model(use: DefaultFor) -> str:
 
 
 def defaults(model: str) -> dict[str, Any]:
-    """Return the settings of a model's estimator that have a default, and that."""
+    """Return the settings of a model's estimator with their defaults."""
     known = fields(registry.load("estimators", model))
     return {field.name: field.default for field in known if field.default is not MISSING}
 
 
 def described() -> dict[str, Any]:
-    """Return what every model is, and its settings."""
+    """Return the description of every model, and its settings."""
     names = registry.names("estimators")
     return {name: {"summary": summary(name), "settings": defaults(name)} for name in names}
 
@@ -136,7 +136,7 @@ def settings_of(model: str, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def settings_of_all(models: Iterable[str], given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the settings of several models, checked against those that they have.
+    """Return the settings of several models, checked against their declarations.
 
     Parameters
     ----------

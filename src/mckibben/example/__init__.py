@@ -58,7 +58,7 @@ def files() -> list[Path]:
 
 
 def copy_to(folder: Path, *, force: bool = False) -> int:
-    """Write all of them into a folder, made where it is missing, and return how many files they are.
+    """Copy all of them to a folder, created if missing, and return the number of files.
 
     Raises
     ------

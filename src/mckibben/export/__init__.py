@@ -1,4 +1,4 @@
-"""Models as code for elsewhere: C99 for microcontrollers, FMUs for simulators, packages of ROS 2."""
+"""Code export of models: C99 for microcontrollers, FMUs for simulators, packages of ROS 2."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exported folders, which are swapped in whole, and zips whose bytes depend on nothing but the files."""
+"""Export folders that are replaced as a whole, and reproducible zips."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ OLDEST = (1980, 1, 1, 0, 0, 0)
 
 
 def write_folder(folder: Path, files: Mapping[str, str], *, force: bool = False) -> None:
-    """Write files, by their path in the folder; what an earlier export wrote there is replaced.
+    """Write files, by their path in the folder; files of an earlier export are replaced.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def write_folder(folder: Path, files: Mapping[str, str], *, force: bool = False)
 
 
 def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
-    """Write texts by their path in a folder of one's own."""
+    """Write texts by their path in a new folder."""
     for path, text in texts.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_bytes(text.encode())

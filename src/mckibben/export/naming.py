@@ -1,4 +1,4 @@
-"""Names and texts from a model file made safe to stand in generated sources.
+"""Names and texts from model files, made safe for generated sources.
 
 A model file may come from anyone: its channel names and units are arbitrary text.
 """
@@ -24,7 +24,7 @@ stdatomic stdbool stddef stdint stdio stdlib string tgmath time uchar wchar unit
 """
 
 RESERVED = frozenset((*WORDS.split(), *HEADERS.split()))
-"""Words of C and C++, and headers that a model's own would stand before."""
+"""Keywords of C and C++, and headers that a model's file must not shadow."""
 
 ELEMENTARY = """
 acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh erf erfc exp exp2 expm1 fabs fdim
@@ -60,7 +60,7 @@ LONGEST = 40
 
 
 def identifier(name: str) -> str:
-    """Return a name that may prefix C functions and macros, or refuse it.
+    """Return a name that may prefix C functions and macros; raise an error for others.
 
     Raises
     ------
@@ -84,19 +84,19 @@ def identifier(name: str) -> str:
 
 
 def name_from(path: Path) -> str:
-    """Return an identifier like a file's name: what does not fit becomes an underscore."""
+    """Return an identifier from a file name, with underscores for invalid characters."""
     words = re.sub(r"[^A-Za-z0-9_]+", "_", path.stem).strip("_")[: LONGEST - 6]
     fits = words and words[0].isalpha() and words.lower() not in RESERVED
     return words if fits and not words.lower().startswith("mck") else f"model_{words}".rstrip("_")
 
 
 def said(text: str) -> str:
-    """Return text for a comment or a string of a source file: all but harmless characters replaced."""
+    """Return text for a comment or a string of a source file, with unsafe characters replaced."""
     return re.sub(r"[^A-Za-z0-9_ .,()^%/+=:-]|//|/\*|\*/", "_", text)[:80]
 
 
 def commented(text: str) -> str:
-    """Return text for a comment of C, which it does not end, and in which none begins.
+    """Return text for a comment of C, without comment marks.
 
     >>> commented("a */ b")
     'a * / b'
@@ -105,7 +105,7 @@ def commented(text: str) -> str:
 
 
 def macros(names: Sequence[str]) -> list[str]:
-    """Return macro endings for channels, all different."""
+    """Return distinct macro suffixes for channels."""
     found: list[str] = []
     for number, name in enumerate(names, start=1):
         ending = re.sub(r"[^A-Z0-9]+", "_", name.upper()).strip("_") or f"CHANNEL_{number}"

@@ -1,4 +1,4 @@
-"""Other people's programs: finding a C compiler, and running what must succeed."""
+"""External programs: finding a C compiler, and running programs."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ FLAGS = (
 
 
 def own_compiler() -> str | None:
-    """Return the C compiler of this machine, $CC, cc, gcc or clang; None where there is none."""
+    """Return the C compiler of this machine, $CC, cc, gcc or clang, or None."""
     wanted = [name for name in (os.environ.get("CC"), "cc", "gcc", "clang") if name]
     return next((path for path in map(shutil.which, wanted) if path), None)
 
 
 def run(command: Sequence[str], failed: str, *, folder: Path | None = None) -> str:
-    """Run a program in a folder and return what it prints.
+    """Run a program in a folder, and return its output.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def compile_c(sources: Sequence[Path], out: Path, *, options: Sequence[str] = ()
 
 
 def self_test(folder: Path, name: str) -> str:
-    """Compile an exported folder elsewhere, run its self-test, and return what it says.
+    """Compile an exported folder elsewhere, run its self-test, and return the output.
 
     Raises
     ------
@@ -84,4 +84,4 @@ def self_test(folder: Path, name: str) -> str:
         sources = sorted((folder / "src").glob("*.c"))
         test = folder / "test" / f"{name}_selftest.c"
         compile_c([*sources, test], program, options=[f"-I{folder / 'src'}"])
-        return run([str(program)], "the exported C does not give Python's numbers").strip()
+        return run([str(program)], "the outputs of the exported C differ from Python's").strip()

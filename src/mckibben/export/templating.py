@@ -1,4 +1,4 @@
-"""Generated sources: templates filled in, and numbers as C writes them."""
+"""Generated sources: templates and numeric literals of C."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ MARKUP = (".xml.j2", ".html.j2")
 """Endings of templates whose values are escaped; those of C come through `naming.said`."""
 
 WIDTH = 92
-"""Of rows of numbers, in columns."""
+"""Width of rows of numbers [columns]."""
 
 CODE_WIDTH = 100
-"""Of lines of C, in columns."""
+"""Width of lines of C [columns]."""
 
 
 def render(package: str, template: str, content: Mapping[str, Any]) -> str:
-    """Return a template of a package's folder ``templates``, filled in; nothing may be undefined."""
+    """Return a rendered template of a package's folder ``templates``; all variables must be defined."""
     return _environment(package).get_template(template).render(content)
 
 
@@ -44,7 +44,7 @@ def _environment(package: str) -> Environment:
 
 
 def literal(value: float, *, single: bool = False) -> str:
-    """Return a number as a C constant: the shortest decimals that give back every bit.
+    """Return a number as a C literal: the shortest decimals that are exact.
 
     >>> literal(0.1), literal(0.1, single=True), literal(3.0), literal(float("inf"))
     ('0.1', '0.1f', '3.0', 'MCK_INFINITY')
@@ -60,7 +60,7 @@ def literal(value: float, *, single: bool = False) -> str:
 
 
 def literals(values: Iterable[float], *, single: bool = False) -> str:
-    """Return numbers as C constants, with commas between them."""
+    """Return numbers as C literals, separated by commas."""
     return ", ".join(literal(float(value), single=single) for value in values)
 
 
@@ -71,7 +71,7 @@ def rows(values: Iterable[float], *, single: bool = False) -> list[str]:
 
 
 def wrapped(line: str) -> list[str]:
-    """Return a line of C as lines that are short enough; types stay with their names."""
+    """Return a line of C wrapped to the line length; types stay with their names."""
     rest = " " * (len(line) - len(line.lstrip()) + 8)
     line = re.sub(r"(const|mck_real|int) (?=\*?\w)", "\\1\u00a0", line)
     lines = textwrap.wrap(line, CODE_WIDTH, subsequent_indent=rest, break_on_hyphens=False)

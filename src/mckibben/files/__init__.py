@@ -1,4 +1,4 @@
-"""Recordings from and to files: the only place where units are converted."""
+"""Reading and writing of recordings; units are converted only here."""
 
 from mckibben.files.own import write as write
 from mckibben.files.reading import columns_of as columns_of

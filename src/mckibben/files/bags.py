@@ -1,4 +1,4 @@
-"""Bags of ROS 1 (.bag) and ROS 2 (.mcap, .db3, or a folder): the numbers in their topics.
+"""Bags of ROS 1 (.bag) and ROS 2 (.mcap, .db3, or a folder): numeric fields of their topics.
 
 RosBags makes Python of the definitions of messages in a file, and runs it; its grammars of definitions
 let nothing but names and numbers into that.
@@ -55,7 +55,7 @@ class _Topic:
     unread: dict[str, str] = field(default_factory=dict)
 
     def take(self, when: int, raw: bytes) -> None:
-        """Take a message that was recorded at a time [ns]."""
+        """Add a message recorded at a time [ns]."""
         message = self.decode(raw)
         stamp: Any = getattr(getattr(message, "header", None), "stamp", None)
         self.stamps.append(stamp.sec * 10**9 + stamp.nanosec if _is_instant(stamp) else 0)
@@ -86,12 +86,12 @@ class _Topic:
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Read the topics of a bag that have numbers; it is opened once more, by its path."""
+    """Read the numeric topics of a bag, which is opened again by its path."""
     return folder(path)
 
 
 def folder(path: Path) -> list[Table]:
-    """Read the topics that have numbers, of a bag that may be a folder of ROS 2."""
+    """Read the numeric topics of a bag that may be a folder of ROS 2."""
     demand("rosbags", "ros", "bags of ROS", file=path)
     reader = _reader(path)
     try:
@@ -122,12 +122,12 @@ def folder(path: Path) -> list[Table]:
 
 
 def _reader(path: Path) -> Any:
-    """Return the reader of a bag, not yet open."""
+    """Return the reader of a bag, not opened yet."""
     from rosbags import rosbag1, rosbag2
     from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
     def database(at: Path) -> Sqlite3Reader:
-        """Return the reader of a database; for SQLite, # % ? are signs in its address."""
+        """Return the reader of a database; for SQLite, # % ? are escaped in its address."""
         return Sqlite3Reader(Path(quote(str(at), safe="/\\:")))
 
     readers: dict[str, Any] = {**rosbag2.Reader.STORAGE_PLUGINS, ".bag": rosbag1.Reader}
@@ -139,7 +139,7 @@ def _reader(path: Path) -> Any:
 
 
 def _topics(reader: Any) -> tuple[list[_Topic], dict[str, str]]:
-    """Return the topics with numbers in the order of their first messages, and what is not read."""
+    """Return the numeric topics in the order of their first messages, and those not read."""
     topics: dict[tuple[str, ...], _Topic] = {}
     unread: dict[str, str] = {}
     for connection in reader.connections:
@@ -169,7 +169,7 @@ def _key(connection: Any) -> tuple[str, ...]:
 
 
 def _decoder(connection: Any) -> Callable[[bytes], Any]:
-    """Return what makes messages of bytes, by the definition in the file, or that of ROS 2 Jazzy."""
+    """Return the decoder of messages, by the definition in the file, or that of ROS 2 Jazzy."""
     from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
     kind, (form, text) = connection.msgtype, connection.msgdef
@@ -189,7 +189,7 @@ def _decoder(connection: Any) -> Callable[[bytes], Any]:
 def _numbers(
     place: str, value: Any, names: Sequence[str] = ()
 ) -> Iterator[tuple[str, float | str]]:
-    """Yield the places of the numbers in a message, with their values, or why there are none.
+    """Yield the positions of the numbers in a message, with their values, or the reason for none.
 
     Elements of arrays are called by the names in the message, as those of joints, if they are as many.
     """
@@ -217,5 +217,5 @@ def _is_instant(value: Any) -> bool:
 
 
 def _indexed(header: str) -> str:
-    """Return a header without brackets, in which units stand elsewhere."""
+    """Return a header without brackets, which mark units elsewhere."""
     return header.replace("[", "/").replace("]", "")

@@ -1,4 +1,4 @@
-"""How lines of text are cut into cells, the forms of cells, and the columns that they make."""
+"""Cells of text tables: separators, number formats, and columns."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MISSING = (
     *("-", "--", "---", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None"),
     *("∞", "+∞", "-∞", "OL", "OVLD"),
 )
-"""Cells of samples that were not taken, or are beyond the instrument's range."""
+"""Cells of missing samples, or of samples beyond the instrument's range."""
 
 _COMMENT = r"#(?!N/?A\b|DIV/0|VALUE!|REF!|NUM!|NAME\?|NULL!)|%|//"  # not the errors of spreadsheets
 _FORMS = {
@@ -39,13 +39,13 @@ _FORMS = {
 
 @dataclass(frozen=True)
 class Dialect:
-    """How lines are cut into cells and numbers written."""
+    """Separator and number format of a text table."""
 
     separator: str | None
     decimal: str
 
     def split(self, line: str, width: int = 0) -> list[str]:
-        """Return the cells of a line; of a header between blanks, so many if it can be."""
+        """Return the cells of a line; of a whitespace-separated header, a given number if possible."""
         if '"' in line:
             line = line if self.separator else line.replace("\t", " ").strip()
             cells = next(csv.reader([line], delimiter=self.separator or " ", skipinitialspace=True))
@@ -60,7 +60,7 @@ class Dialect:
 
     @property
     def comment(self) -> str:
-        """The pattern of what begins a comment: a semicolon only where it does not separate."""
+        """The pattern of the start of a comment: a semicolon only if it is not the separator."""
         return _COMMENT if self.separator == ";" else f"{_COMMENT}|;"
 
     def is_comment(self, line: str) -> bool:
@@ -75,7 +75,7 @@ class Dialect:
         return "text" if cell and cell not in MISSING else "missing", None
 
     def value(self, found: re.Match[str] | None) -> float:
-        """Return the number of a cell of that form, NaN of one that is missing."""
+        """Return the number of a cell of that form, NaN for a missing one."""
         if found is None:
             return math.nan
         if found["hexadecimal"]:
@@ -87,13 +87,13 @@ class Dialect:
         return self.form(cell)[1] is not None or may_be_instant(cell)
 
     def balance(self, cells: Sequence[str]) -> int:
-        """Return how many more values than words there are in cells."""
+        """Return the number of values minus that of words in cells."""
         filled = [cell for cell in cells if self.form(cell)[0] != "missing"]
         return 2 * sum(map(self.is_value, filled)) - len(filled)
 
 
 def column(name: str, unit: str | None, cells: Any, dialect: Dialect) -> tuple[Column, str]:
-    """Return a column by the forms of its cells, and a number that may be of thousands, if all may.
+    """Return a column from the forms of its cells, and a possible thousands number if all may be.
 
     "1,000" is a thousand to some and one to others: its mark is for decimals where another number of
     the column shows it, or where no number is without such a mark.

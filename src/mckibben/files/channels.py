@@ -30,7 +30,7 @@ class _Strict(BaseModel):
 
 
 class Time(_Strict):
-    """The column of times and its unit, or the sample time [s] of files without such a column."""
+    """The time column and its unit, or the sample time [s] of files without such a column."""
 
     column: _Word | None = None
     sample_time: Annotated[float, Field(ge=1e-12, lt=1e11)] | None = None
@@ -53,7 +53,7 @@ class Channel(_Strict):
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         if self.value is not None and {self.column, self.gain, self.offset} != {None}:
-            raise ValueError("a value is a constant: it goes with a unit alone")
+            raise ValueError("a value is a constant, with a unit and nothing else")
         if self.gain == 0:
             raise ValueError("a gain of 0 leaves nothing of the column; use value for a constant")
         if self.gain is not None and self.unit is None:
@@ -67,7 +67,7 @@ class Channel(_Strict):
 
 
 class Files(_Strict):
-    """Settings for files of some names, which go before those of the folder.
+    """Settings for files by name, which take precedence over those of the folder.
 
     ``match`` is a pattern of names, with ``*`` and ``?``. ``join`` names files with one signal each that
     are one recording; a ``*`` in each matches the text that is alike in their names.
@@ -88,14 +88,14 @@ class Files(_Strict):
         return self
 
     def include(self, name: str) -> bool:
-        """Return whether a file of this name is one of these."""
+        """Return whether a file of this name is included."""
         if self.match is not None:
             return fnmatchcase(name, self.match)
         return any(_matched(part, name) for part in self.join or ())
 
 
 class Described(_Strict):
-    """The settings for one file; none by default."""
+    """Settings for one file; by default none."""
 
     time: Time = Time()
     channels: dict[_Word, Channel] = {}
@@ -109,7 +109,7 @@ class Described(_Strict):
 
 
 class Folder(Described):
-    """The settings for all files in a folder.
+    """Settings for all files in a folder.
 
     ``files`` are for some of them, later ones before earlier ones; ``split`` is not interpreted here.
     """
@@ -118,7 +118,7 @@ class Folder(Described):
     split: dict[str, Any] | None = None
 
     def merged(self, files: Iterable[Files]) -> Described:
-        """Return the settings for files to which these of ``files`` apply too."""
+        """Return the settings including matching entries of ``files``."""
         time, sheet = self.time.model_dump(exclude_none=True), self.sheet
         channels = {name: one.model_dump(exclude_none=True) for name, one in self.channels.items()}
         for some in files:
@@ -134,7 +134,7 @@ class Folder(Described):
         return Described.model_validate({"time": time, "channels": channels, "sheet": sheet})
 
     def parts(self, name: str) -> dict[str, str]:
-        """Return the files that are one recording with the one of this name -> their signals' names.
+        """Return the files that form one recording with this one -> their signals' names.
 
         A signal is named as its file, without the text that ``*`` matches; empty for a file alone.
         """
@@ -146,7 +146,7 @@ class Folder(Described):
 
 
 def described(folder: str | Path) -> Folder:
-    """Return the contents of ``channels.toml`` in a folder, without settings if there is none.
+    """Return the contents of ``channels.toml`` in a folder, or empty settings.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def described(folder: str | Path) -> Folder:
 
 @contextmanager
 def describing(folder: Path, what: Folder) -> Iterator[None]:
-    """Use these settings inside for a folder without a ``channels.toml`` of its own."""
+    """Use these settings within the context for a folder without ``channels.toml``."""
     token = _ELSEWHERE.set((folder.absolute(), what))
     try:
         yield
@@ -177,13 +177,13 @@ _ELSEWHERE: ContextVar[tuple[Path | None, Folder]] = ContextVar(
 
 
 def description(path: Path) -> Folder:
-    """Return the settings in a file of any name; errors are those of `described`."""
+    """Return the settings in a file of any name; errors as in `described`."""
     with _refusing(path):
         return _parsed(read_text(path, most=DESCRIPTION))
 
 
 def about(path: Path) -> Described:
-    """Return the settings for a recording: from inside it, where it is a folder, or else beside it."""
+    """Return the settings for a recording: from inside its folder, or from the folder it is in."""
     inside = path.is_dir() and os.path.lexists(path / NAME)
     folder = path if inside else path.parent
     found = described(folder)
@@ -192,7 +192,7 @@ def about(path: Path) -> Described:
 
 
 def _matched(part: str, name: str) -> re.Match[str] | None:
-    """Return the match of a name in join with a file's, whose group 1 is the text of ``*``."""
+    """Return the match of a join pattern with a file name, whose group 1 is the text of ``*``."""
     return re.fullmatch(re.escape(part).replace(r"\*", "(.*)") + "()", name)
 
 

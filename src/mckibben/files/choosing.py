@@ -1,4 +1,4 @@
-"""Which column of a table is which channel."""
+"""Assignment of table columns to channels."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mckibben.recording import REST_LENGTH, conversion
 
 @dataclass(frozen=True)
 class Seen:
-    """A column of a file, as an import shows it, with its ``first`` cells.
+    """A column of a file, as shown in an import, with its ``first`` cells.
 
     The unit is empty where the file states none, and ``channel``, which it is read as, where it is left
     out; ``unasked`` is the channel that it is read as without options.
@@ -35,7 +35,7 @@ class Seen:
 
 
 def seen(source: Source) -> list[Seen]:
-    """Return the columns of a table and what each is read as; of a refusal, what headers name."""
+    """Return the columns of a table and their channels; on an error, channels by header."""
     plain = replace(source.request, columns={}, units={}, channels=None, rate=None)
     asked, unasked = (_by_identity(one) for one in (source, replace(source, request=plain)))
     return [
@@ -135,7 +135,7 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
 
 
 def find_column(wanted: str, channel: str, source: Source) -> Column:
-    """Return the column of a name: as written, without its unit, or in another case."""
+    """Return the column of a name: exact, without its unit, or in another case."""
     table = source.table
     readings = (
         lambda column: column.header == wanted,
@@ -163,7 +163,7 @@ def find_column(wanted: str, channel: str, source: Source) -> Column:
 
 
 def matrix_hint(table: Table, *, time: bool) -> str:
-    """Return what to add to a remedy where columns are those of a matrix, whose names mean nothing."""
+    """Return a hint for a remedy if columns are those of a matrix, without meaningful names."""
     columns = [column for column in table.columns if column.matrix]
     if not columns:
         return ""
@@ -177,14 +177,14 @@ def matrix_hint(table: Table, *, time: bool) -> str:
 
 
 def _of_one_length(source: Source, fixed: Mapping[str, Column]) -> tuple[Source, dict[str, str]]:
-    """Return the source with columns of the recording's length only, and why others are left out."""
+    """Return the source with columns of the recording's length, and why others are left out."""
     columns = source.table.columns
     if source.table.has_clocks or source.table.lines is not None:
         return source, {}
     asked = {channel: column.size for channel, column in fixed.items()}
     if len(set(asked.values())) > 1:
         sizes = ", ".join(f"{channel} {size}" for channel, size in asked.items())
-        problem = f"the columns asked for have unlike numbers of samples: {sizes}"
+        problem = f"the requested columns have different numbers of samples: {sizes}"
         remedy = "name columns of one length with `columns[CHANNEL]=COLUMN`"
         raise source.error(problem, remedy, next(iter(asked)))
     found = Counter(column.size for column in columns if column.size > 1)
@@ -199,7 +199,7 @@ def _of_one_length(source: Source, fixed: Mapping[str, Column]) -> tuple[Source,
 
 
 def _described(source: Source) -> dict[str, Column]:
-    """Return the columns and constants that the folder names; what is not needed may be missing.
+    """Return the columns and constants of the folder's settings; optional ones may be missing.
 
     Of a force, a mass is the weight that hangs there: nobody measured it.
     """
@@ -227,7 +227,7 @@ def _described(source: Source) -> dict[str, Column]:
 
 
 def _only_time(named: Mapping[str, Column], source: Source) -> Column | None:
-    """Return the one column that can only be the time: in seconds and rising, or else of dates."""
+    """Return the only possible time column: in seconds and increasing, or else of dates."""
     in_seconds = [
         column
         for column in named.values()
@@ -244,13 +244,13 @@ def _only_time(named: Mapping[str, Column], source: Source) -> Column | None:
 
 
 def _target(column: Column) -> str:
-    """Return the package's unit for the unit that a column states, empty where there is none."""
+    """Return the package's unit for the unit of a column, empty if there is none."""
     unit = find(column.unit or parse(column.label).unit or "")
     return (unit.target or "") if unit else ""
 
 
 def _require(named: Mapping[str, Column], source: Source) -> None:
-    """Refuse channels that are asked for and not there."""
+    """Raise an error for requested channels that are missing."""
     request, table = source.request, source.table
     for channel in request.channels or ():
         if channel not in named and channel not in source.derived(named):

@@ -1,4 +1,4 @@
-"""Channels that were sampled at times of their own, put on one clock: that of the slowest asked for."""
+"""Channels with separate times, resampled to the slowest requested one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mckibben.files.timebase import GAP
 
 
 def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Column], list[str]]:
-    """Return columns of one length, with one of times, and the headers of those left out.
+    """Return columns of one length, with a time column, and the headers of those left out.
 
     The clock suits the channels asked for and those that have a meaning (a temperature that nobody asks
     for does not slow the rest down), or all. Between its samples a column is linear, or holds the
@@ -62,7 +62,7 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
     if any(not np.array_equal(times, grid) for times in needed.values()):
         rates = ", ".join(f"{name} {1 / step:.4g}" for name, step in list(steps.items())[:10])
         source.warn(
-            f"channels have times of their own (samples a second: {rates}); they were put on the "
+            f"channels have separate times (samples a second: {rates}); they were put on the "
             f"{whose}, by interpolation"
         )
     columns: dict[str, Column] = {"time": Column("time", grid, "s")}
@@ -85,7 +85,7 @@ def _spans(times: Array, grid: Array) -> bool:
 
 
 def _at(column: Column, times: Array, grid: Array) -> Array:
-    """Return a column at other times, NaN where it has none."""
+    """Return a column at other times, NaN outside its own."""
     if column.values is None or column.flaw is not None:
         return np.full(grid.size, np.nan)
     if np.array_equal(times, grid):

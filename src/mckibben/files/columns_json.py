@@ -1,4 +1,4 @@
-"""JSON as a tree of columns by name, or of records with one value of each."""
+"""JSON tables: columns by name, or records with one value per column."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _node(value: Any) -> Node:
 
 
 def _records(records: Sequence[Mapping[str, Any]]) -> Node:
-    """Return the columns of records; those with none of the numbers that most have are events."""
+    """Return the columns of records; records without the usual numbers are events."""
     ((usual, _),) = Counter(tuple(record) for record in records if record).most_common(1)
     first = next(record for record in records if tuple(record) == usual)
     numbers = {name for name in usual if not isinstance(first[name], str)} or set(usual)
@@ -85,7 +85,7 @@ def _records(records: Sequence[Mapping[str, Any]]) -> Node:
 
 
 def _distinct(pairs: Sequence[tuple[str, Any]]) -> Mapping[str, Any]:
-    """Return an object, unless two of its names are one, of which json takes the last."""
+    """Return an object, unless a name is repeated, as json would use the last."""
     found = dict(pairs)
     if len(found) < len(pairs):
         raise ValueError("a name is there twice")

@@ -1,4 +1,4 @@
-"""The condition of recorded signals, in numbers: saturation, stuck sensors, the output's lag."""
+"""Condition of recorded signals: saturation, stuck sensors, lag of the output."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DRIVING, DRIVEN = {"bar", "V"}, {"mm", "rad"}
 """Units of channels that move others, and of those that they move, never before they do."""
 
 MOST = 1 << 20
-"""Samples of a recording by which its lag is found."""
+"""Number of samples of a recording used to estimate its lag."""
 
 
 def condition(samples: Array) -> dict[str, float]:
@@ -33,7 +33,7 @@ def condition(samples: Array) -> dict[str, float]:
 
 
 def lag(recording: Recording, input_: str, output: str) -> int | None:
-    """Return by how many samples the output follows the input, by their cross-correlation.
+    """Return the lag of the output after the input in samples, by cross-correlation.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def lag(recording: Recording, input_: str, output: str) -> int | None:
 
 
 def early(recordings: Sequence[Recording], input_: str, output: str) -> int | None:
-    """Return the lag [samples] of an output that moves before its input, or None where it does not.
+    """Return the lag [samples] of an output that moves before its input, or None.
 
     Only motion by pressure or voltage is judged.
     """

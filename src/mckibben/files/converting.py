@@ -1,4 +1,4 @@
-"""The columns of a table in the package's units: calibrated, converted and plausible."""
+"""Conversion of table columns to the package's units: calibration, units and plausibility."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ASSUMED = "no unit is given, so these are assumed: "
 
 @dataclass(frozen=True)
 class Signal:
-    """One channel: its samples, and what was done to its column, in the unit ``read_in``.
+    """One channel: its samples, and the processing of its column, in the unit ``read_in``.
 
     ``assumed`` is whether no unit is stated; ``calibration`` has gain and offset, or the
     constant that the folder describes.
@@ -41,7 +41,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class Times:
-    """Times in their own unit, so that the digits recorded can still be seen.
+    """Times in their original unit, with the recorded digits.
 
     The unit is ``certain`` where it was asked for or is not the second.
     """
@@ -57,7 +57,7 @@ class Times:
 
 
 def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, dict[str, Any]]:
-    """Return the channels of a table in the package's units, its times, and what else is recorded.
+    """Return the channels of a table in the package's units, its times, and other contents.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
 
 
 def _derived(channel: str, of: str, signal: Signal, source: Source) -> Signal:
-    """Return a channel that another and the rest length give."""
+    """Return a channel derived from another and the rest length."""
     line = conversion(channel, of, source.rest_length)
     assert line is not None
     samples = line[0] * signal.samples + line[1]
@@ -129,7 +129,7 @@ def _derived(channel: str, of: str, signal: Signal, source: Source) -> Signal:
 
 
 def _with_clocks(source: Source) -> Source:
-    """Return a table whose columns have the clock before them, where several are among them."""
+    """Return a table with a clock per column, if it has several clocks."""
     table = source.table
     if table.own or table.has_clocks or "time" in source.request.columns:
         return source
@@ -168,7 +168,7 @@ def times_of(column: Column, source: Source) -> Times:
 
 
 def _signal(channel: str, column: Column, source: Source) -> Signal:
-    """Return a channel in the package's unit, NaN where samples are missing."""
+    """Return a channel in the package's unit, NaN for missing samples."""
     raw = _numbers(channel, column, source)
     calibration = _calibration(channel, column, source)
     calibrated = "gain" in calibration
@@ -193,7 +193,7 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
 
 
 def _numbers(channel: str, column: Column, source: Source) -> Array:
-    """Return the samples of a column; `DataError` if it is text or has a flaw."""
+    """Return the samples of a column; raise a `DataError` for text or flaws."""
     if column.values is None:
         remedy = f"name a column of numbers with `columns[{channel}]=COLUMN`"
         raise source.error(f"column {column.header!r} holds text", remedy, channel, 0)
@@ -204,7 +204,7 @@ def _numbers(channel: str, column: Column, source: Source) -> Array:
 
 
 def _calibration(channel: str, column: Column, source: Source) -> dict[str, Any]:
-    """Return gain and offset as asked for or else described, the constant described, or nothing."""
+    """Return gain and offset, requested or described, or the described constant, or nothing."""
     given = source.request.described.channels.get(channel)
     if given is not None and given.value is not None and column.header == channel:
         return {"value": given.value, "unit": given.unit}
@@ -218,13 +218,13 @@ def _calibration(channel: str, column: Column, source: Source) -> dict[str, Any]
 
 
 def _describes(given: Channel | Time, column: Column) -> bool:
-    """Return whether what a folder states of a channel is about this column."""
+    """Return whether a folder's settings of a channel refer to this column."""
     named = snake_case(given.column or column.header)
     return named in (snake_case(column.header), snake_case(parse(column.header).name))
 
 
 def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[Unit, bool]:
-    """Return the unit of a column, asked for, stated or assumed, and whether it is assumed."""
+    """Return the unit of a column, requested, stated or assumed, and whether it is assumed."""
     expected = unit_of(channel)
     asked = source.request.units.get(channel)
     text = _stated(channel, column, source) if asked is None else asked
@@ -270,7 +270,7 @@ def _option(channel: str, column: Column, unit: str) -> str:
 
 
 def _stated(channel: str, column: Column, source: Source) -> str | None:
-    """Return the unit that the file and the folder state; `DataError` if they state different ones."""
+    """Return the unit of the file and the folder; raise a `DataError` if they differ."""
     described = source.request.described
     given = described.time if channel == "time" else described.channels.get(channel)
     in_header = None if source.table.own else parse(column.label).unit
@@ -295,7 +295,7 @@ def _stated(channel: str, column: Column, source: Source) -> str | None:
 
 
 def _assumed(channel: str, column: Column, values: Array, source: Source) -> Unit:
-    """Return the package's unit; `DataError` if a word of the header or the size shows another."""
+    """Return the package's unit; raise a `DataError` if the header or the values contradict it."""
     expected = unit_of(channel)
     if expected is None:
         return Unit("", "")

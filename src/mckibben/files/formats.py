@@ -1,4 +1,4 @@
-"""The formats of files: which module reads which ending, one line each."""
+"""File formats: ending to reader module, one line each."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ WRITERS = (".csv", ".tsv", ".parquet")
 """Endings whose module also has ``write(recording, path)``."""
 
 SOUGHT = tuple(ending for ending in READERS if ending not in (".log", ".json", ".jsonl"))
-"""Endings that a folder is searched for; programs write their own logs and settings in the others."""
+"""Endings that a folder is searched for; other formats also hold logs and settings."""
 
 _SIGNATURES: dict[bytes, tuple[str, ...]] = {
     b"PAR1": (".parquet",),
@@ -61,13 +61,13 @@ _SIGNATURES: dict[bytes, tuple[str, ...]] = {
 
 
 def tables(path: Path) -> list[Table]:
-    """Return the contents of a file before they are interpreted; errors are those of `read`."""
+    """Return the raw contents of a file; errors as in `read`."""
     with opened(path, most=MOST_BYTES) as file:
         return read(file, path)
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Return the contents of an open file before they are interpreted.
+    """Return the raw contents of an open file.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 def laid_out(
     file: BufferedReader, path: Path, header: int, skip: int, encoding: str | None
 ) -> BufferedReader:
-    """Return a text as `mckibben.files.text.laid_out` does; `DataError` of any other format."""
+    """Return a text as `mckibben.files.text.laid_out` does; raise a `DataError` for other formats."""
     if header <= 1 and not skip and encoding is None:
         return file
     if READERS.get(path.suffix.casefold()) != "text":
@@ -106,18 +106,18 @@ def laid_out(
 
 
 def bag(folder: Path) -> list[Table]:
-    """Return the contents of the folder of a bag of ROS 2; errors are those of `read`."""
+    """Return the contents of a ROS 2 bag folder; errors as in `read`."""
     with refusing(folder):
         return [printable(table) for table in import_module("mckibben.files.bags").folder(folder)]
 
 
 def writer(path: Path) -> ModuleType:
-    """Return the module that writes files of this ending; `DataError` if there is none."""
+    """Return the module that writes files of this ending; raise a `DataError` if there is none."""
     return _module(path, WRITERS, "written")
 
 
 def reason(error: Exception) -> str:
-    """Return an error of a library in one line."""
+    """Return a library's error in one line."""
     text = str(error)
     if isinstance(error, ValidationError):
         first = error.errors()[0]
@@ -128,7 +128,7 @@ def reason(error: Exception) -> str:
 
 @contextmanager
 def refusing(path: Path) -> Iterator[None]:
-    """Turn whatever a library raises into errors that name the file."""
+    """Convert any exception of a library to an error that names the file."""
     try:
         yield
     except MckibbenError:

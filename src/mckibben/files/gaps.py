@@ -1,4 +1,4 @@
-"""From samples that are missing and times with gaps to pieces on one uniform grid."""
+"""Missing samples and time gaps: pieces on one uniform grid."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Piece:
 def pieces(
     channels: Channels, times: Times | None, step: float | None, start: float, source: Source
 ) -> list[Piece]:
-    """Return the stretches of channels without gaps, or all with gaps bridged, on one uniform grid.
+    """Return the segments of channels without gaps, or with gaps bridged, on one uniform grid.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def pieces(
 
 
 def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
-    """Return which samples are missing in the channels that are used; refuse them by the policy."""
+    """Return which samples are missing in the channels used; raise an error as the policy requires."""
     found: dict[str, Mask] = {}
     for name, samples in channels.items():
         missing = ~np.isfinite(samples)
@@ -122,7 +122,7 @@ def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
 
 
 def _enclosed(missing: dict[str, Mask], source: Source) -> Mask:
-    """Return where every channel has samples before and after, with a note of what is interpolated."""
+    """Return where every channel has samples before and after, with a note on interpolation."""
     inside = np.logical_and.reduce(
         [
             np.logical_or.accumulate(~mask) & np.logical_or.accumulate(~mask[::-1])[::-1]
@@ -142,7 +142,7 @@ def _enclosed(missing: dict[str, Mask], source: Source) -> Mask:
 
 
 def _judge_gaps(cuts: NDArray[np.intp], times: Times, source: Source) -> None:
-    """Refuse gaps in time, or note that they are bridged."""
+    """Raise an error for gaps in time, or note that they are bridged."""
     lengths = convert(times.values[cuts] - times.values[cuts - 1], times.unit, "s")
     total = f"{len(cuts)} gap{'s' * (len(cuts) > 1)} in time, {lengths.sum():.6g} s in all"
     if source.request.gaps == "error":
@@ -155,7 +155,7 @@ def _judge_gaps(cuts: NDArray[np.intp], times: Times, source: Source) -> None:
 def _judged_step(
     size: float, jitter: tuple[float, float] | None, times: Times, source: Source
 ) -> float:
-    """Return the step in seconds; refuse one of a doubtful unit, and note jitter."""
+    """Return the step in seconds; raise an error for a doubtful unit, and note jitter."""
     seconds = times.seconds(size)
     if seconds > 5.0 and not times.certain:
         raise timebase.doubtful_unit(f"its steps are {seconds:.6g} s", seconds, source)
@@ -169,7 +169,7 @@ def _judged_step(
 
 
 def _long_enough(spans: timebase.Spans, source: Source) -> timebase.Spans:
-    """Return the spans that are not too short to be of use."""
+    """Return the spans of sufficient length."""
     fewest = FEWEST if len(spans) > 1 else source.request.fewest
     long = spans[spans[:, 1] - spans[:, 0] >= fewest]
     if not long.size:

@@ -1,4 +1,4 @@
-"""HDF5: the vectors, and matrices of a few, anywhere in its groups, with the units in their attributes.
+"""HDF5 files: vectors and narrow matrices in any group, with units from attributes.
 
 A data set of HDF5 can have its samples in another file, and a link can lead there. The first is refused
 and the second not followed: whoever sends a file must not choose what else is read.
@@ -37,7 +37,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 
 
 class _Tree:
-    """Makes a plain tree of the groups of a file.
+    """Builds a plain tree of the groups of a file.
 
     In those that MATLAB wrote, text is numbers, and struct arrays and cells are references.
     """
@@ -48,7 +48,7 @@ class _Tree:
         self._seen: set[int] = set()
 
     def group(self, group: Any) -> dict[str, Node]:
-        """Return what hard links lead to, each once: they can lead round in circles."""
+        """Return the targets of hard links, each once, as links can be circular."""
         import h5py
 
         self._seen.add(h5py.h5o.get_info(group.id).addr)
@@ -92,7 +92,7 @@ class _Tree:
         return [dict(zip(arrays, each, strict=True)) for each in rows]
 
     def _values(self, data: Any) -> Node:
-        """Return the samples of a data set, or its text, or what its references lead to."""
+        """Return the samples of a data set, its text, or the targets of its references."""
         import h5py
 
         if data.is_virtual or data.external:  # asking for its shape would open other files
@@ -135,7 +135,7 @@ class _Tree:
 
 
 def _fields(samples: NDArray[Any]) -> Node:
-    """Return samples, those of a table as one array a field."""
+    """Return samples, for a table one array per field."""
     names = samples.dtype.names
     if names == ("real", "imag"):
         return Unread("complex numbers")
@@ -147,7 +147,7 @@ def _fields(samples: NDArray[Any]) -> Node:
 
 
 def _attributes(item: Any) -> dict[str, Any]:
-    """Return the attributes that JSON holds."""
+    """Return the JSON-compatible attributes."""
     found: dict[str, Any] = {}
     for name in item.attrs:
         with suppress(TypeError):  # NumPy has no such type

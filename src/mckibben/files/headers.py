@@ -1,4 +1,4 @@
-"""Column headers as people write them, read as a channel of the package and a unit."""
+"""Column headers, parsed to a channel and a unit."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def parse(text: str) -> Header:
 
 
 def channel_of(header: Header) -> str:
-    """Return the channel that a header names: a standard one, or its name in lower snake case.
+    """Return the channel of a header: a standard one, or its name in lower snake case.
 
     >>> channel_of(parse("P1 [bar]")), channel_of(parse("u1_V")), channel_of(parse("f [Hz]"))
     ('pressure_1', 'u1', 'f')
@@ -120,7 +120,7 @@ def channel_of(header: Header) -> str:
 
 
 def _of_loop(name: str, header: Header) -> str | None:
-    """Return the channel of a loop's reference or command, or None: a desired pressure is sent."""
+    """Return the channel of a loop's reference or command, or None: a desired pressure is a command."""
     name = _ATTACHED.sub(r"_\g<0>_", name.replace("set_point", "setpoint"))
     words = [word for word in name.split("_") if word]
     roles = [_ROLES[word] for word in words if word in _ROLES]
@@ -140,7 +140,7 @@ def _of_loop(name: str, header: Header) -> str | None:
 
 
 def by_units(units: Mapping[str, str]) -> dict[str, str]:
-    """Return channels by units for what is named u1, output or the like in a recording."""
+    """Return channels by units for columns named u1, output or similar."""
     found = {}
     for name, unit in units.items():
         unnamed = re.fullmatch(r"(?:[a-z]|input|output)(?:_?(\d+))?", name)
@@ -191,7 +191,7 @@ def snake_case(name: str) -> str:
 
 
 def foreign_words(text: str) -> int:
-    """Return how many letters of words and units beyond ASCII a text has, as a measure of its encoding.
+    """Return the number of non-ASCII letters in known words and units, to rate an encoding.
 
     >>> foreign_words("Länge (µm)"), foreign_words("Lضnge (╡m)")
     (6, 0)
@@ -202,7 +202,7 @@ def foreign_words(text: str) -> int:
 
 
 def unknown_ending(text: str) -> str:
-    """Return the first word behind a channel's name that may be a unit nobody knows; empty if none.
+    """Return the first word after a channel's name that may be an unknown unit; empty if none.
 
     >>> unknown_ending("pressure_qux"), unknown_ending("Inlet pressure 2"), unknown_ending("data")
     ('qux', '', '')
@@ -214,7 +214,7 @@ def unknown_ending(text: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return text with one sign for each of those that Unicode has in several widths and forms."""
+    """Return text with Unicode variants replaced by one character each."""
     return text if text.isascii() else unicodedata.normalize("NFKC", text.replace("º", "°"))
 
 
@@ -236,12 +236,12 @@ def _standard(name: str) -> str | None:
 
 
 def _expected(name: str) -> str | None:
-    """Return the unit of the package for what a header names, None where there is none."""
+    """Return the package's unit of a header's channel, or None."""
     return unit_of(_standard(snake_case(name)) or snake_case(name))
 
 
 def _is_unit(text: str, name: str) -> bool:
-    """Return whether the ending of a header is a unit and no part of the name."""
+    """Return whether the ending of a header is a unit and not part of the name."""
     if text in ("-", "1", "none"):
         return False
     unit = find_listed(text) or (find(text) if GAUGE.fullmatch(text) else None)
@@ -258,13 +258,13 @@ def _is_unit(text: str, name: str) -> bool:
 
 
 def _is_doubtful(text: str) -> bool:
-    """Return whether a word that is a unit may as well be a name."""
+    """Return whether a unit word may also be part of a name."""
     letter = len(text) == 1 and text.isalpha() and text not in _LETTERS
     return letter or text.casefold() in _DOUBTFUL
 
 
 def _referred(unit: str, name: str) -> str:
-    """Return a unit with the reference of a pressure that the name has."""
+    """Return a unit with the pressure reference of the name."""
     found = [f"{unit} {word}" for word in _words(name) if word in _REFERENCES]
     return found[0] if found and GAUGE.fullmatch(found[0]) else unit
 
@@ -274,7 +274,7 @@ def _last(name: str) -> str:
 
 
 def _names(word: str, unit: str) -> bool:
-    """Return whether a word names what has a unit: the l of ``muscle_l/mm`` is no litre."""
+    """Return whether a word is a quantity with a unit: the l of ``muscle_l/mm`` is not a litre."""
     channel, found = _CHANNELS.get(word.casefold()), find(unit)
     if found is not None and word.casefold() in _DOUBTFUL:  # pressure_in/bar, but speed_in/s
         return found.target != "s"
@@ -282,7 +282,7 @@ def _names(word: str, unit: str) -> bool:
 
 
 def _is_part(name: str, unit: str, *, stroke: bool) -> bool:
-    """Return whether the last word of a name is of the unit after it, or after a stroke.
+    """Return whether the last word of a name belongs to the unit after it, or after a slash.
 
     As in ``flow_Nl/min``, ``rate_1/s``, ``stiffness_N_mm`` and ``q_deg_per_s``.
     """

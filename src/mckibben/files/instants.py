@@ -1,4 +1,4 @@
-"""Instants as people and programs write them: ISO 8601, day or month first, or the time of day alone."""
+"""Instants: ISO 8601, day or month first, or the time of day alone."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _BEGINNING = re.compile(
 
 
 def may_be_instant(text: str) -> bool:
-    """Return whether a text begins like an instant.
+    """Return whether a text starts like an instant.
 
     >>> [may_be_instant(text) for text in ("2026-01-31", "31.1.26 12:00", "12:00:00", "up", "1.5")]
     [True, True, True, False, False]
@@ -80,7 +80,7 @@ def seconds(texts: Sequence[str], source: Source) -> Array:
 
 
 def _in_one_form(parts: Any, form: re.Match[str]) -> tuple[Any, list[str]]:
-    """Return instants written alike from their parts, and their formats for `pandas.to_datetime`."""
+    """Return instants of one form from their parts, and formats for `pandas.to_datetime`."""
     clock = parts["clock"] if form["clock"] else parts["clock"].fillna("00:00")
     cells = clock + ":" + parts["whole"].fillna("00") + "." + parts["part"].fillna("0")
     pattern = "%H:%M:%S.%f"

@@ -1,4 +1,4 @@
-"""Measurement files of LabVIEW (.lvm): a header of the file, then segments with headers of their own.
+"""LabVIEW measurement files (.lvm): a file header, then segments with headers.
 
 By "LabVIEW Measurement File Format" (NI): a line of a header is a key and its value for each channel.
 """
@@ -63,7 +63,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 def _timed(
     table: Table, names: Sequence[str], about: Mapping[str, Sequence[str]], decimal: str
 ) -> Table:
-    """Return a segment with its times: in one column, in one for each channel, or stated."""
+    """Return a segment with its times: in one column, one per channel, or stated."""
     clocks = [column for column in table.columns if column.header == _X]
     names = [name for name in names if name != _X]  # not of comments
     channels = tuple(column for column in table.columns if column.header in names)

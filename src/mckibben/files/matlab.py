@@ -1,4 +1,4 @@
-"""MATLAB files: vectors and matrices of a few, also in structs and cells; version 7.3 is HDF5."""
+"""MATLAB files: vectors and narrow matrices, also in structs and cells; version 7.3 is HDF5."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 
 
 def _checked(data: bytes, order: str, outer: Collection[int] = _OUTER) -> Iterator[bytes]:
-    """Yield the elements of version 5, unless one in them has a type that cannot stand there.
+    """Yield the elements of version 5; raise an error for an element of an invalid type.
 
     SciPy indexes a C array by the type unchecked, so that a received file could make it follow a pointer
     of its choice; see scipy/scipy#25829.

@@ -1,4 +1,4 @@
-"""Words of headers: how channels, and the two ends of a loop, are called in ten languages. Data only.
+"""Words for channels, references and commands in headers, in ten languages. Data only.
 
 Words are in lower case, several of one name joined by underscores; a header matches whole words.
 """
@@ -63,11 +63,11 @@ ROLES: dict[str, dict[str, str]] = {
         "en": "command commanded cmd", "de": "stellgröße stellgroesse", "fr": "commande",
         "it es pt": "comando", "ja zh": "指令 指令値 指令值", "ko": "명령 지령"},
 }  # fmt: skip
-"""References and commands of a loop -> the words for it beside, or instead of, a channel's name."""
+"""References and commands of a loop -> words for them, used with or instead of a channel's name."""
 
 
 def words_of(table: dict[str, dict[str, str]]) -> dict[str, str]:
-    """Return what each word of a table means.
+    """Return the meaning of each word of a table.
 
     >>> words_of(CHANNELS)["druck"]
     'pressure'

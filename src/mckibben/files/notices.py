@@ -1,4 +1,4 @@
-"""Warnings about what was assumed or mended, shown at the line that called the package."""
+"""Warnings about assumptions and corrections, shown at the line of the user's call."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def listed(items: Sequence[str], most: int = 30) -> str:
 
 @contextmanager
 def noted() -> Iterator[list[str]]:
-    """Yield a list of the texts of warnings issued inside."""
+    """Collect the texts of warnings issued within the context."""
     notes: list[str] = []
     token = _NOTED.set(notes)
     try:

@@ -1,4 +1,4 @@
-"""Recordings as this package writes them: reading one gives the same recording to the last bit."""
+"""The package's own recording files: reading one returns the same recording to the last bit."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from mckibben.system import ordinary
 from mckibben.system.atomic import digest
 
 STILL = ("calibration", "pressure_reference")
-"""What of a recording's meta applies to samples that were edited since."""
+"""Entries of a recording's meta that remain valid after its samples were edited."""
 
 
 class Stored(BaseModel):
-    """The description of a recording in a CSV's sidecar or in the schema of a Parquet file.
+    """Description of a recording in a CSV's sidecar or in the schema of a Parquet file.
 
     ``sha256`` is of the samples as they are on disk, to see whether they were changed since; ``units``
     are in the order of the columns. With a sample time, the first column is the time.
@@ -46,7 +46,7 @@ class Stored(BaseModel):
         return Table(columns, None, self.sample_time, self.start_time, self.meta, own=True)
 
     def edited(self, table: Table) -> Table:
-        """Return a table of samples that were changed since, with the units and calibrations."""
+        """Return a table of edited samples, with the described units and calibrations."""
         units = {"time": "s", **self.units}
         columns = (replace(c, unit=c.unit or units.get(c.header) or None) for c in table.columns)
         meta = {key: self.meta[key] for key in STILL if key in self.meta}
@@ -54,7 +54,7 @@ class Stored(BaseModel):
 
 
 def write(recording: Recording, path: str | Path) -> None:
-    """Write a recording to a file, from which `read` returns an equal one; a file there is replaced.
+    """Write a recording to a file, from which `read` returns an equal one; an old file is replaced.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def write(recording: Recording, path: str | Path) -> None:
 
 
 def describe(recording: Recording, samples: bytes, path: Path) -> str:
-    """Return the description, in JSON, of a recording whose samples are these bytes on disk.
+    """Return the description, in JSON, of a recording with these bytes of samples.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def describe(recording: Recording, samples: bytes, path: Path) -> str:
 
 
 def parse(text: str | bytes) -> Stored | str:
-    """Return the description in a JSON text, or why it is none."""
+    """Return the description in a JSON text, or why it is invalid."""
     try:
         found = Stored.model_validate_json(text)
     except ValidationError as error:
@@ -119,7 +119,7 @@ def parse(text: str | bytes) -> Stored | str:
 
 
 def noted(found: Stored | str, problem: str, path: Path) -> Stored | None:
-    """Warn that a description is not of the samples as they are; None if it is no description."""
+    """Warn that a description does not match the samples; return None if it is invalid."""
     if isinstance(found, str):
         warn(path, f"{problem}; it is ignored, and units are taken from the header")
         return None
@@ -128,7 +128,7 @@ def noted(found: Stored | str, problem: str, path: Path) -> Stored | None:
 
 
 def sidecar(path: Path) -> Path:
-    """Return where the description of a text file is, named as in W3C's "CSV on the Web".
+    """Return the path of a text file's description, named as in W3C's "CSV on the Web".
 
     >>> sidecar(Path("run.csv")).name
     'run.csv-metadata.json'
@@ -137,12 +137,12 @@ def sidecar(path: Path) -> Path:
 
 
 def description(path: Path) -> Path | None:
-    """Return where the description of a text file is; None for other formats."""
+    """Return the path of a text file's description; None for other formats."""
     return sidecar(path) if READERS.get(path.suffix.casefold()) == "text" else None
 
 
 def describes(path: Path) -> bool:
-    """Return whether a file is a description by this package."""
+    """Return whether a file is a description written by this package."""
     try:
         return isinstance(parse(ordinary.read_bytes(path, most=ordinary.DESCRIPTION)), Stored)
     except MckibbenError:
@@ -150,7 +150,7 @@ def describes(path: Path) -> bool:
 
 
 def is_own(path: Path) -> bool:
-    """Return whether a file is a recording by this package, as it was written."""
+    """Return whether a file is an unchanged recording written by this package."""
     beside = description(path)
     if path.is_symlink() or (beside is not None and not describes(beside)):
         return False

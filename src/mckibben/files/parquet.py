@@ -1,4 +1,4 @@
-"""Parquet: ours with everything in the schema's metadata, others by the rules for headers."""
+"""Parquet files: own ones with metadata in the schema, others by header rules."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def write(recording: Recording, path: Path) -> None:
 
 
 def _own(frame: Any, text: bytes, path: Path) -> Table | own.Stored | None:
-    """Return the table that the description in a file is of, or the description of another."""
+    """Return the described table of a file, or a description of other samples."""
     description = own.parse(text)
     if isinstance(description, str):
         problem = f"the description in it is not by this package ({description})"

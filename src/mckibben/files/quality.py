@@ -1,4 +1,4 @@
-"""What is wrong with samples: codes for missing ones, wraps, outliers, impossible values."""
+"""Data quality: codes for missing samples, wraps, outliers, impossible values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Mask = NDArray[np.bool_]
 
 
 class Plausible(NamedTuple):
-    """Values of a standard channel or of time; others are in another unit.
+    """Plausible values of a standard channel or of time; others suggest another unit.
 
     ``typical`` is a common size, by which another unit is proposed; a channel without a unit that
     reaches less than ``least`` or more than ``most`` may well be in another.
@@ -43,21 +43,22 @@ PLAUSIBLE = {
     "degC": Plausible(-100.0, 1e3),
     "": Plausible(-1e4, 1e4, 0.2, 0.0, 1.5),
 }
-"""By the package's unit."""
+"""Plausible range, by the package's unit."""
 
 TOO_SMALL = {"bar": (1e-12, 1e-7)}
-"""By the package's unit: largest values that are in another unit, and more than the rounding of 0."""
+"""By the package's unit: largest values that suggest another unit, and are more than rounding of 0.
+"""
 
 _SIZES = (0.0, *(10.0**k - 1 for k in range(3, 8)), *(2.0**k - 1 for k in (15, 16)), 2.0**15)
 CODES = np.array([sign * size for size in _SIZES for sign in (1.0, -1.0)])
-"""What instruments write for a missing sample, be it a single one."""
+"""Codes of instruments for a missing sample, even a single one."""
 
 WRAPS = (2.0**8, 2.0**10, 2.0**12, 2.0**16, 2.0**32)
-"""Range of integer counters, which begin anew beyond it."""
+"""Ranges of integer counters, which wrap around."""
 
 
 def wraps(values: Array) -> tuple[float, Array] | None:
-    """Return the range of an integer counter, and how often it wraps upwards at each of n - 1 steps.
+    """Return the range of a wrapping integer counter, and its upward wraps at each of n - 1 steps.
 
     None where the n values, all finite, are no whole numbers of one of the ranges `WRAPS`, or do not
     wrap: where steps are not alike once they go on beyond the end of the range.
@@ -79,7 +80,7 @@ def wraps(values: Array) -> tuple[float, Array] | None:
 
 
 def refuse_wraps(channel: str, recorded: Array, source: Source) -> None:
-    """Refuse samples, as in the file, of an integer counter that wraps."""
+    """Raise an error for samples of a wrapping integer counter."""
     finite = np.isfinite(recorded)
     found = wraps(recorded[finite])
     if found is not None:
@@ -92,7 +93,7 @@ def refuse_wraps(channel: str, recorded: Array, source: Source) -> None:
 
 
 def without_codes(channel: str, values: Array, recorded: Array, source: Source) -> Array:
-    """Return samples, NaN where the file has a code for a missing one, with a note.
+    """Return samples with codes for missing ones replaced by NaN, with a note.
 
     Codes are whole numbers as ``recorded`` in the file, not in the package's unit.
     """
@@ -116,7 +117,7 @@ def without_codes(channel: str, values: Array, recorded: Array, source: Source) 
 
 
 def _is_code(code: float, known: Array) -> bool:
-    """Return whether a number is what a sensor drops to, far outside the range of the others."""
+    """Return whether a number is an isolated value far outside the range, as a dropout code."""
     at = known == code
     # a muscle rests at 0 before and after it moves, and as often as not
     if not at.any() or at.all() or (code == 0 and (at[0] or at[-1] or at.mean() > 0.25)):
@@ -132,7 +133,7 @@ def _is_code(code: float, known: Array) -> bool:
 
 
 def note_outliers(channel: str, values: Array, source: Source) -> None:
-    """Note samples in short runs far from all others, which may be measured."""
+    """Note short runs of outliers, which may be measured."""
     finite = np.flatnonzero(np.isfinite(values))
     if finite.size < 100:
         return
@@ -149,7 +150,7 @@ def note_outliers(channel: str, values: Array, source: Source) -> None:
 
 
 def refuse_impossible(channel: str, values: Array, read_in: str, source: Source) -> None:
-    """Refuse values, in the package's unit, that no rig has, and propose another than ``read_in``."""
+    """Raise an error for values that no rig has, and suggest another unit than ``read_in``."""
     target = unit_of(channel)
     finite = np.isfinite(values)
     if target not in PLAUSIBLE or not finite.any():
@@ -170,7 +171,7 @@ def refuse_impossible(channel: str, values: Array, read_in: str, source: Source)
 
 
 def fitting_units(value: float, read_in: str, target: str) -> list[str]:
-    """Return the units in which a value is of a common size, the nearest first."""
+    """Return the units in which a value has a plausible size, nearest first."""
     read = convert(np.array([abs(value)]), target, read_in)
     sizes = {unit: float(convert(read, unit, target)[0]) for unit in SPELLINGS[target]}
     typical = math.log(PLAUSIBLE[target].typical)

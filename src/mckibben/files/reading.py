@@ -1,4 +1,4 @@
-"""From a file to recordings: a table, its channels and units, its time grid."""
+"""Reading files to recordings: table, channels and units, time grid."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from mckibben.recording import Recording
 MAY_BE_HELD = frozenset(
     {"displacement", "length", "contraction", "angle", "velocity", "force", "temperature"}
 )
-"""Channels that an experiment can hold constant."""
+"""Channels that may be constant in an experiment."""
 
 
 def read(
@@ -62,35 +62,36 @@ def read(
     units : mapping of str to str, optional
         Channel -> unit, such as ``{"pressure": "kPa"}``; overrides what the file states.
     rate : float, optional
-        Samples per second, positive, where there is no column of times. Without either, a scalar
-        beside the samples may state it, such as ``fs``, or the recording has no time. Channels with
-        times of their own are put on a clock of this rate.
+        Samples per second, positive, where there is no column of times. Without either, a scalar in
+        the file, such as ``fs``, is used, or the recording has no time. Channels with separate
+        times are resampled to this rate.
     gaps : {"error", "split", "interpolate"}
-        What to do where time is missing (a step of more than three median steps) or a sample is
-        (blank, NaN, infinite, or a code such as -9999): refuse, cut into several recordings, or bridge
-        linearly. Bridged samples are not fitted: ``meta["bridged"]`` has their first and last times.
+        Treatment of missing time (a step of more than three median steps) and missing samples
+        (blank, NaN, infinite, or a code such as -9999): raise an error, split into several
+        recordings, or interpolate linearly. Bridged samples are not fitted: ``meta["bridged"]`` has
+        their first and last times.
     channels : sequence of str, optional
-        Channels that must be there and whole. Others are left out, with a `DataWarning`, if samples of
-        theirs are missing. By default all must be whole.
+        Required channels, without missing samples. Others are left out, with a `DataWarning`, if
+        samples are missing. By default all channels are required.
     informative : bool
-        Whether there must be something to learn from: at least 10 samples, and no constant pressure
-        or other channel asked for that an experiment does not hold, as it does a length or a force.
-        Without, two samples are enough, as for simulating a model.
+        Whether recordings must be informative: at least 10 samples, and no constant pressure or
+        other requested channel, except a length or a force. Otherwise two samples are enough, as
+        for simulating a model.
     calibration : mapping of str to (float, float), optional
         Channel -> gain and offset: the channel is gain times the column, plus offset, in the unit that
-        ``units`` or else the header gives. ``{"displacement": (-1, 0)}`` turns a sign.
+        ``units`` or else the header states. ``{"displacement": (-1, 0)}`` reverses a sign.
     constants : mapping of str to (float, str), optional
-        Channel -> value and unit of what was held and is in no column, such as the force
-        ``{"force": (200, "g")}``: a mass is the weight that it hangs with. Override columns.
+        Channel -> value and unit of a constant quantity without a column, such as ``{"force": (200,
+        "g")}``; a mass is converted to its weight. Overrides columns.
     most : float
         Largest file that is read [bytes].
     raw : bool
         Whether codes for missing samples, and counters that seem to wrap, are read as measured.
     rest_length : float, optional
-        Length of the muscle where its displacement is 0 [mm], kept in ``meta``: where ``channels``, or
-        models, ask for a contraction, displacement or length, another of these gives it.
+        Length of the muscle at displacement 0 [mm], stored in ``meta``: contraction, displacement
+        and length are then converted to each other as needed.
     header : int
-        Line of a text with the names of columns, counted from 1; 0 where it is found.
+        Line of a text with the names of columns, counted from 1; 0 to detect it.
     skip : int
         Lines after it that are left out.
     encoding : str, optional
@@ -100,9 +101,9 @@ def read(
     -------
     list of Recording
         One; or one for each stretch with ``gaps="split"``, each group of a TDMS file, and each file of
-        a folder. In the package's units: bar, mm, N, s, rad, V, mm/s, degC. A file that `write` made
-        gives a recording equal to the one written. What was assumed, mended or left out is in
-        ``meta["notes"]``, a list of sentences, if anything was.
+        a folder. In the package's units: bar, mm, N, s, rad, V, mm/s, degC. A file from `write` is
+        read as an equal recording. Assumptions, corrections and omissions are listed in
+        ``meta["notes"]``.
 
     Raises
     ------
@@ -138,7 +139,7 @@ def read(
 
 
 def look(path: str | Path, **options: Any) -> tuple[list[Recording], list[Seen]]:
-    """Return the recordings in a file, as `read` does, and its columns, as `columns_of` does, read once.
+    """Return recordings as `read` does, and columns as `columns_of` does, in one pass.
 
     Parameters
     ----------
@@ -155,7 +156,7 @@ def look(path: str | Path, **options: Any) -> tuple[list[Recording], list[Seen]]
 
 
 def columns_of(path: str | Path, **options: Any) -> list[Seen]:
-    """Return the columns of a file or a folder's recording, and the channel that each is read as.
+    """Return the columns of a file or a folder's recording, with their channels.
 
     Parameters
     ----------
@@ -180,7 +181,7 @@ def columns_of(path: str | Path, **options: Any) -> list[Seen]:
 
 
 def has_columns(path: Path) -> bool:
-    """Return whether a file holds columns of samples, rather than a model."""
+    """Return whether a file holds columns of samples, not a model."""
     try:
         return bool(columns_of(path))
     except DataError:
@@ -188,7 +189,7 @@ def has_columns(path: Path) -> bool:
 
 
 def _read(path: Path, request: Request) -> tuple[list[Recording], Source]:
-    """Return the recordings of a file, with notes after earlier ones, and the first that it is of."""
+    """Return the recordings of a file, with notes after earlier ones, and their first file."""
     request = replace(request, described=about(path))
     with noted() as notes:
         tables, digest = sources.tables(path, request)
@@ -243,7 +244,7 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
 
 
 def _stated_step(times: Times | None, source: Source) -> float | None:
-    """Return the sample time that the caller or the file states, which the times must not contradict."""
+    """Return the sample time stated by the caller or the file, checked against the times."""
     table, request = source.table, source.request
     step = table.sample_time if request.rate is None else 1.0 / request.rate
     if step is None and times is None and not table.own:
@@ -258,7 +259,7 @@ def _stated_step(times: Times | None, source: Source) -> float | None:
         problem = f"the times are {mean:.6g} s apart on average, or not evenly"
     else:
         return step if table.sample_time is None else table.sample_time
-    problem = f"{problem}, which is not the {1 / step:g} a second asked for"
+    problem = f"{problem}, which is not the {1 / step:g} a second requested"
     raise source.error(problem, "leave `rate` out, or delete the column of times", "time")
 
 

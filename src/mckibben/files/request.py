@@ -1,4 +1,4 @@
-"""The options of `read`, and a table to which they apply."""
+"""Options of `read`, and a table to which they apply."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from mckibben.files.table import Table
 from mckibben.recording import conversion
 
 FEWEST = 10
-"""Fewest samples of a recording, or of a stretch of one, that can show a loop."""
+"""Smallest number of samples of a recording, or of a segment of one."""
 
 LONGEST = 1e6
-"""Rest length of a muscle [mm]."""
+"""Largest rest length of a muscle [mm]."""
 
 Gaps = Literal["error", "split", "interpolate"]
 
 
 @dataclass(frozen=True)
 class Request:
-    """The options of `mckibben.read`, and behind them the settings of ``channels.toml``."""
+    """The options of `mckibben.read`, then the settings of ``channels.toml``."""
 
     columns: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
@@ -48,7 +48,7 @@ class Request:
 
     @property
     def fewest(self) -> int:
-        """Fewest samples of a recording."""
+        """Smallest number of samples of a recording."""
         return FEWEST if self.informative else 2
 
     @property
@@ -57,15 +57,15 @@ class Request:
         return bool(self.columns.keys() - {"time"}) or self.channels is not None
 
     def asks_for(self, channel: str) -> bool:
-        """Return whether the caller named a channel."""
+        """Return whether the caller requested a channel."""
         return channel in (self.channels or ()) or channel in self.columns
 
     def needs(self, channel: str) -> bool:
-        """Return whether a flaw of a channel is an error: it is named, or none is."""
+        """Return whether a flaw of a channel is an error: it is requested, or none is."""
         return not self.names_channels or channel == "time" or self.asks_for(channel)
 
     def of(self, table: Table, path: Path) -> Source:
-        """Return a table with this request, in which constants are among what is described.
+        """Return a table with this request; constants are added to the description.
 
         What this package wrote was described when it was first read, and is not calibrated twice.
 
@@ -96,7 +96,7 @@ class Request:
         return Source(table, replace(self, described=described), path)
 
     def check(self, path: Path) -> None:
-        """Refuse options that are impossible for any file."""
+        """Raise an error for options that are invalid for any file."""
         error = partial(DataError, file=path)
         ways = get_args(Gaps)
         require(self.gaps in ways, "gaps", self.gaps, f"one of {', '.join(ways)}", error)
@@ -118,7 +118,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Source:
-    """A table, the file it is from, and the request for it."""
+    """A table, its file, and the request for it."""
 
     table: Table
     request: Request
@@ -126,12 +126,12 @@ class Source:
 
     @property
     def rest_length(self) -> float | None:
-        """Rest length asked for, or else that in the file [mm]."""
+        """Rest length as requested, or else of the file [mm]."""
         given = self.request.rest_length or self.table.meta.get("rest_length")
         return float(given) if isinstance(given, int | float) and given > 0 else None
 
     def derived(self, named: Iterable[str]) -> dict[str, str]:
-        """Return the channels asked for that others and the rest length give, each with the other."""
+        """Return requested channels that can be derived by the rest length, each with its source."""
         found: dict[str, str] = {}
         for wanted in self.request.channels or ():
             others = [n for n in named if conversion(wanted, n, self.rest_length) is not None]
@@ -142,7 +142,7 @@ class Source:
     def error(
         self, problem: str, remedy: str, channel: str | None = None, sample: int | None = None
     ) -> DataError:
-        """Return the error for this file; a sample, counted from 0, is named by its row."""
+        """Return the error for this file; a sample, counted from 0, is given by its row."""
         row = None if sample is None else self.table.row(sample)
         return DataError(problem, remedy=remedy, file=self.path, channel=channel, row=row)
 

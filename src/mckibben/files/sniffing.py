@@ -1,4 +1,4 @@
-"""What a text table looks like by its first lines: encoding, separator, decimal mark, header, units."""
+"""Layout of a text table from its first lines: encoding, separator, decimal mark, header, units."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mckibben.files.notices import warn
 from mckibben.files.units import find, find_listed
 
 SEPARATORS = ("\t", ";", "|", ",", None)
-"""In the order in which they are preferred where a file can be read in two ways; None is blanks."""
+"""Separators in order of preference; None is whitespace."""
 
 _ENCODINGS = ("cp1252", "cp932", "gb18030", "cp949", "latin-1")
 _CONTROL = bytes([*range(0x09), *range(0x0E, 0x20), 0x7F])
@@ -24,7 +24,7 @@ _LOOKED_AT = 2**16  # bytes by which the encoding is recognised
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the samples begin, a line counted from 0, and what their columns are called."""
+    """First line of samples, counted from 0, and the column names."""
 
     dialect: Dialect
     headers: list[str]
@@ -33,7 +33,7 @@ class Layout:
 
 
 def decoded(data: bytes, path: Path) -> bytes:
-    """Return a text in UTF-8, its lines ended by line feeds; `DataError` if it is no text."""
+    """Return a text in UTF-8 with line feeds; raise a `DataError` for binary data."""
     start = data[:_LOOKED_AT]
     zeros = [start[at::2].count(0) * 4 > len(start) for at in (0, 1)]
     wide = "utf-16-be" if zeros[0] else "utf-16-le" if zeros[1] else "utf-8"
@@ -50,7 +50,7 @@ def decoded(data: bytes, path: Path) -> bytes:
 
 
 def _foreign(data: bytes, path: Path) -> str:
-    """Decode text in no encoding of Unicode's: by that in which its header has words of `names`."""
+    """Decode text in a non-Unicode encoding: the one in which its header has words of `names`."""
     texts = {}
     for encoding in _ENCODINGS:
         with suppress(UnicodeDecodeError):
@@ -63,7 +63,7 @@ def _foreign(data: bytes, path: Path) -> str:
 
 
 def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) -> Layout:
-    """Return the layout of a table by its first lines; `DataError` if they are comments and blanks.
+    """Return the layout of a table; raise a `DataError` for comments and blanks only.
 
     The header is a row of words before the samples, or else a comment there: that with the most names
     of standard channels, and of several the last. Units are in the row below it.
@@ -115,7 +115,7 @@ def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
 
 
 def _fitness(dialect: Dialect, lines: Sequence[str]) -> tuple[float, bool, bool, int, Dialect]:
-    """Return how well a dialect fits: how many rows of one width are numbers.
+    """Return the fitness of a dialect: the number of numeric rows of one width.
 
     Then whether it cuts the row above these to that width, and whether it cuts at all.
     """
@@ -139,12 +139,12 @@ def _fitness(dialect: Dialect, lines: Sequence[str]) -> tuple[float, bool, bool,
 
 
 def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
-    """Return whether a row of words has the units of those above it: units that are no better names."""
+    """Return whether a row of words has units that are not names."""
     cells = [cell.strip("[]() ") for cell in row if cell]
     found = [find_listed(cell) or (re.search(r"[/*·^]", cell) and find(cell)) for cell in cells]
     return _known(row) <= _known(above) and 2 * sum(map(bool, found)) >= len(cells)
 
 
 def _known(row: Sequence[str]) -> int:
-    """Return how many cells of a row name a standard channel."""
+    """Return the number of cells in a row that name a standard channel."""
     return sum(map(is_standard, row))

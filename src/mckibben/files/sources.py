@@ -1,4 +1,4 @@
-"""The files of a recording: one, several with one signal each, or those in the folder of a bag."""
+"""The files of a recording: one, several with one signal each, or a ROS 2 bag folder."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from mckibben.files.units import convert
 from mckibben.system.ordinary import DESCRIPTION, opened, read_text
 
 BAG = "metadata.yaml"
-"""In the folder of a bag of ROS 2."""
+"""Metadata file of a ROS 2 bag folder."""
 
 PROTOCOL = "protocol.json"
-"""Has the role of each recording in its folder."""
+"""File with the role of each recording in its folder."""
 
 ROLES = ("train", "validation", "test")
 
@@ -74,7 +74,7 @@ def inside(path: Path) -> list[Path]:
 
 
 def roles(path: Path) -> dict[str, list[Path]]:
-    """Return the recordings of a path by role, as its protocol.json has them, or all to train.
+    """Return the recordings of a path by role from its protocol.json, or all to train.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def roles(path: Path) -> dict[str, list[Path]]:
 def expanded(
     files: Sequence[Path], test: Sequence[Path]
 ) -> tuple[list[Path], list[Path], list[Path]]:
-    """Return files to train, to validate and to test on, folders replaced by their recordings.
+    """Return files to train, validate and test on, folders expanded to their recordings.
 
     Recordings in a folder of ``files`` have their own roles; all of ``test`` are to test on. Errors are
     those of `roles`.
@@ -107,7 +107,7 @@ def expanded(
 
 
 def tables(path: Path, request: Request) -> tuple[list[Table], str]:
-    """Return the contents of a recording before they are interpreted, and the SHA-256 of its files.
+    """Return the raw contents of a recording, and the SHA-256 of its files.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def tables(path: Path, request: Request) -> tuple[list[Table], str]:
 
 
 def read_with(path: Path) -> list[Path]:
-    """Return all files that are read where this one is, or this folder; some may be missing.
+    """Return all files that are read with this file or folder; some may be missing.
 
     They are the parts of recordings and what describes them.
     """
@@ -163,7 +163,7 @@ def read_with(path: Path) -> list[Path]:
 
 
 def _parts(path: Path) -> dict[Path, str]:
-    """Return the files of a recording -> the names of their signals, where they are several."""
+    """Return the files of a recording -> the names of their signals, if there are several."""
     if path.is_dir():
         return {each: each.stem for each in _files(path)}
     parts = described(path.parent).parts(path.name)
@@ -187,7 +187,7 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def _are_one(paths: Sequence[Path]) -> bool:
-    """Return whether files are one recording: of one column each, all of different channels."""
+    """Return whether files form one recording: one column each, of different channels."""
     channels: list[str] = []
     for path in paths if len(paths) > 1 else ():
         with warnings.catch_warnings():
@@ -210,7 +210,7 @@ def _are_one(paths: Sequence[Path]) -> bool:
 
 
 def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Request) -> Table:
-    """Return one table of files with one signal each, given the names of the signals."""
+    """Return one table from files with one signal each, given the names of the signals."""
     stamp = request.columns.get("time", request.described.time.column)
     signals: list[Column] = []
     clocks: list[Column] = []
@@ -280,7 +280,7 @@ def _split(table: Table, stamp: str | None) -> tuple[list[Column], list[Column]]
 
 
 def _named(column: Column, name: str) -> Column:
-    """Return a column with the name of its file for the channel, or else with that of its header."""
+    """Return a column named after its file if that is a channel, or else after its header."""
     if is_standard(column.header) and not is_standard(name):
         return replace(column, header=name, says=column.header)
     return replace(column, header=name, unit=column.unit or parse(column.header).unit)

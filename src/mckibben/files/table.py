@@ -1,4 +1,4 @@
-"""A table: the columns of one recording as they are in the file, before they are interpreted."""
+"""Raw table: the columns of one recording before interpretation."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WIDEST = 64
 
 @dataclass(frozen=True)
 class Flaw:
-    """Why a column of numbers cannot be used, as in a `DataError`, and the first sample of which."""
+    """Why a column of numbers cannot be used, as in a `DataError`, and the first bad sample."""
 
     sample: int
     problem: str
@@ -43,7 +43,7 @@ class Column:
 
     @property
     def label(self) -> str:
-        """What names the channel and the unit."""
+        """Text with the channel and the unit."""
         return self.says or self.header
 
     @property
@@ -54,7 +54,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """The columns of one recording in a file, and what else the file holds.
+    """The columns of one recording in a file, and other contents.
 
     The columns are in the order of the file, and of unlike lengths where it holds such vectors.
     """
@@ -71,29 +71,29 @@ class Table:
 
     @property
     def n_samples(self) -> int:
-        """Samples of the first column of numbers, or of the first column."""
+        """Number of samples of the first numeric column, or of the first column."""
         return next(
             (c.values.size for c in self.columns if c.values is not None), self.columns[0].size
         )
 
     @property
     def has_clocks(self) -> bool:
-        """Whether columns have times of their own, so that none of them is the time."""
+        """Whether columns have separate times, so that none of them is the time."""
         return any(column.times is not None for column in self.columns)
 
     @property
     def calibration(self) -> Mapping[str, Any]:
-        """How channels were calibrated when this package wrote them, by their names."""
+        """Calibration of channels in a file written by this package, by name."""
         found = self.meta.get("calibration")
         return found if isinstance(found, Mapping) else {}
 
     def row(self, sample: int) -> int:
-        """Return the row that an error names for a sample counted from 0."""
+        """Return the row number for a sample counted from 0."""
         return sample + 1 if self.lines is None else int(self.lines[sample])
 
 
 def column(header: str, values: NDArray[Any], unit: str | None = None) -> Column:
-    """Return the column of an array of any type; instants become seconds since the first."""
+    """Return the column of an array of any type; instants are converted to seconds since the first."""
     if values.dtype.kind in "mM":
         since = values - values[:1] if values.dtype.kind == "M" else values
         seconds = since.astype("timedelta64[ns]").astype(np.float64) * 1e-9
@@ -104,7 +104,7 @@ def column(header: str, values: NDArray[Any], unit: str | None = None) -> Column
 
 
 def plain_meta(found: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the finite numbers and the texts of a mapping, as JSON holds them."""
+    """Return the finite numbers and the texts of a mapping, as JSON values."""
     meta: dict[str, Any] = {}
     for name, value in found.items():
         if isinstance(value, (np.ndarray, np.generic)) and value.size == 1:
@@ -128,7 +128,7 @@ def is_matrix(shape: Sequence[int]) -> bool:
 
 
 def printable(value: Any) -> Any:
-    r"""Return a table of another program, or what it holds, without control characters in its texts.
+    r"""Return a foreign table, or a part of one, without control characters in its texts.
 
     Blanks of any kind become plain ones; other characters that cannot be printed are written out.
 
@@ -150,7 +150,7 @@ def printable(value: Any) -> Any:
 
 
 def distinct(table: Table) -> Table:
-    """Return a table in which the second column of one header is called ``header (2)``, and so on."""
+    """Return a table with repeated headers numbered, as ``header (2)``."""
     seen: Counter[str] = Counter()
     columns = []
     for column in () if table.own else table.columns:

@@ -1,4 +1,4 @@
-"""NI TDMS: one recording for each group, with the units, starts and increments in its properties."""
+"""NI TDMS files: one recording per group, with units, starts and increments from properties."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mckibben.system.extras import demand
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Read the groups of a TDMS file that hold channels."""
+    """Read the groups with channels of a TDMS file."""
     demand("nptdms", "tdms", "TDMS", file=path)
     from nptdms import TdmsFile
     from nptdms.log import log_manager

@@ -1,4 +1,4 @@
-"""Text tables: CSV, TSV and their kin, with any common separator and decimal mark.
+"""Text tables: CSV, TSV and similar, with any common separator and decimal mark.
 
 This package writes a plain header of channel names, and all else in a sidecar (see `own`).
 """
@@ -45,7 +45,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 def laid_out(
     file: BufferedReader, path: Path, header: int, skip: int, encoding: str | None
 ) -> BufferedReader:
-    """Return a text in UTF-8 whose lines before the header and ``skip`` lines after it are blank.
+    """Return a text in UTF-8 with the lines before the header and ``skip`` lines after it blanked.
 
     The others have the same numbers as before. Errors are those of `mckibben.read`.
     """
@@ -63,7 +63,7 @@ def laid_out(
 
 
 def write(recording: Recording, path: Path) -> None:
-    """Write a recording as text, and its description beside it."""
+    """Write a recording as text, with its description in a second file."""
     import pandas as pd
 
     # 1.38, not 1.3800000000000001: the description has the exact step
@@ -79,7 +79,7 @@ def write(recording: Recording, path: Path) -> None:
 
 
 def _own(data: bytes, path: Path) -> Table | own.Stored | None:
-    """Return the table that the description beside a file is of, or the description of another."""
+    """Return the table described by a sidecar, or a description of another version."""
     try:
         description = own.parse(read_bytes(own.sidecar(path), most=DESCRIPTION))
     except DataError as error:
@@ -101,7 +101,7 @@ def _own(data: bytes, path: Path) -> Table | own.Stored | None:
 
 
 def _frame(data: bytes, dialect: Dialect, names: Sequence[Any], **options: Any) -> Any:
-    """Return a frame of cells, all decimals read to the last bit."""
+    """Return a frame of cells, with decimals read exactly."""
     import pandas as pd
 
     if [int(part) for part in pd.__version__.split(".")[:2]] < [3, 1]:  # later ones do by default
@@ -119,7 +119,7 @@ def _frame(data: bytes, dialect: Dialect, names: Sequence[Any], **options: Any) 
 
 
 def parsed(data: bytes, path: Path, separators: Sequence[str | None] = SEPARATORS) -> Table:
-    """Return the table in a text in UTF-8, whose lines line feeds end; None in separators is blanks."""
+    """Return the table of a text in UTF-8 with line feeds; None in separators is whitespace."""
     named = re.match(rb"\"?sep=([\t;|,])\"?[ \t;|,]*\n", data, re.IGNORECASE)  # a line for Excel
     if named:
         separators = (named[1].decode(),)
@@ -129,7 +129,7 @@ def parsed(data: bytes, path: Path, separators: Sequence[str | None] = SEPARATOR
 
 
 def block(data: bytes, layout: Layout, path: Path, stop: int | None = None) -> Table:
-    """Return the table of the samples of a text, from the line where they begin on.
+    """Return the table of the samples of a text, from their first line on.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def block(data: bytes, layout: Layout, path: Path, stop: int | None = None) -> T
 
 
 def _samples(data: bytes, layout: Layout, path: Path, stop: int | None) -> tuple[list[int], bytes]:
-    """Return the numbers of the lines of samples and their text, with a cell for each header.
+    """Return the numbers of the lines of samples and their text, with a cell per header.
 
     Blank lines, comments, and words or separators alone at the end are left out.
     """
@@ -233,7 +233,7 @@ def _samples(data: bytes, layout: Layout, path: Path, stop: int | None) -> tuple
 
 
 def _shows_decimals(values: Array) -> bool:
-    """Return whether a number shows by its value alone that its mark is for decimals.
+    """Return whether a number's mark is a decimal mark by its value alone.
 
     By another count of digits after it than three, more than three before it, or a zero there.
     """

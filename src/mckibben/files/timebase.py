@@ -1,4 +1,4 @@
-"""From the times of the samples, as recorded, to one uniform time grid."""
+"""Uniform time grid from recorded times."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mckibben.files.quality import wraps
 from mckibben.files.request import Source
 
 Spans = NDArray[np.intp]
-"""Samples from the first to, not including, the second, shape (m, 2)."""
+"""First samples, and those after the last, shape (m, 2)."""
 
 GAP = 3.0
 """Steps longer than this many median steps are gaps; shorter ones are jitter."""
@@ -33,7 +33,7 @@ _SINCE_1970 = {"ms": (1e12, 4.2e12), "us": (1e15, 4.2e15), "ns": (1e18, 4.2e18)}
 
 
 class Step(NamedTuple):
-    """A time step, and how far the recorded steps are from it, in the unit of the times.
+    """A time step, and the deviation of recorded steps from it, in the unit of the times.
 
     ``jitter`` is the root mean square and the largest deviation of a step; None where every time is on
     the grid within the digits that were recorded, and none is lost.
@@ -44,7 +44,7 @@ class Step(NamedTuple):
 
 
 def checked(time: Array, source: Source) -> Array:
-    """Return times that rise: counters that wrap go on, and other times that do not rise are refused.
+    """Return increasing times: wrapping counters are unwrapped; raise an error for others.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def checked(time: Array, source: Source) -> Array:
 
 
 def stated_step(source: Source) -> float | None:
-    """Return the sample time [s] by scalars beside the samples such as ``fs = 50``, with a note.
+    """Return the sample time [s] from scalars in the file such as ``fs = 50``, with a note.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def stated_step(source: Source) -> float | None:
 
 
 def is_rate(name: str) -> bool:
-    """Return whether a scalar of this name is a rate or a sample time.
+    """Return whether a scalar's name is that of a rate or a sample time.
 
     >>> is_rate("Fs"), is_rate("SampleTime"), is_rate("FS")
     (True, True, False)
@@ -116,7 +116,7 @@ def _last(place: str) -> str:
 
 
 def unit_by_size(time: Array, source: Source) -> str | None:
-    """Return the unit of times without one where their size shows it, with a note, or None.
+    """Return the unit of times without one if their size determines it, with a note, or None.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def unit_by_size(time: Array, source: Source) -> str | None:
 
 
 def doubtful_unit(problem: str, step: float, source: Source) -> DataError:
-    """Return the error for times in an uncertain unit, with those that make steps of 0.1 ms to 5 s."""
+    """Return the error for times of uncertain unit, with units that make steps of 0.1 ms to 5 s."""
     shares = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
     fitting = [unit for unit, share in shares.items() if 1e-4 <= share * step <= 5.0] or ["ms"]
     options = " or ".join(f"`units[time]={unit}`" for unit in fitting)
@@ -162,7 +162,7 @@ def doubtful_unit(problem: str, step: float, source: Source) -> DataError:
 
 
 def resolution(time: Array) -> float:
-    """Return the last digit that the times were recorded with.
+    """Return the last recorded digit of the times.
 
     >>> resolution(np.array([0.0, 0.083, 0.167])), resolution(np.array([0.0, 4.0, 8.0]))
     (0.001, 1.0)
@@ -180,7 +180,7 @@ def resolution(time: Array) -> float:
 
 
 def common_step(time: Array, spans: Spans) -> Step:
-    """Return the step that all spans have in common: the shortest decimal that fits them.
+    """Return the common step of all spans: the shortest decimal that fits them.
 
     Rounding of recorded times is distinguished from jitter by the spread of the times about the grid.
     """
@@ -210,7 +210,7 @@ def common_step(time: Array, spans: Spans) -> Step:
 def _fitted(
     t: Array, count: Array, starts: NDArray[np.intp], digit: float, noise: float
 ) -> tuple[float, float]:
-    """Return the step for samples of these counts, and how far times are off its grid (rms)."""
+    """Return the step for samples of these counts, and the rms deviation of times from its grid."""
     lengths = np.diff(starts, append=t.size)
     k = count - np.repeat(count[starts], lengths)
     t_mid, k_mid = (
@@ -229,7 +229,7 @@ def _fitted(
 
 
 def _shortest_first(step: float) -> Iterator[float]:
-    """Yield decimals ever closer to a step, and steps whose rate is such a decimal."""
+    """Yield decimals of increasing accuracy for a step, and steps with such a decimal rate."""
     for digits in range(1, 17):
         yield float(f"{step:.{digits}g}")
         yield 1.0 / float(f"{1.0 / step:.{digits}g}")
@@ -237,6 +237,6 @@ def _shortest_first(step: float) -> Iterator[float]:
 
 
 def agrees(time: Array, step: float) -> bool:
-    """Return whether times are those of a stated step, within the digits recorded."""
+    """Return whether times have a stated step, within the recorded digits."""
     off = np.abs(time - time[0] - step * np.arange(time.size))
     return bool(np.all(off <= max(resolution(time), 1e-3 * step)))

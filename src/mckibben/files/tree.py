@@ -1,4 +1,4 @@
-"""The vectors in a tree of groups, as MATLAB, Simulink, dSPACE, HDF5 and JSON files hold them.
+"""Vectors in a tree of groups, from MATLAB, Simulink, dSPACE, HDF5 and JSON files.
 
 Readers make a plain tree of a file: groups and structs are dicts, struct arrays and cells are lists,
 numbers are arrays, text is str or a list of it. Each array of numbers is a vector, or a matrix of a few,
@@ -37,12 +37,12 @@ UNITS = {"unit", "units"}
 """Fields with the unit of such a signal, or with those of ``NAMES``."""
 
 INFO = "Info"
-"""Ending of a group that describes what is beside it, as ``DataInfo`` does ``Data``."""
+"""Suffix of a group that describes another, as ``DataInfo`` does ``Data``."""
 
 
 @dataclass(frozen=True)
 class Unread:
-    """What holds data and cannot be read, and the reason in a few words."""
+    """Data that cannot be read, and the reason in a few words."""
 
     reason: str
 
@@ -117,7 +117,7 @@ def table(
 
 
 def without_numbers(unread: Mapping[str, str], path: Path) -> DataError:
-    """Return the error for a file that has no vectors, only what is not read."""
+    """Return the error for a file without vectors, listing what is not read."""
     reasons = listed([f"{place} ({reason})" for place, reason in unread.items()])
     return DataError(
         "there are no vectors of numbers in it" + (f"; not read: {reasons}" if unread else ""),
@@ -127,7 +127,7 @@ def without_numbers(unread: Mapping[str, str], path: Path) -> DataError:
 
 
 def _leaves(node: Any, place: Place) -> Iterator[tuple[Place, Node]]:
-    """Yield the arrays and texts in a tree; elements of lists that are not one leaf are numbered."""
+    """Yield the arrays and texts in a tree; elements of other lists are numbered."""
     while isinstance(node, list) and len(node) == 1:
         node = node[0]
     if isinstance(node, list):
@@ -144,7 +144,7 @@ def _leaves(node: Any, place: Place) -> Iterator[tuple[Place, Node]]:
 
 
 def _merged(nodes: Sequence[Any]) -> Node | None:
-    """Return the vector of scalars, the texts, or the struct of such of a struct array, or None."""
+    """Return the merged vector, texts, or struct of a struct array, or None."""
     words = [isinstance(each, str) for each in nodes]
     scalars = [isinstance(each, np.ndarray) and each.size == 1 for each in nodes]
     if all(words):
@@ -162,7 +162,7 @@ def _merged(nodes: Sequence[Any]) -> Node | None:
 def _vectors(
     arrays: Mapping[Place, NDArray[Any]], leaves: Mapping[Place, Node], dot: str
 ) -> tuple[dict[Place, Column], dict[Place, tuple[Place, ...]]]:
-    """Return the vectors and columns of matrices by place, and the places that units of them may have.
+    """Return the vectors and matrix columns by path, and the paths where units of them may be.
 
     The first of these is the group that a vector stands for, or itself.
     """
@@ -218,7 +218,7 @@ def _units(
     own: Mapping[Place, tuple[Place, ...]],
     leaves: Mapping[Place, Node],
 ) -> dict[Place, set[str]]:
-    """Return the units stated for vectors, or else for their names in a group beside."""
+    """Return the units stated for vectors, or for their names in a neighbouring group."""
     groups = {at[:-1] for at, leaf in leaves.items() if isinstance(leaf, str) and find(leaf)}
     signals = {*own, *(places[0] for places in own.values())}
     units: dict[Place, set[str]] = {}
@@ -249,7 +249,7 @@ def _timed(
     unread: dict[str, str],
     dot: str,
 ) -> dict[Place, Column]:
-    """Return the columns without repeated times, each with its times [s] where clocks differ."""
+    """Return the columns without repeated times, each with its times [s] if clocks differ."""
     seconds = {
         place: times for place, each in columns.items() if (times := _seconds(each)) is not None
     }
@@ -268,7 +268,7 @@ def _timed(
     if all(np.array_equal(seconds[first], seconds[time], equal_nan=True) for time in others):
         return {place: each for place, each in columns.items() if place not in others}
     rest = [place for place in columns if place not in {first, *others, *clocks}]
-    unread |= {dot.join(at): "it has no times, and others have their own" for at in sorted(rest)}
+    unread |= {dot.join(at): "it has no times, but others have" for at in sorted(rest)}
     return {place: replace(columns[place], times=seconds[time]) for place, time in clocks.items()}
 
 

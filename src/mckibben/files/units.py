@@ -1,4 +1,4 @@
-"""Units as people write them, converted to the package's: bar, mm, N, s, rad, V, mm/s, degC.
+"""Units, converted to the package's: bar, mm, N, s, rad, V, mm/s, degC.
 
 The spellings in common use are listed here, with their dimension; pint does the conversions and
 reads everything that is not listed. It is only imported when there is something to convert.
@@ -50,13 +50,13 @@ RARE: dict[str, dict[str, str]] = {
     "mm": {"nm": "nm nanometer nanometers", "thou": "mil mils thou", "dm": "dm", "km": "km"},
     "N": {"daN": "daN", "cN": "cN"},
 }  # fmt: skip
-"""The same for units that are understood and never proposed."""
+"""The same for units that are understood and never suggested."""
 
 MASSES = {
     "gf": ("g", "gram", "grams"), "kgf": ("kg", "kilogram", "kilograms"),
     "lbf": ("lb", "lbs", "pound", "pounds"),
 }  # fmt: skip
-"""Unit of force -> those of the mass that hangs with it."""
+"""Unit of force -> units of the mass with that weight."""
 
 COUNTS = frozenset(
     (
@@ -64,7 +64,7 @@ COUNTS = frozenset(
         *("px", "pixel", "pixels", "adc", "raw", "pulse", "pulses", "inc", "steps"),
     )
 )
-"""What converters and cameras count: no unit, and never that of a channel."""
+"""Units of converter counts and pixels, which are no units of a channel."""
 
 GAUGE = re.compile(
     r"(?P<unit>m?bar|[hkM]?Pa|psi)[\s_(\[]*(?P<kind>gauge|absolute|abs|g|a)[)\]]?", re.IGNORECASE
@@ -77,7 +77,7 @@ _LOOK_ALIKES = str.maketrans({"º": "°", "µ": "u", "μ": "u", "⋅": "·", "�
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit by its name for pint, and the package's of that dimension, None where there is none.
+    """A unit by its pint name, and the package's unit of that dimension, or None.
 
     ``reference`` is what a pressure is measured from, where the unit states it; no offset is ever
     removed.
@@ -102,7 +102,7 @@ def find_listed(text: str) -> Unit | None:
 
 
 def find(text: str) -> Unit | None:
-    """Return the unit that ``text`` means, or None if it means none.
+    """Return the unit of ``text``, or None if it is not one.
 
     >>> find("kPa"), find("psig").reference, find("nonsense")
     (Unit(name='kPa', target='bar', reference=None), 'gauge', None)
@@ -122,7 +122,7 @@ def find(text: str) -> Unit | None:
 
 
 def weight(text: str) -> str:
-    """Return the unit of the force by which a mass hangs for that of a mass; others as they are.
+    """Return the unit of weight for a unit of mass; others unchanged.
 
     >>> weight("kg"), weight("kN")
     ('kgf', 'kN')
@@ -131,7 +131,7 @@ def weight(text: str) -> str:
 
 
 def convert(samples: Array, unit: str, target: str) -> Array:
-    """Return samples in ``target``; untouched where it is the unit that they have.
+    """Return samples in ``target``; unchanged if it is their unit.
 
     >>> import numpy as np
     >>> convert(np.array([100.0, 250.0]), "kPa", "bar").tolist()
@@ -188,6 +188,6 @@ def _ask_pint(text: str) -> Unit | None:
 
 
 def _plain(text: str) -> str:
-    """Write the look-alikes of one sign in one way."""
+    """Replace look-alike characters by one form."""
     text = unicodedata.normalize("NFKC", text.replace("º", "°")).translate(_LOOK_ALIKES)
     return re.sub(r" ?([/*·]) ?", r"\1", " ".join(text.split()))

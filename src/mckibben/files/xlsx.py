@@ -1,4 +1,4 @@
-"""Spreadsheets: a sheet as a text table, so that titles, units and headers are found alike."""
+"""Spreadsheets: a sheet as a text table, so that titles, units and headers are parsed alike."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _DOUBTFUL = re.compile(r"[+-]?\d{1,3}[.,]\d{3}", re.ASCII)
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Read the first sheet with numbers, or the one that ``channels.toml`` names."""
+    """Read the first sheet with numbers, or the one of ``channels.toml``."""
     demand("openpyxl", "xlsx", "spreadsheets", file=path)
     import openpyxl
 
@@ -49,7 +49,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 
 
 def _text(sheet: Any) -> bytes | None:
-    """Return a sheet as text, a line for each row and tabs between; None where it has no numbers."""
+    """Return a sheet as text, with a line per row and tabs between; None without numbers."""
     rows = list(sheet.iter_rows(values_only=True))
     if not any(isinstance(value, (int, float)) for row in rows for value in row):
         return None
@@ -60,7 +60,7 @@ def _text(sheet: Any) -> bytes | None:
 
 
 def _cell(value: object) -> str:
-    """Return a cell as the reader of texts takes it; numbers in a form that has no second meaning."""
+    """Return a cell as text for the table reader; numbers in an unambiguous form."""
     if value is None:
         return ""
     if isinstance(value, datetime.timedelta):

@@ -1,4 +1,4 @@
-"""Folders of recordings, and what of each is fitted and tested: ``split`` in its ``channels.toml``.
+"""Folders of recordings, and their fit and test data: ``split`` in their ``channels.toml``.
 
 A folder without that file, and of a name in ``known``, is read by the description there.
 """
@@ -26,7 +26,7 @@ from mckibben.recording import Recording
 from mckibben.signals import resample
 
 KNOWN = Path(str(resources.files("mckibben.measured"))) / "known"
-"""Descriptions of public recordings, by the name of their folder: ``NAME.toml``."""
+"""Descriptions of public data sets, by the name of their folder: ``NAME.toml``."""
 
 
 class _Strict(BaseModel):
@@ -34,14 +34,14 @@ class _Strict(BaseModel):
 
 
 class Published(_Strict):
-    """A figure printed for the same test: whose it is, and its RMSE in the unit of the output."""
+    """A printed figure for the same test: its source, and its RMSE in the unit of the output."""
 
     what: str
     rmse: float
 
 
 class Task(_Strict):
-    """What is fitted and what is tested.
+    """Fit and test data.
 
     Parameters
     ----------
@@ -86,13 +86,13 @@ class Task(_Strict):
         return [*self.test, *self.leave_out]
 
     def parts(self) -> list[Task]:
-        """Return the task, or one for every pattern that is left out in turn."""
+        """Return the task, or one for every pattern of a leave-one-out task."""
         each = [self.model_copy(update={"leave_out": [pattern]}) for pattern in self.leave_out]
         return each or [self]
 
 
 class Split(_Strict):
-    """A folder's tasks, and how its recordings are made even.
+    """A folder's tasks, and how its recordings are resampled.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class Split(_Strict):
 
 
 def split_of(given: dict[str, Any] | None, file: str | Path = NAME) -> Split:
-    """Return a table ``split``, checked; without one, a single task with compare's own split."""
+    """Return a table ``split``, checked; without one, a single task with the default split."""
     try:
         return Split.model_validate(given or {})
     except ValidationError as error:
@@ -157,7 +157,7 @@ class Set:
         return self.split.title or self.name
 
     def recordings(self) -> list[Recording]:
-        """Return all recordings, even in time, each named as its file."""
+        """Return all recordings, resampled, each named as its file."""
         split, found = self.split, list[Recording]()
         with describing(self.folder, self.description):
             for path in inside(self.folder):
@@ -168,7 +168,7 @@ class Set:
         return found
 
     def tasks(self) -> Iterator[Task]:
-        """Give every task; one that leaves out in turn is several."""
+        """Yield every task; a leave-one-out task is several."""
         names = [path.stem for path in self.folder.iterdir()]
         for task in self.split.tasks:
             if not task.optional or any(matches(name, task.tested) for name in names):
@@ -189,7 +189,7 @@ def _periods(one: Recording, length: int) -> list[Recording]:
 
 
 def sets_in(folder: Path) -> list[Set]:
-    """Return the sets of a folder: each folder in it with recordings, or itself.
+    """Return the sets of a folder: its subfolders with recordings, or itself.
 
     Raises
     ------
@@ -234,7 +234,7 @@ def _set(place: Path) -> Set:
 def parted(
     task: Task, recordings: Sequence[Recording], folder: Path
 ) -> tuple[list[Recording], list[Recording]]:
-    """Return what a task fits, and what it tests on: nothing where the comparison is to split.
+    """Return the fit and test data of a task; no test data for the default split.
 
     Raises
     ------

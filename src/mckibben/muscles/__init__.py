@@ -1,4 +1,4 @@
-"""Identified muscles, and what they say of others before these are recorded."""
+"""Identified muscles, and priors derived from them."""
 
 from mckibben.muscles.library import Muscle as Muscle
 from mckibben.muscles.library import described as described

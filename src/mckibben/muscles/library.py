@@ -1,4 +1,4 @@
-"""Identified muscles as files: TOML that a person can read, one a muscle."""
+"""Identified muscles as readable TOML files, one per muscle."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from mckibben.system.ordinary import DESCRIPTION, read_text
 FORMAT, VERSION = "mckibben-muscle", 1
 
 HEADING = ("format", "version", "kind")
-"""Of a saved balance, which a muscle's file leaves out."""
+"""Fields of a saved balance that a muscle's file leaves out."""
 
 FOLDER = Path(__file__).parent / "library"
 
 UNSURE = 0.5
-"""Standard error of a trait's logarithm from which its recordings have not told it."""
+"""Standard error of a trait's logarithm above which its recordings do not determine it."""
 
 
 class Conditions(BaseModel):
-    """What a muscle was identified under: lowest and highest of each."""
+    """Conditions of a muscle's identification: lowest and highest of each."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -85,7 +85,7 @@ class Muscle:
     balance : Balance
         As fitted.
     errors : array
-        Standard errors of its traits (`mckibben.muscles.traits`); NaN of those not told.
+        Standard errors of its traits (`mckibben.muscles.traits`); NaN of undetermined ones.
     """
 
     name: str
@@ -99,7 +99,7 @@ class Muscle:
     errors: Array
 
     def summary(self) -> dict[str, Any]:
-        """Return what it is and its data sheet, for JSON."""
+        """Return its description and its data sheet, for JSON."""
         named = {key: getattr(self, key) for key in ("title", "virtual", "source", "licence")}
         return named | {"sheet": self.sheet.model_dump(exclude_none=True)}
 
@@ -111,19 +111,19 @@ class Muscle:
 
     @property
     def traits(self) -> Array:
-        """What its recordings told of it, the rest NaN."""
+        """Traits determined by its recordings, others NaN."""
         found = traits(self.balance, self.sheet)
         return np.where(self.errors < UNSURE, found, np.nan)
 
 
 @cache
 def names() -> tuple[str, ...]:
-    """Return the names of the muscles that come with the package, in alphabetical order."""
+    """Return the names of the muscles of the package, in alphabetical order."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
 def list() -> tuple[Muscle, ...]:  # noqa: A001
-    """Return the muscles that come with the package, by their names.
+    """Return the muscles of the package, by name.
 
     >>> import mckibben
     >>> "mas20-hanging" in [muscle.name for muscle in mckibben.muscles.list()]
@@ -195,7 +195,7 @@ def _load(path: Path) -> Muscle:
 
 
 def parsed(path: Path) -> dict[str, Any]:
-    """Return what a TOML file holds.
+    """Return the contents of a TOML file.
 
     Raises
     ------
@@ -221,7 +221,7 @@ def described(muscle: Muscle) -> str:
     text += [f"virtual = {_toml(muscle.virtual)}", "", "[sheet]"]
     text += _pairs(muscle.sheet.model_dump(exclude_none=True))
     text += ["", "[conditions]", *_pairs(muscle.conditions.model_dump(exclude_none=True))]
-    text += ["", "[uncertainty]  # standard errors of the logarithms of its traits; inf: not told"]
+    text += ["", "[uncertainty]  # standard errors of the logarithms of its traits; inf: unknown"]
     text += [f"{name} = {_toml(muscle.errors[place].tolist())}" for name, place in PLACES.items()]
     text += ["", "[balance]", *_pairs({k: v for k, v in block.items() if k not in left})]
     text += _pairs({k: block[k] for k in block if k in channels})

@@ -1,4 +1,4 @@
-"""What the library says of a muscle before it is recorded: a Gaussian over its traits."""
+"""Prior of a muscle from the library: a Gaussian over its traits."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from mckibben.muscles.sheet import Sheet, refused
 from mckibben.muscles.traits import COUNT, PLACES, POSITIONS
 
 ALIKE = 0.1
-"""Logarithm by which muscles of one make and size differ."""
+"""Standard deviation of the logarithm among muscles of one make and size."""
 
 NEAR = 0.25
-"""Logarithm of size, slenderness or braid over which muscles get unlike."""
+"""Correlation length of the logarithm of size, slenderness and braid."""
 
 ZERO = 0.03
-"""Share of the rest length by which displacements count from elsewhere."""
+"""Standard deviation of the origin of displacements, relative to the rest length."""
 
 SMOOTH, FINE = 1.0, 0.03
-"""Neighbours over which traits of a name go together, and what each has alone."""
+"""Correlation length of a trait's numbers, in neighbours, and the independent part of each."""
 
 FEWEST = 3
-"""Muscles that tell of a spread."""
+"""Smallest number of muscles for estimating a spread."""
 
 MIDDLE = 0.8413
-"""Quantile at which a Gaussian is one deviation from its mean."""
+"""Quantile of a normal distribution at one standard deviation."""
 
-UNTOLD = 1.0
-"""Spread of what fewer tell."""
+DEFAULT_SPREAD = 1.0
+"""Spread assumed with fewer muscles."""
 
 
 @dataclass(frozen=True)
 class Prior:
-    """What is likely of a muscle's traits.
+    """Prior of a muscle's traits.
 
     Traits of a name go up and down together by a level, and differ from it by a smooth shape.
 
@@ -71,7 +71,7 @@ class Prior:
         return np.asarray(self.levels[name] ** 2 + curved + FINE**2 * np.eye(len(place)))
 
     def weights(self) -> Array:
-        """Return rows that make independent numbers of deviation 1 of traits less their mean."""
+        """Return rows that normalise deviations of traits from their mean to unit covariance."""
         rows = []
         for name, place in PLACES.items():
             known = np.flatnonzero(np.isfinite(self.mean[place]))
@@ -83,7 +83,7 @@ class Prior:
 
 
 def prior_of(given: str | Path | Sheet, *, without: Sequence[str] = ()) -> Prior:
-    """Return what the library says of a muscle.
+    """Return the prior of a muscle from the library.
 
     Parameters
     ----------
@@ -119,14 +119,14 @@ def prior_of(given: str | Path | Sheet, *, without: Sequence[str] = ()) -> Prior
 
 
 def _with(own: Muscle | None, muscles: list[Muscle], without: Sequence[str]) -> list[Muscle]:
-    """Return the muscles that are asked: a user's own too, unless it is one of them already."""
+    """Return the muscles used: also a user's own, unless it is one of them already."""
     if own is None or own.name in without or any(one.balance == own.balance for one in muscles):
         return muscles
     return [*(one for one in muscles if one.name != own.name), own]
 
 
 def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = None) -> Prior:
-    """Return what some muscles say of one with a data sheet, or of the same make as one of them.
+    """Return the prior by some muscles of one with a data sheet, or of the same make as one of them.
 
     Their traits are taken for a Gaussian process over size, slenderness and braid (kriging): near a
     muscle its own traits are likely, and far from all their mean, with the spread of all.
@@ -135,7 +135,7 @@ def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = No
         raise DataError("there are no muscles to derive a prior from", remedy="leave fewer out")
     muscles = sorted(muscles, key=lambda muscle: muscle.name)
     table = np.array([muscle.traits for muscle in muscles])
-    told = np.isfinite(table)
+    known = np.isfinite(table)
     shapes = np.array([muscle.sheet.shape for muscle in muscles])
     here = sheet.shape if like is None else like.sheet.shape
     mean = np.full(COUNT, np.nan)
@@ -144,19 +144,19 @@ def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = No
         level, shape = _spreads(table[:, place])
         spread = float(np.hypot(level, shape))
         for number in range(place.start, place.stop):
-            which = told[:, number]
+            which = known[:, number]
             if which.any():
                 middle = float(table[which, number].mean())
                 share, _ = _shares(shapes[which], here, spread)
                 mean[number] = middle + share @ (table[which, number] - middle)
-        left = _shares(shapes[told[:, place].any(axis=1)], here, spread)[1]
+        left = _shares(shapes[known[:, place].any(axis=1)], here, spread)[1]
         of_levels[name] = float(np.hypot(left * level, ALIKE))
         of_shapes[name] = float(np.hypot(left * shape, ALIKE))
     return Prior(sheet, mean, of_levels, of_shapes, ZERO * sheet.rest_length_mm)
 
 
 def _shares(shapes: Array, here: Array, spread: float) -> tuple[Array, float]:
-    """Return how much of each muscle's deviation one here has, and the share of spread left."""
+    """Return the weight of each muscle's deviation, and the remaining share of the spread."""
     if not len(shapes):
         return np.zeros(0), 1.0
 
@@ -171,20 +171,20 @@ def _shares(shapes: Array, here: Array, spread: float) -> tuple[Array, float]:
 
 
 def _spreads(table: Array) -> tuple[float, float]:
-    """Return the deviations of muscles' levels, and of shapes from these, as few muscles tell them.
+    """Return the spreads of muscles' levels, and of shapes about these, allowing for few muscles.
 
     A new one's is Student's; the Gaussian with the same middle two thirds is taken.
     """
-    told = np.isfinite(table)
-    muscles = told.any(axis=1)
+    known = np.isfinite(table)
+    muscles = known.any(axis=1)
     n = int(muscles.sum())
     if n < FEWEST:
-        return UNTOLD, UNTOLD
-    table, told = table[muscles], told[muscles]
-    away = np.where(told, table, 0.0)
-    away = np.where(told, away - away.sum(axis=0) / np.maximum(told.sum(axis=0), 1), 0.0)
-    level = away.sum(axis=1) / told.sum(axis=1)
-    shape = np.where(told, away - level[:, np.newaxis], 0.0)
+        return DEFAULT_SPREAD, DEFAULT_SPREAD
+    table, known = table[muscles], known[muscles]
+    away = np.where(known, table, 0.0)
+    away = np.where(known, away - away.sum(axis=0) / np.maximum(known.sum(axis=0), 1), 0.0)
+    level = away.sum(axis=1) / known.sum(axis=1)
+    shape = np.where(known, away - level[:, np.newaxis], 0.0)
     free = n - 1
     new = (1.0 + 1.0 / n) * float(stdtrit(free, MIDDLE)) ** 2
     of_level = float(np.sqrt(new * (level - level.mean()) @ (level - level.mean()) / free))

@@ -1,4 +1,4 @@
-"""A muscle's balance of forces at another size, by geometry alone.
+"""A muscle's force balance at another size, by geometry alone.
 
 Lengths go with the stroke, forces per bar with the area at rest, pressures with the highest. What is
 elastic, rubs or relaxes is bladder and braid under that pressure, so that forces go with its pull, and
@@ -19,7 +19,7 @@ from mckibben.muscles.sheet import Sheet
 
 
 def scaled(balance: Balance, of: Sheet, to: Sheet) -> Balance:
-    """Return the balance that a muscle would have were it of another size.
+    """Return the force balance of a muscle scaled to another size.
 
     Parameters
     ----------

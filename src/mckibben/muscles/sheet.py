@@ -1,4 +1,4 @@
-"""What a muscle's data sheet says, and what geometry alone makes of it: the scales of a muscle."""
+"""A muscle's data sheet, and its scales by geometry."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from mckibben.errors import DataError
 NEWTON_PER_BAR_MM2 = 0.1
 
 USED = 0.75
-"""Share of the contraction at which a braid pulls no more that muscles reach without a load."""
+"""Largest contraction of a muscle without load, relative to that at which its braid's pull is zero.
+"""
 
 
 class Sheet(BaseModel):
@@ -53,7 +54,7 @@ class Sheet(BaseModel):
     without: list[str] | None = None
 
     def model_post_init(self, _: Any) -> None:
-        """Refuse a sheet that tells no braid."""
+        """Raise an error for a sheet that does not determine the braid."""
         if self.braid_angle_deg is None and self.max_force_N is None:
             raise ValueError("it has neither braid_angle_deg nor max_force_N")
         if self.braid_angle_deg is None and not 0.4 < self._pull < 60:
@@ -102,7 +103,7 @@ class Sheet(BaseModel):
 
     @property
     def shape(self) -> Array:
-        """Size, slenderness and braid, in logarithms: muscles near one another here are alike."""
+        """Logarithms of size, slenderness and braid: coordinates of similarity between muscles."""
         return np.log(
             [self.diameter_mm, self.rest_length_mm / self.diameter_mm, math.sqrt(self.braid[0])]
         )
@@ -114,7 +115,7 @@ class Sheet(BaseModel):
 
 
 def refused(error: ValidationError, file: str | Path | None, what: str) -> DataError:
-    """Return the first thing that was refused of a file as a `DataError`."""
+    """Return the first validation error of a file as a `DataError`."""
     first = error.errors(include_url=False)[0]
     place = ".".join(str(part) for part in first["loc"])
     said = first["msg"][0].lower() + first["msg"][1:]

@@ -1,4 +1,4 @@
-"""What a balance of forces says of a muscle, whatever its size: numbers to compare muscles by.
+"""Traits of a muscle's force balance, independent of its size, for comparison.
 
 A data sheet gives the scales: the area at rest A and its loss with contraction by the braid's geometry,
 the stroke, the highest pressure P, the force P A. Over these, in logarithms, are taken
@@ -26,16 +26,16 @@ from mckibben.blocks.coupled.balance import Balance
 from mckibben.muscles.sheet import Sheet
 
 ALONG = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
-"""Contractions, as shares of the largest."""
+"""Contractions of the traits, relative to the largest."""
 
 TRAVELS = np.geomspace(0.001, 0.2, 6)
-"""From a reversal, as shares of the stroke."""
+"""Distances from a reversal, relative to the stroke."""
 
 PRESSURES = np.array([0.25, 0.75])
-"""At which friction is looked at, as shares of the highest."""
+"""Pressures at which friction is evaluated, relative to the highest."""
 
 TIMES = np.array([0.1, 0.4, 1.6, 6.4, 25.6, 102.4])
-"""After which stiffness has not relaxed yet [s]."""
+"""Times at which relaxation is evaluated [s]."""
 
 LEAST = {"elasticity": 0.05, "friction": 3e-4, "relaxation": 0.03, "damping": 1e-3, "wall": 3e-3}
 """What hardly matters: of the force at the largest contraction, of force, of elastic stiffness, of force
@@ -51,29 +51,29 @@ GROUPS = {
     "wall": 1,
     "offset": 1,
 }
-"""Names of traits, and how many numbers each has."""
+"""Names of traits, and their number of entries."""
 
 GRIDS = {"friction": (PRESSURES.size, TRAVELS.size)}
-"""Of names whose numbers are no row."""
+"""Shapes of traits that are not vectors."""
 
 _ENDS = np.cumsum([0, *GROUPS.values()]).tolist()
 PLACES = {
     name: slice(first, last)
     for name, first, last in zip(GROUPS, _ENDS[:-1], _ENDS[1:], strict=True)
 }
-"""Where those of a name are among all."""
+"""Slices of the traits in the vector of all."""
 
 POSITIONS = {
     name: np.stack([grid.ravel() for grid in np.indices(GRIDS.get(name, (count,)))], axis=1)
     for name, count in GROUPS.items()
 }
-"""Where each number of a name is among its neighbours, shape (numbers, ways)."""
+"""Coordinates of each entry within its trait, shape (entries, axes)."""
 
 COUNT: int = _ENDS[-1]
 
 
 def traits(balance: Balance, sheet: Sheet, zero: float = 0.0) -> Array:
-    """Return the traits of a muscle, those that it has not as NaN.
+    """Return the traits of a muscle, undetermined ones as NaN.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def _log(values: object, least: float = 1e-6) -> Array:
 
 
 def _straight(powers: Array, balance: Balance, y: Array) -> Array:
-    """Return a polynomial, which goes on straight beyond what is known."""
+    """Return a polynomial with linear extrapolation."""
     inside = np.clip(y, balance.hull[0][0], balance.hull[0][1])
     u = inside / balance.scale
     slope = polynomial.polyval(u, polynomial.polyder(powers)) / balance.scale

@@ -1,1 +1,1 @@
-"""The papers, one folder each: its protocol, what it prints, and its re-run, published beside ours."""
+"""The papers, one folder each: protocol, printed results, and re-run."""

@@ -1,4 +1,4 @@
-"""The re-run of a paper: recordings, fits, free runs, tables and figures, by one builder for all papers.
+"""Re-run of a paper: recordings, fits, free runs, tables and figures, by one builder for all papers.
 
 A paper's module says what is recorded, fitted and compared; every word of it is in its ``paper.toml``.
 """
@@ -31,19 +31,19 @@ Cell = str | float | None
 Curves = Mapping[str, tuple[Array, Array]]
 Progress = Callable[[float, str], None]
 
-OWN = "Recordings of one's own: where words name the paper's signals, they are those of its rig."
+OWN = "User recordings; descriptions of signals refer to the paper's rig."
 
 MOST = 2000
 """Points of a curve that is drawn."""
 
 
 def _no_progress(share: float, text: str) -> None:
-    """Take no notice of progress."""
+    """Ignore progress."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of a re-run: its words, filled in, headings with units, and rows of cells.
+    """A table of a re-run: its texts, filled in, headings with units, and rows of cells.
 
     Headings of printed figures end with ``", printed"``.
     """
@@ -54,7 +54,7 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the table as ``tables.json`` holds it."""
+        """Return the table as in ``tables.json``."""
         rows = [dict(zip(self.columns, row, strict=True)) for row in self.rows]
         words = {"title": self.text.title, "of": self.text.of, "note": self.text.note}
         return {"key": self.key, **words, "rows": rows}
@@ -62,7 +62,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a re-run: its words, and panels of curves by their titles."""
+    """A figure of a re-run: its texts, and panels of curves by their titles."""
 
     key: str
     text: FigureText
@@ -71,7 +71,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Reproduction:
-    """A paper's experiment, run again: on a rig or recordings, with what differs as notes."""
+    """A re-run of a paper's experiment: on a rig or recordings, with notes on differences."""
 
     name: str
     paper: Paper
@@ -84,7 +84,7 @@ class Reproduction:
     seed: int = 0
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all but the figures, as ``tables.json`` holds it."""
+        """Return all but the figures, as in ``tables.json``."""
         return {
             "name": self.name,
             "title": self.paper.title,
@@ -100,7 +100,7 @@ class Reproduction:
 
 @dataclass(frozen=True)
 class Fitted:
-    """What a fit gave.
+    """Result of a fit.
 
     ``rmse`` is the free-running error on the data fitted, in the unit of the output, of several the
     largest; ``standard_errors`` are of ``block.pack()``, NaN where not known; ``search`` is the least
@@ -118,21 +118,21 @@ class Fitted:
 
 
 class Labels(NamedTuple):
-    """What a recording is for: role, and labels as in the paper's protocol (stage, load, frequency)."""
+    """Role of a recording, and labels as in the paper's protocol (stage, load, frequency)."""
 
     role: Role
     labels: Mapping[str, Any]
 
 
 class Runs(dict[str, Recording]):
-    """Recordings by name, in the order of the protocol, with what each is for."""
+    """Recordings by name, in the order of the protocol, with roles and labels."""
 
     def __init__(self, recordings: Mapping[str, Recording], labels: Mapping[str, Labels]) -> None:
         super().__init__(recordings)
         self.labels = labels
 
     def names(self, role: Role | None = None, **labels: Any) -> list[str]:
-        """Return the names of recordings of a role, and with all of the labels."""
+        """Return the names of recordings of a role that have all of the labels."""
         return [
             name
             for name, given in self.labels.items()
@@ -141,7 +141,7 @@ class Runs(dict[str, Recording]):
         ]
 
     def select(self, role: Role | None = None, **labels: Any) -> list[Recording]:
-        """Return the recordings of a role, and with all of the labels."""
+        """Return the recordings of a role that have all of the labels."""
         return [self[name] for name in self.names(role, **labels)]
 
     def of(self, name: str, label: str) -> Any:
@@ -150,7 +150,7 @@ class Runs(dict[str, Recording]):
 
 
 class Rerun(NamedTuple):
-    """What a paper's module gives.
+    """Interface of a paper's module.
 
     ``run`` fills an `Experiment`. ``sort`` takes recordings of one's own and returns what each is for,
     or None for one without use; it raises DataError where one that is needed is missing.
@@ -162,7 +162,7 @@ class Rerun(NamedTuple):
 
 @dataclass
 class Experiment:
-    """A paper's experiment under way.
+    """A paper's experiment in progress.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ class Experiment:
         self._free: dict[tuple[str, int], tuple[Recording, Recording]] = {}
 
     def within(self, low: float, high: float) -> Progress:
-        """Return what reports the progress of a part."""
+        """Return the progress callback of a part."""
         return lambda share, text: self.tell(low + (high - low) * share, text)
 
     def record(
@@ -203,7 +203,7 @@ class Experiment:
         *,
         until: float = 0.3,
     ) -> Runs:
-        """Return the runs of the paper's protocol on the rig, or one's own recordings, sorted.
+        """Return the runs of the paper's protocol on the rig, or the user's recordings, sorted.
 
         Parameters
         ----------
@@ -226,7 +226,7 @@ class Experiment:
         return Runs(runs, {name: Labels(plan[name].role, plan[name].labels) for name in runs})
 
     def _complete(self, one: Recording) -> Recording:
-        """Return a recording with all channels that the paper needs, or refuse it."""
+        """Return a recording with all channels that the paper needs; raise an error otherwise."""
         one = one.with_derived(self.paper.channels)
         for channel in self.paper.channels:
             if channel not in one:
@@ -241,7 +241,7 @@ class Experiment:
         return one
 
     def _given(self, data: Sequence[Recording]) -> Runs:
-        """Return recordings with what they are for: as a rig has noted it, or by what was driven."""
+        """Return recordings with roles: as noted by a rig, or by their driving signals."""
         labels: Sequence[Labels | None]
         if all(one.meta.get("protocol") == self.name for one in data):
             labels = [Labels(one.meta["role"], one.meta["labels"]) for one in data]
@@ -265,7 +265,7 @@ class Experiment:
         settings: Mapping[str, Any] | None = None,
         **how: Any,
     ) -> Fitted:
-        """Return what an estimator finds on recordings, or found before the work was stopped.
+        """Return the model fitted to recordings, or its stored fit.
 
         The block is one of ``models`` from then on, under its name. ``model`` is the estimator's short
         name; ``how`` is what else its ``fit`` takes. Errors are those of its ``fit``.
@@ -291,7 +291,7 @@ class Experiment:
         return fitted
 
     def simulate(self, name: str, recording: Recording) -> Recording:
-        """Return the free run of a model over a recording, run at the first call only."""
+        """Return the free run of a model on a recording, cached."""
         key = name, id(recording)
         if key not in self._free:
             with warnings.catch_warnings(record=True) as caught:
@@ -308,7 +308,7 @@ class Experiment:
         rows: Mapping[str, Sequence[Cell]] | Sequence[Sequence[Cell]],
         **facts: Any,
     ) -> None:
-        """Add a table of ours; printed figures of ``paper.toml`` come before the columns they belong to.
+        """Add a table of ours; printed figures of ``paper.toml`` precede their columns.
 
         Parameters
         ----------
@@ -338,7 +338,7 @@ class Experiment:
         self.tables.append(Table(key, filled, (*full,), (*zip(*full.values(), strict=True),)))
 
     def figure(self, key: str, panels: Mapping[str, Curves]) -> None:
-        """Add a figure: title of a panel -> name of a curve -> its x and y, of which some are drawn.
+        """Add a figure: panel title -> curve name -> its x and y, of which some are drawn.
 
         Without any panel there is no figure.
         """
@@ -351,11 +351,11 @@ class Experiment:
         self.figures.append(Figure(key, self.paper.figures[key], drawn))
 
     def says(self, **facts: Any) -> None:
-        """Give facts that fill the sentences of ``paper.toml``."""
+        """Set facts for the sentences of ``paper.toml``."""
         self.facts |= facts
 
     def done(self, on: str) -> Reproduction:
-        """Return all that came out; a sentence without its facts is left out."""
+        """Return all results; sentences without facts are left out."""
         sentences = []
         for text in self.paper.summary.values():
             fields = (name for _, name, _, _ in string.Formatter().parse(text) if name)
@@ -387,7 +387,7 @@ def reproduce(
     clear: bool = True,
     progress: bool | Progress | None = None,
 ) -> Reproduction:
-    """Run a paper's experiment again.
+    """Re-run a paper's experiment.
 
     Parameters
     ----------
@@ -408,7 +408,7 @@ def reproduce(
         Whether to forget what was kept when all is done; else the caller does, once it has written
         what is returned, by ``Checkpoints(folder).clear()``.
     progress : bool or callable, optional
-        Whether to show a bar; or who is told the share of the work done, and what is next.
+        Whether to show a bar; or a callback for the share done, and the next step.
 
     Raises
     ------
@@ -445,7 +445,7 @@ def reproduce(
 
 
 def demand_one_sign(recordings: Sequence[Recording], channel: str) -> None:
-    """Refuse recordings of which some are far below 0 and others far above: signs are turned."""
+    """Raise an error for recordings of opposite signs."""
     peaks = np.array([one[channel][np.argmax(np.abs(one[channel]))] for one in recordings])
     strong = np.abs(peaks) > 0.1 * np.abs(peaks).max()
     usual = np.sign(np.sum(np.sign(peaks[strong]))) or 1.0
@@ -456,7 +456,7 @@ def demand_one_sign(recordings: Sequence[Recording], channel: str) -> None:
 
 
 def demand_rise(recordings: Sequence[Recording], by: str, channel: str) -> None:
-    """Refuse recordings in which a channel does not move, or falls as another rises."""
+    """Raise an error for recordings in which a channel is constant, or falls as another rises."""
     for one in recordings:
         for name in (by, channel):
             if np.ptp(one[name]) == 0:
@@ -477,6 +477,6 @@ def rms(errors: Array) -> float:
 
 
 def thinned(values: Sequence[float] | Array, most: int = MOST) -> Array:
-    """Return every k-th value, so that at most so many are left."""
+    """Return every k-th value, so that at most so many remain."""
     array = np.asarray(values, dtype=np.float64)
     return array[:: max(1, -(-array.size // most))]

@@ -1,4 +1,4 @@
-"""A paper: who wrote it, what it asks and prints, and where each of its equations and tables is here.
+"""A paper: authors, question, printed results, and the place of its equations and tables here.
 
 All of it is data, ``paper.toml`` in the paper's folder; the code beside it holds what must be computed.
 """
@@ -40,7 +40,7 @@ class Item(_Strict):
 
 
 class TableText(_Strict):
-    """What a table of the re-run is called, and what the paper prints in it.
+    """Title of a re-run's table, and the paper's printed values.
 
     Title and note may have fields in braces, which the experiment fills. ``of`` is the paper's table or
     figure, empty for ours; ``rows`` the heading of the first column; ``printed`` the paper's figures by
@@ -58,7 +58,7 @@ class TableText(_Strict):
 
 
 class FigureText(_Strict):
-    """What a figure of the re-run is called, the paper's that it redraws, and labels of the axes."""
+    """Title of a re-run's figure, the paper's figure that it redraws, and axis labels."""
 
     title: Words
     of: str = ""
@@ -105,7 +105,7 @@ class Paper(_Strict):
 
 @cache
 def paper(name: str) -> Paper:
-    """Return a paper by its short name; a ModelError lists those there are."""
+    """Return a paper by its short name; raise a `ModelError` that lists them if unknown."""
     module = registry.load("papers", name).run.__module__
     text = resources.files(module.rpartition(".")[0]).joinpath("paper.toml").read_text("utf-8")
     return Paper.model_validate(tomllib.loads(text))
@@ -123,7 +123,7 @@ def printed_models() -> tuple[str, ...]:
 
 
 def printed(name: str) -> Any:
-    """Return the block of a model with the parameters that its paper prints.
+    """Return the block of a model with the paper's printed parameters.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""What to record next."""
+"""Plans of the next recording."""

@@ -1,4 +1,4 @@
-"""Within what commands have to stay: their ends, how fast they may go, and where they rest."""
+"""Limits of commands: their range, rate and rest value."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LOWEST, HIGHEST = -1.1, 50.0
 
 @dataclass(frozen=True)
 class Limit:
-    """Ends of a command in its unit, equal where it is held; its rate a second; where it rests."""
+    """Range of a command in its unit (equal ends if constant), rate per second, rest value."""
 
     low: float
     high: float
@@ -38,11 +38,11 @@ class Limit:
 
     @property
     def span(self) -> float:
-        """How far it is from end to end."""
+        """Width of the range."""
         return self.high - self.low
 
     def beyond(self, recorded: Limit | None) -> bool:
-        """Return whether it goes further than recordings, by more than a tenth of their range."""
+        """Return whether it exceeds the recorded range by more than a tenth."""
         if recorded is None:
             return False
         further = max(recorded.low - self.low, self.high - recorded.high)
@@ -58,7 +58,7 @@ Limits = dict[str, Limit]
 
 
 def limits_of_rig(rig: Rig) -> Limits:
-    """Return what a rig's hardware permits, at a speed that crosses its range in 2 s."""
+    """Return a rig's hardware limits, at a rate that crosses its range in 2 s."""
     found = {}
     for name, rest in zip(rig.inputs, rig.resting[0].tolist(), strict=True):
         ends = rig.limits(name)
@@ -70,7 +70,7 @@ def limits_of_rig(rig: Rig) -> Limits:
 
 
 def limits_of_recordings(known: Excitation) -> Limits:
-    """Return between what ends, and how fast, inputs and loads went; those held in each run stay."""
+    """Return the recorded ranges and rates of inputs and loads; those constant in each run stay so."""
     found = {}
     for name in known.driven:
         low, high = known.ranges[name]
@@ -86,7 +86,7 @@ def limits_of_recordings(known: Excitation) -> Limits:
 
 
 def narrowed(limits: Limits, asked: Mapping[str, Iterable[float | None]]) -> Limits:
-    """Return limits of which some are given: by channel low, high and perhaps rate."""
+    """Return limits with some replaced: by channel low, high and optionally rate."""
     found = dict(limits)
     for name, given in asked.items():
         if name not in limits:
@@ -114,7 +114,7 @@ def narrowed(limits: Limits, asked: Mapping[str, Iterable[float | None]]) -> Lim
             rate = own.rate if own.span > 0 or high == low else (high - low) / CROSSING
         if not 0 < rate < math.inf:
             raise DataError(
-                f"nothing moves at {rate:g} {unit}/s",
+                f"there is no motion at {rate:g} {unit}/s",
                 channel=name,
                 remedy=f"give a positive rate, for instance {name}={low:g}:{high:g}:{own.rate:.3g}",
             )
@@ -123,7 +123,7 @@ def narrowed(limits: Limits, asked: Mapping[str, Iterable[float | None]]) -> Lim
 
 
 def check_possible(limits: Limits, seconds: float, rig: Rig | None) -> None:
-    """Refuse limits in which nothing moves, that take too long, or beyond what a rig permits."""
+    """Raise an error for limits that allow no motion, take too long, or exceed a rig's."""
     for name, limit in limits.items():
         unit = standard_unit(name) or ""
         ends = rig.limits(name) if rig is not None and name in rig.inputs else limit

@@ -1,4 +1,4 @@
-"""Motion for a recording: random motion of everything within limits, full cycles, and holds."""
+"""Motion for a recording: random motion within limits, full cycles, and holds."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def motion(
 
 
 def _strokes(limits: Limits, seconds: float, step: float, rng: np.random.Generator) -> Array:
-    """Go between random levels by half cosines of random speeds, each channel for itself."""
+    """Return random levels joined by half cosines of random speeds, each channel independently."""
     columns = []
     for limit in limits.values():
         slowest = np.clip(seconds / (STROKES * PEAK * max(limit.crossing, step)), 1.0, SLOWEST)
@@ -91,6 +91,6 @@ def _strokes(limits: Limits, seconds: float, step: float, rng: np.random.Generat
 
 
 def _lasts(limits: Limits, here: Array, there: Array) -> float:
-    """Return how long half cosines of all channels take from one level to another [s]."""
+    """Return the duration of half cosines of all channels from one level to another [s]."""
     ways = zip(limits.values(), (there - here).tolist(), strict=True)
     return PEAK * max(abs(way) / limit.rate for limit, way in ways)

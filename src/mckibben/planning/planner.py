@@ -1,4 +1,4 @@
-"""What to record next: random motion of everything within limits, with what data gaps ask for besides.
+"""Plan of the next recording: random motion within limits, and runs that close data gaps.
 
 With a model, the standard errors that its parameters should have are given: those of least squares of
 the free run where residuals are correlated, of all recordings and the plan together.
@@ -53,16 +53,16 @@ from mckibben.statistics import Autoregression
 from mckibben.system.threads import one_blas_thread
 
 MOST_MINUTES = 60.0
-"""Longest plan: longer ones are better made after the first has been recorded."""
+"""Longest plan [min]; a longer one is better made in two."""
 
 MOST_VALUES = 2e7
 """Sensitivities that are computed at once, of all samples to all parameters."""
 
 NOISE = 0.003
-"""Noise of an output over its range, where nothing is recorded."""
+"""Assumed noise of an output, relative to its range, without recordings."""
 
 LOADED = 0.3
-"""Share of a muscle's largest force that it is loaded with at most, where no load is known."""
+"""Load of a muscle, as a share of its largest force, if no load is known."""
 
 USUAL = 0.02
 """Sample time of a plan without recordings [s]."""
@@ -70,7 +70,7 @@ USUAL = 0.02
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter with its standard errors over its value, now and with the plan; None for unknown."""
+    """A parameter with its relative standard errors, now and with the plan; None if unknown."""
 
     name: str
     value: float
@@ -80,7 +80,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Step:
-    """A part of a plan: from and to when [s], kind of motion, and the data gaps it closes."""
+    """A part of a plan: start and stop [s], kind of motion, and the data gaps it closes."""
 
     start: float
     stop: float
@@ -90,7 +90,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Plan:
-    """What to record next: commands over time, and what each part of them is for.
+    """Plan of the next recording: commands over time, and the purpose of each part.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def plan(
     limits: Mapping[str, Sequence[float | None]] | None = None,
     seed: int = 0,
 ) -> Plan:
-    """Return what to record next.
+    """Return a plan of the next recording.
 
     Parameters
     ----------
@@ -143,8 +143,8 @@ def plan(
     muscle : str or path, optional
         A muscle of the library, or a data sheet (.toml), in place of recordings.
     model : str or Block, optional
-        Whose standard errors are told, to be fitted or fitted already; default ``balance`` where it
-        applies, or ``multistate`` where force is measured.
+        Model whose standard errors are planned, to be fitted or fitted already; default ``balance``
+        where it applies, or ``multistate`` where force is measured.
     minutes : float
         How long to record.
     limits : mapping of str to sequence of float, optional
@@ -209,7 +209,7 @@ def plan(
 def _steps(
     parts: Sequence[tuple[str, Array]], step: float, gaps: Sequence[Gap]
 ) -> tuple[Step, ...]:
-    """Return which part is for what, from when to when."""
+    """Return the purpose and the times of each part."""
     found, start = [], 0.0
     for what, group in groupby(parts, key=lambda part: part[0]):
         stop = start + step * sum(len(commands) for _, commands in group)
@@ -221,7 +221,7 @@ def _steps(
 
 
 def _known(recordings: list[Recording], rig: Rig | None, block: Block | None) -> Excitation:
-    """Return what recordings contain, of the channels of a model if one is given."""
+    """Return the excitation of recordings, with the channels of a model if one is given."""
     needed = [*(rig.inputs if rig is not None else ())]
     needed += [one.name for one in (*block.inputs, *block.outputs)] if block is not None else []
     for recording in recordings:
@@ -245,7 +245,7 @@ def _known(recordings: list[Recording], rig: Rig | None, block: Block | None) ->
 
 
 def _of_twin(rig: Rig, model: str | None, planned: Recording, seed: int) -> tuple[Parameter, ...]:
-    """Return the parameters of a model fitted to the plan as a rig would record it, nothing before."""
+    """Return the parameters of a model fitted to the plan as recorded by a rig, without earlier data."""
     resting = rig.changed({f"start.{name}": float(u[0]) for name, u in planned.channels.items()})
     recorded = [resting.run(planned, seed)]
     block = _fitted(_known(recorded, rig, None), model, seed)
@@ -254,7 +254,7 @@ def _of_twin(rig: Rig, model: str | None, planned: Recording, seed: int) -> tupl
 
 
 def _fitted(known: Excitation, model: str | None, seed: int) -> Block | None:
-    """Return a model fitted to recordings; None where the usual one does not apply."""
+    """Return a model fitted to recordings; None if the default model does not apply."""
     usual = "plan of force" if known.outputs == ("force",) else "plan of displacement"
     kind = registry.load("estimators", model or default_model(usual))  # type: ignore[arg-type]
     channels = known.inputs, known.outputs, known.loads or None
@@ -271,7 +271,7 @@ def _fitted(known: Excitation, model: str | None, seed: int) -> Block | None:
 
 
 def _of_muscle(given: str | Path, rig: Rig | None) -> tuple[Block, Limits]:
-    """Return the model of the library's muscle that is most alike, and what it may be driven with."""
+    """Return the model of the most similar muscle of the library, and its driving channels."""
     sheet = prior_of(given).sheet
     if Path(given).suffix != ".toml":
         like = load(given)
@@ -299,7 +299,7 @@ def _of_muscle(given: str | Path, rig: Rig | None) -> tuple[Block, Limits]:
 def _parameters(
     block: Block, recordings: Sequence[Recording], planned: Recording
 ) -> tuple[Parameter, ...]:
-    """Return the parameters of a model with their standard errors, now and with the plan recorded."""
+    """Return the parameters of a model with their standard errors, now and with the plan."""
     values, names = block.pack(), quantities(block)
     places = np.flatnonzero(np.logical_not(vanishing(values))).tolist()
     if not places:
@@ -311,7 +311,7 @@ def _parameters(
     kept = [one.slice(0, max(int(share * len(one)), 2)) for one in recordings]
 
     def slopes(recording: Recording) -> Array:
-        """Return how outputs move with parameters, shape (n, outputs, parameters)."""
+        """Return the derivatives of outputs by parameters, shape (n, outputs, parameters)."""
 
         def run(blocks: list[Block]) -> Array:
             given, step = recording.matrix(inputs), recording.sample_time
@@ -335,7 +335,7 @@ def _parameters(
         noise = [Autoregression(np.zeros(0), x, x * x) for x in (NOISE * spans).tolist()]
 
     def errors(moves: list[Array], left: list[Array]) -> list[float | None]:
-        """Return standard errors over values; None of what is not determined."""
+        """Return relative standard errors; None for undetermined parameters."""
         if not moves:
             return [None] * len(places)
         _, covariance, determined = sandwich(moves, left, noise)

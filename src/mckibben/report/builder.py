@@ -1,4 +1,4 @@
-"""One builder of pages: a title, tiles, and sections of text, tables and figures, in one HTML file.
+"""Builder of pages: a title, tiles, and sections of text, tables and figures, in one HTML file.
 
 A page needs nothing but itself, and a browser runs nothing else under it.
 """
@@ -49,7 +49,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Table:
-    """A table: headings, and rows of cells; numbers are set right.
+    """A table: headings, and rows of cells; numbers are right-aligned.
 
     ``best`` is the row that is marked, ``titles`` explain first cells to whoever points at them. With
     ``keys``, rows of what a column is sorted by, headings sort.
@@ -68,7 +68,7 @@ class Table:
 
     @property
     def figures(self) -> set[int]:
-        """Columns of numbers, which are set right."""
+        """Columns of numbers, which are right-aligned."""
 
         def numbers(place: int) -> float:
             cells = [row[place] for row in self.rows if row[place] not in (None, "", "–", "-")]
@@ -80,7 +80,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure: its plots by variant, what it shows, and how it is laid out by the style sheet."""
+    """A figure: its plots by variant, its caption, and its layout in the style sheet."""
 
     name: str
     plots: Variants
@@ -96,7 +96,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Code:
-    """A command, and what it does."""
+    """A command, and its effect."""
 
     what: str
     text: str
@@ -105,7 +105,7 @@ class Code:
 
 @dataclass(frozen=True)
 class Equations:
-    """What a model is, in equations: a `mckibben.diagnosis.description.Written`."""
+    """Equations of a model: a `mckibben.diagnosis.description.Written`."""
 
     written: Any
     kind: str = "equations"
@@ -117,7 +117,7 @@ Item = Text | Table | Figure | Code | Equations | None
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page, behind a heading that the contents list; without one, before the contents."""
+    """A part of a page with a heading in the contents; without one, before the contents."""
 
     name: str
     heading: str
@@ -130,7 +130,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Tile:
-    """A number on the first screen: what it is, the number, and its unit or what else belongs to it."""
+    """A number on the first screen: its label, the number, and its unit or a remark."""
 
     label: str
     value: str
@@ -178,7 +178,7 @@ class Page:
         )
 
     def markdown(self) -> str:
-        """Return the page as Markdown: its words and tables."""
+        """Return the page as Markdown: its texts and tables."""
         lines = [f"# {plain(self.title)}", plain(self.subtitle)]
         for section in self.sections:
             lines += [f"## {plain(section.heading)}"] if section.heading else []
@@ -202,14 +202,14 @@ def markdown(items: Sequence[Item]) -> str:
 
 
 def cell(value: Any, digits: int = 3) -> str:
-    """Return what a cell of a table shows."""
+    """Return the text of a table cell."""
     return (
         "–" if value is None else numeral(value, digits) if isinstance(value, float) else str(value)
     )
 
 
 def plain(text: str) -> str:
-    """Return words on one line, with nothing in them that Markdown would take for its own."""
+    """Return text on one line, with Markdown characters escaped."""
     return re.sub(r"([\\`*\[\]<>|#])", r"\\\1", " ".join(text.split()))
 
 
@@ -229,14 +229,14 @@ def _table(one: Table) -> Iterator[str]:
 
 @cache
 def _scripts() -> tuple[str, ...]:
-    """Return what a page runs."""
+    """Return the scripts of a page."""
     folder = resources.files("mckibben.report").joinpath("templates")
     packed = folder.joinpath(PLOTLY).read_bytes()
     return lzma.decompress(packed).decode(), folder.joinpath("report.js").read_text("utf-8")
 
 
 def policy(*scripts: str) -> str:
-    """Return a page's content security policy: these scripts run, and nothing is fetched or sent."""
+    """Return a page's content security policy: only these scripts run, and nothing is loaded or sent."""
     own = " ".join(
         f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
         for text in scripts
@@ -249,13 +249,13 @@ def policy(*scripts: str) -> str:
 
 
 def template(name: str) -> Template:
-    """Return a template: everything escaped, nothing undefined, numbers as they are printed."""
+    """Return a template: with escaping, strict variables, and typeset numbers."""
     return _environment().get_template(name)
 
 
 @cache
 def _environment() -> Environment:
-    """Return where templates are compiled, each once for all pages."""
+    """Return the template environment, with compiled templates cached."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -277,6 +277,6 @@ def _environment() -> Environment:
 
 
 def versions() -> str:
-    """Return the versions of Python, this package, and those that its numbers come from."""
+    """Return the versions of Python, this package, and its numerical libraries."""
     found = [f"{name} {version(name)}" for name in PACKAGES]
     return ", ".join([f"Python {platform.python_version()}", *found])

@@ -1,4 +1,4 @@
-"""The page of a check, and its numbers as JSON."""
+"""Page and JSON of a model check."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def write_check(folder: Results, found: Validation, model_file: str) -> None:
 
 
 def check_page(found: Validation, model_file: str) -> str:
-    """Return a check as HTML; ``model_file`` is where the model was read from."""
+    """Return a check as HTML; ``model_file`` is the path of the model."""
     longest = sorted(found.runs, key=lambda run: -len(run.inputs))[:MOST_RECORDINGS]
     runs = [run for run in found.runs if run in longest]
     names = [run.recording.name for run in runs]
@@ -71,7 +71,7 @@ def check_page(found: Validation, model_file: str) -> str:
 
 
 def _output(one: OutputCheck, place: int, runs: list[Run]) -> list[Item]:
-    """Return what a page shows of an output: what is missed, residuals, and all tests."""
+    """Return the sections of an output: finding, residuals, and all tests."""
     items = results.checked(one)
     if place >= MOST_OUTPUTS:
         return items

@@ -1,4 +1,4 @@
-"""The columns of a leaderboard, the same on every face: what they hold, in which unit, how rounded."""
+"""Columns of leaderboards, the same in all interfaces: content, unit and rounding."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Given = Mapping[str, Any]
 FORGOTTEN = 1e-6
 """Share of a gap between branches below which none is left: the rest is rounding."""
 
-RAN_AWAY = 10.0
-"""Error over the output's standard deviation from which a model is said to have run away."""
+DIVERGED = 10.0
+"""Error, relative to the output's standard deviation, above which a model counts as diverged."""
 
 ROUNDING = 1e-9
 """Error over the same below which there is none."""
@@ -57,7 +57,7 @@ class Column:
         return f"{self.heading} [{self.unit}]" if self.unit else self.heading
 
     def text(self, row: Given) -> str:
-        """Return what a row holds, as it is shown; a dash for nothing."""
+        """Return the text of a row's value; a dash for nothing."""
         value = self.value(row)
         if isinstance(value, str):
             return value
@@ -68,16 +68,16 @@ class Column:
         return numeral(self._rounded(value, row), self.digits)
 
     def flag(self, row: Given) -> str:
-        """Return what is absurd about what a row holds, in words; most often nothing."""
+        """Return a warning about a row's value; usually none."""
         value = self.value(row)
-        if self.key == "r2" and value is not None and value < 100 * (1 - RAN_AWAY**2):
-            return "ran away"
+        if self.key == "r2" and value is not None and value < 100 * (1 - DIVERGED**2):
+            return "diverged"
         if self.key not in ("chosen", "test", "train", "worst") or value is None:
             return ""
-        return "ran away" if value > RAN_AWAY * _deviation(row) else ""
+        return "diverged" if value > DIVERGED * _deviation(row) else ""
 
     def sorted_by(self, row: Given) -> float | str | None:
-        """Return what a table is sorted by: of two ends the middle."""
+        """Return the sort key of a value: the midpoint of an interval."""
         value = self.value(row)
         return sum(value) / len(value) if isinstance(value, list) else value
 
@@ -94,7 +94,7 @@ def columns_of(
     outputs: Sequence[str] = (),
     chosen_by: str = "cross-validation",
 ) -> tuple[Column, ...]:
-    """Return the columns of a leaderboard that hold anything, in their order.
+    """Return the non-empty columns of a leaderboard, in order.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def columns_of(
         Column("interval", "95 % interval", unit, _inside("test", "rmse_interval")),
         Column(
             "difference",
-            "less the chosen’s",
+            "minus the chosen’s",
             unit,
             _inside("test", "difference_to_chosen_interval"),
         ),
@@ -145,7 +145,7 @@ def columns_of_board(board: Leaderboard) -> tuple[Column, ...]:
 
 
 def _deviation(row: Given) -> float:
-    """Return the standard deviation of the measured test output; infinite where it is not known."""
+    """Return the standard deviation of the measured test output; infinite if unknown."""
     test = row.get("test") or {}
     error, share = test.get("rmse"), test.get("r2")
     if not error or share is None or not math.isfinite(share) or share >= 1:

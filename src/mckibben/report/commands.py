@@ -1,4 +1,4 @@
-"""What to type to repeat a study, and to use what it found."""
+"""Commands that repeat a study and use its results."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def commands(study: Study, command: str = "") -> list[tuple[str, str]]:
-    """Return commands, each after what it does; those after the first run in the folder of results.
+    """Return commands with descriptions; those after the first run in the folder of results.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def _files(recordings: Sequence[Recording]) -> list[str]:
 
 
 def model_file(model: str) -> str:
-    """Return where in the folder a model is saved.
+    """Return the path of a saved model in the folder.
 
     >>> model_file("memory a load")
     'models/memory-a-load.json'

@@ -1,4 +1,4 @@
-"""What a figure shows, free of any drawing library: panels of curves, thinned for the eye."""
+"""Figures independent of any drawing library: panels of curves, thinned for display."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ JUMP = 0.05
 loop at every step."""
 
 N_COLOURS = 6
-"""Colours that can be told apart; as many models or recordings share a panel at most."""
+"""Number of distinguishable colours, the most models or recordings in a panel."""
 
 N_AGES = 5
 """Steps of the colour scale from early to late."""
@@ -72,7 +72,7 @@ class Arrow:
 
 @dataclass(frozen=True)
 class Mark:
-    """A vertical line with a word at its top; where it has an end, what is between is shaded."""
+    """A vertical line with a label at its top; with an end, a shaded interval."""
 
     x: float
     text: str
@@ -116,7 +116,7 @@ class Panel:
 
     @property
     def y_range(self) -> tuple[float, float] | None:
-        """Ends of the y axis where they do not follow from the curves."""
+        """Limits of the y axis, if not from the curves."""
         every = [one.y[np.isfinite(one.y)] for one in self.curves]
         values = np.concatenate([*every, np.zeros(int(self.zero))])
         if not values.size or np.ptp(values) >= self.least:
@@ -148,7 +148,7 @@ class Drawing:
 
 
 def over_time(time: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:
-    """Return uniform time and y thinned to at most ``points``, with every extremum to the eye."""
+    """Return uniform time and y thinned to at most ``points``, with all visible extrema."""
     from mckibben.signals import decimate_minmax
 
     time, y = decimate_minmax(time, y, max_points=points)
@@ -181,7 +181,7 @@ def time_label(recording: Recording) -> str:
 
 
 def left_out(names: Sequence[str]) -> str:
-    """Return the note on what a figure leaves out.
+    """Return the note on curves that are not shown.
 
     >>> left_out(["run 7", "run 8"])
     'Not shown: run 7, run 8.'
@@ -194,5 +194,5 @@ def left_out(names: Sequence[str]) -> str:
 
 
 def series_colour(place: int) -> str:
-    """Return the colour of the model or recording at a place counted from 0."""
+    """Return the colour of the model or recording at an index."""
     return f"series-{place % N_COLOURS + 1}"

@@ -1,4 +1,4 @@
-"""The registry of figures: what draws each kind, for `plot`, `interactive`, print and pages."""
+"""Registry of figures: the drawing function of each kind, for `plot`, `interactive`, print and pages."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ PERIOD, CYCLES, SAMPLE_TIME = 10.0, 3, 0.02
 
 
 def draw(thing: Any, kind: str | None = None, **choices: Any) -> Drawing:
-    """Return a figure of a thing.
+    """Return a figure of an object.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def interact(thing: Any, kind: str | None, choices: Mapping[str, Any]) -> Any:
 
 
 def pair_of(recording: Recording) -> tuple[str, str] | None:
-    """Return the first pair of channels that move, of those that drive and are moved, or None."""
+    """Return the first pair of varying input and output, or None."""
     try:
         pairs = channels_of([recording]).pairs()
     except DataError:
@@ -163,7 +163,7 @@ def _time(
     input: str | None = None,  # noqa: A002
     output: str | None = None,
 ) -> Drawing:
-    """Draw channels over time, one panel each; default all."""
+    """Draw channels over time, one panel each; by default all."""
     several = _several(recordings)
     named = [name for name in (input, output) if name is not None]
     return subjects.time_course(several, channels or named or [*several[0].channels])
@@ -174,7 +174,7 @@ def _loop(
     input: str | None = None,  # noqa: A002
     output: str | None = None,
 ) -> Drawing:
-    """Draw the output over the input, from early to late."""
+    """Draw the output over the input, coloured by time."""
     several = _several(recordings)
     pair = pair_of(several[0])
     if pair is None and not (input and output):
@@ -195,7 +195,7 @@ def _triangle(
     step: float = SAMPLE_TIME,
     units: Mapping[str, str] | None = None,
 ) -> Recording:
-    """Return a falling triangle of one input, with the other inputs held."""
+    """Return a decreasing triangle of one input, with the other inputs constant."""
     t = step * np.arange(round(CYCLES * PERIOD / step) + 1)
     channels = {other: np.full(t.size, value) for other, value in others.items()}
     channels[driven] = decaying_triangle(t, period=PERIOD, low=ends[0], high=ends[1])
@@ -203,7 +203,7 @@ def _triangle(
 
 
 def _of_rig(drawn: Callable[..., Drawing]) -> Callable[..., Drawing]:
-    """Return what draws what a falling triangle of one input does to a rig, the other inputs at rest."""
+    """Return the drawing function of a rig's loop for a decreasing triangle, other inputs at rest."""
 
     def draw_rig(
         rig: Rig,
@@ -230,7 +230,7 @@ def _block_loop(
     output: str | None = None,
     high: float | None = None,
 ) -> Drawing:
-    """Draw the answer to a falling triangle of one input, from rest, the others in the middle."""
+    """Draw the loop of a block for a decreasing triangle of one input, others at mid-range."""
     names = [channel.name for channel in block.inputs]
     driven, given = input or names[0], output or block.outputs[0].name
     ranges = known_ranges(block)
@@ -249,7 +249,7 @@ def _block_loop(
 
 
 def _against(kind: str) -> Callable[..., Drawing]:
-    """Return what draws a model, or some of a leaderboard, running free against recordings."""
+    """Return the drawing function of free runs, of a model or a leaderboard, with recordings."""
 
     def draw_against(
         thing: Block | Leaderboard,
@@ -280,7 +280,7 @@ def _against(kind: str) -> Callable[..., Drawing]:
 
 
 def _blocks(board: Leaderboard, models: str | Sequence[str]) -> dict[str, Block]:
-    """Return the models of a leaderboard by name; default the chosen one."""
+    """Return the models of a leaderboard by name; by default the chosen one."""
     asked = [models] if isinstance(models, str) else list(models)
     if not asked and board.best is not None:
         asked = [board.best.model]
@@ -295,7 +295,7 @@ def _blocks(board: Leaderboard, models: str | Sequence[str]) -> dict[str, Block]
 
 
 def _driving(block: Block, recording: Recording) -> tuple[str, ...]:
-    """Return a model's driving inputs, without scheduling ones: no loop is drawn over those."""
+    """Return a model's driving inputs, without scheduling ones."""
     names = tuple(channel.name for channel in block.inputs)
     muscles = tuple(name for name in driving(recording) if name in names)
     return muscles if names[0] in muscles else names[:1]
@@ -304,7 +304,7 @@ def _driving(block: Block, recording: Recording) -> tuple[str, ...]:
 def _one_each(
     runs: Sequence[Shown], kind: str, others: Sequence[str] = (), models: int | None = None
 ) -> Drawing:
-    """Draw each recording in panels of its own."""
+    """Draw each recording in separate panels."""
     panels: list[Panel] = []
     for one in runs[:N_COLOURS]:
         drawing = one.draw(kind, models=models)
@@ -315,7 +315,7 @@ def _one_each(
 
 
 def _weights(block: Block, recording: Recordings | None = None) -> Drawing:
-    """Draw weights over thresholds, the same whatever the recording."""
+    """Draw weights over thresholds, for all recordings alike."""
     del recording
     return model_subjects.weights({"model": block})
 
@@ -324,7 +324,7 @@ def _weights(block: Block, recording: Recordings | None = None) -> Drawing:
 
 
 def _of_study(kind: str) -> Callable[[Study], Drawing]:
-    """Return what draws the chosen model on recordings; residuals on the one tested on."""
+    """Return the drawing function of the chosen model on recordings; residuals on the test."""
 
     def draw_study(study: Study) -> Drawing:
         runs = shown(study)
@@ -334,7 +334,7 @@ def _of_study(kind: str) -> Callable[[Study], Drawing]:
 
 
 def _study_recordings(drawn: Callable[..., Drawing]) -> Callable[[Study], Drawing]:
-    """Return what draws input and first output of all recordings."""
+    """Return the drawing function of input and first output of all recordings."""
 
     def draw_study(study: Study) -> Drawing:
         every = shown(study)
@@ -379,7 +379,7 @@ def _tracked(found: Tracked, output: str | None = None) -> Drawing:
 
 
 def _of_output(drawn: Callable[[Any], Drawing]) -> Callable[..., Drawing]:
-    """Return what draws what was found of one output."""
+    """Return the drawing function for results of one output."""
 
     def draw_output(found: Review | Validation, output: str | None = None) -> Drawing:
         return drawn(_named({one.output: one for one in found.outputs}, output))
@@ -395,7 +395,7 @@ def _pattern(found: Validation, output: str | None = None, against: str = "branc
 
 
 def _named(known: Mapping[str, T], name: str | None) -> T:
-    """Return what has a name; default the first."""
+    """Return the item of a name; by default the first."""
     if name is not None and name not in known:
         raise DataError(f"{name!r} is not among the results", remedy=f"use {', '.join(known)}")
     return known[name or next(iter(known))]

@@ -1,4 +1,4 @@
-"""Figures for the page, as plotly.js reads them: plain dicts with packed numbers.
+"""Figures for plotly.js: plain dicts with packed numbers.
 
 Nothing of plotly is imported: the page's own script unpacks the numbers and looks up the colours,
 which depend on whether the page is dark or light.
@@ -34,14 +34,14 @@ _GAP = 0.09
 
 
 def plots(drawing: Drawing) -> list[Json]:
-    """Return the plots of a drawing: one for all panels where they are stacked, else one each."""
+    """Return the plots of a drawing: one for stacked panels, else one each."""
     if drawing.stacked:
         return [_plot(drawing.panels)]
     return [_plot((panel,)) for panel in drawing.panels]
 
 
 def packed(values: Array) -> Json:
-    """Return numbers as the page's script unpacks them: seven digits beside a base, in few bytes.
+    """Return numbers packed for the page's script: seven digits relative to a base.
 
     The base keeps the digits of numbers that are large and close together, such as times.
 
@@ -57,17 +57,17 @@ def packed(values: Array) -> Json:
 
 
 def unpacked(numbers: Json) -> Array:
-    """Return numbers that are `packed`, as the page's script does."""
+    """Return the numbers of `packed`, as the page's script does."""
     return np.frombuffer(b64decode(numbers["f4"]), dtype="<f4").astype(float) + numbers["base"]
 
 
 def text(words: str) -> str:
-    """Return words as plotly.js shows them verbatim: it takes <b>, <a> and the like for markup."""
+    """Return text that plotly.js shows verbatim, with its markup escaped."""
     return escape(words, quote=False)
 
 
 def resolved(value: Any, colours: Mapping[str, str]) -> Any:
-    """Return plain numbers for packed ones, and colours for their names, as the page's script does."""
+    """Return plain numbers for packed ones, and colours for names, as the page's script does."""
     if isinstance(value, dict):
         if set(value) == {"base", "f4"}:
             return unpacked(value)

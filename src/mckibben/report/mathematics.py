@@ -1,4 +1,4 @@
-"""Equations for the page: MathML, which browsers set themselves, made of LaTeX."""
+"""Equations for pages: MathML from LaTeX."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ATTRIBUTES = frozenset(
 
 @lru_cache(maxsize=1000)
 def mathml(latex: str, display: Literal["block", "inline"] = "block") -> Markup:
-    r"""Return an equation as MathML; as it is written, where that is no LaTeX, or more than equations.
+    r"""Return an equation as MathML; the source itself if it is not a LaTeX equation.
 
     >>> "<mfrac>" in mathml(r"y = \frac{u}{2}")
     True

@@ -1,4 +1,4 @@
-"""Figures of models themselves: ranking, weights, inverse, residuals over what they follow, reviews."""
+"""Figures of models: ranking, weights, inverse, residuals, reviews."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ OperatorSum = PI | GPI | EUPI | RateDependentPI
 
 
 def leaderboard(board: Leaderboard) -> Drawing:
-    """Draw the errors of all models that worked, with the interval of the test error.
+    """Draw the errors of all fitted models, with the interval of the test error.
 
     Raises
     ------
@@ -54,7 +54,9 @@ def leaderboard(board: Leaderboard) -> Drawing:
     """
     ranked = [row for row in board.rows if row.train is not None and row.test is not None]
     if not ranked:
-        raise ModelError("no model worked, so there is nothing to rank", remedy="read the reasons")
+        raise ModelError(
+            "no model could be fitted, so there is no ranking", remedy="read the reasons"
+        )
     place = np.arange(len(ranked), dtype=float)
     tested = np.array([row.test.rmse for row in ranked if row.test is not None])
     fitted = np.array([row.train.rmse for row in ranked if row.train is not None])
@@ -78,7 +80,7 @@ def leaderboard(board: Leaderboard) -> Drawing:
 
 
 def weights(blocks: Mapping[str, Block]) -> Drawing:
-    """Draw the weights over the thresholds of every sum of play operators in the models.
+    """Draw the weights over the thresholds of all sums of play operators in the models.
 
     Raises
     ------
@@ -109,7 +111,7 @@ def weights(blocks: Mapping[str, Block]) -> Drawing:
 
 
 def operator_sums(block: Block) -> Iterator[OperatorSum]:
-    """Yield the parts of a model, however nested, that are weighted sums of play operators."""
+    """Yield the parts of a model that are weighted sums of play operators, at any depth."""
     if isinstance(block, OperatorSum):
         yield block
     elif hasattr(block, "forward"):
@@ -130,7 +132,7 @@ def _courses(time: Array, points: int, *given: Course) -> tuple[Curve, ...]:
 
 
 def tracking(loops: Mapping[str, Tracked], output: str, points: int = POINTS) -> Drawing:
-    """Draw a desired motion of one output, and what every controller made of it."""
+    """Draw the desired motion of one output, and the motion with every controller."""
     first = next(iter(loops.values())).recording
     ways: list[Course] = [
         (found.recording[output], name, series_colour(place), "line")
@@ -142,7 +144,7 @@ def tracking(loops: Mapping[str, Tracked], output: str, points: int = POINTS) ->
 
 
 def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
-    """Draw reference and output, their difference, and the input that the inverse gives.
+    """Draw reference and output, their difference, and the input computed by the inverse.
 
     Parameters
     ----------
@@ -181,7 +183,7 @@ def autocorrelation(one: OutputCheck) -> Drawing:
 
 
 def pattern(one: OutputCheck, against: Pattern) -> Drawing:
-    """Draw the residual's means over something, with their 95 % intervals."""
+    """Draw the residual's means over a variable, with their 95 % intervals."""
     groups = BRANCHES if against.against == "branch" else (("", "series-1"),)
     curves: list[Curve] = []
     for label, colour in groups:
@@ -214,7 +216,7 @@ def parts(one: Followed, points: int = POINTS) -> Drawing:
 
 
 def frequency_response(found: FrequencyResponse) -> Drawing:
-    """Draw gain and angle over frequency, with bounds, beside what was measured."""
+    """Draw gain and angle over frequency, with bounds and measurements."""
     given, wanted = found.input, found.output
     unit = "" if given.unit == wanted.unit else f"{wanted.unit or '1'}/{given.unit or '1'}"
     gain = axis_label(f"gain to {wanted.name}", unit)

@@ -1,4 +1,4 @@
-"""How results appear in Python: three lines of text, and a card in notebooks."""
+"""Display of results in Python: three lines of text, and a card in notebooks."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _CELL = "padding:.12em .9em .12em 0;border:0;background:none;color:inherit;text-
 
 @dataclass(frozen=True)
 class Card:
-    """A title, what is shown of a result but its figures, and a loop as a small picture."""
+    """A title, the texts and tables of a result, and a loop as a small picture."""
 
     title: str
     items: Sequence[Item]
@@ -51,7 +51,7 @@ class Card:
         return [one for one in self.items if isinstance(one, Table)]
 
     def text(self) -> str:
-        """Return the title and sentences, or rows where there are none, in at most three lines."""
+        """Return the title and sentences, or rows if there are none, in at most three lines."""
         first, *_ = wrap(verbatim(self.title), WIDTH, max_lines=1, placeholder=" …") or [""]
         rest = verbatim(" ".join(self.lines or map(_read_out, self.tables)))
         return "\n".join([first, *wrap(rest, WIDTH, max_lines=2, placeholder=" …")])
@@ -71,14 +71,14 @@ class Card:
 
 
 def card(thing: Any) -> Card:
-    """Return the card of a thing, by the name that it has as its ``face``."""
+    """Return the card of an object, by its ``face``."""
     pair = pair_of(thing) if isinstance(thing, Recording) else None
     path = None if pair is None else (thing[pair[0]], thing[pair[1]])
     return Card(TITLES[thing.face](thing), results.FACES[thing.face](thing), path)
 
 
 def _read_out(table: Table) -> str:
-    """Return a table as a sentence: every cell after its heading, where there are several."""
+    """Return a table as a sentence: every cell after its heading, if there are several."""
     heads = [f"{heading} " * (len(table.headings) > 2) for heading in table.headings[1:]]
     rows = [
         f"{row[0]} {', '.join(f'{head}{cell(x)}' for head, x in zip(heads, row[1:], strict=True))}"

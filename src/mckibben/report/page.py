@@ -1,4 +1,4 @@
-"""The report of a study, as a page."""
+"""Report of a study as a page."""
 
 from __future__ import annotations
 
@@ -37,13 +37,14 @@ if TYPE_CHECKING:
     from mckibben.studying.study import Study
 
 N_VALUES = 180_000
-"""Numbers in all plots together, so that the file stays under 6 MB beside plotly.js."""
+"""Largest number of values in all plots together, which limits the file to 6 MB plus plotly.js."""
 
 FEWEST_POINTS = 400
 """Points left to a curve at least, however many curves there are."""
 
 COLUMNS = ("chosen", "test", "interval", "rank", "gap", "parameters", "inverse", "step")
-"""Columns of the leaderboard on the page, beside those of each output; the files have all."""
+"""Columns of the leaderboard on the page, in addition to those of each output; the files have all.
+"""
 
 MOST_CHECKED = 3
 """Outputs whose residuals have figures of their own."""
@@ -67,7 +68,7 @@ def write_report(study: Study, path: str | Path, *, title: str = "") -> None:
 
 
 def page(study: Study, command: str = "", *, title: str = "") -> str:
-    """Return the report of a study as HTML, with how it is repeated, and its title."""
+    """Return the report of a study as HTML, with the commands that repeat it, and its title."""
     board, every = study.leaderboard, shown(study)
     pictured = drawn(every)
     first = pictured[0]
@@ -96,7 +97,7 @@ def page(study: Study, command: str = "", *, title: str = "") -> str:
 
 
 class _View:
-    """The recordings that are drawn, and with how many points."""
+    """The recordings drawn, and the number of points."""
 
     def __init__(self, pictured: Sequence[Shown], points: int) -> None:
         self.pictured, self.points = pictured, points
@@ -108,7 +109,7 @@ class _View:
 
 
 def _lead(one: Shown, board: Leaderboard) -> Figure:
-    """Return the measured loop with the chosen model's; over time where several inputs move."""
+    """Return the measured loop with the chosen model's; over time for several inputs."""
     moving = [name for name in board.inputs if any_moves([one.recording], (name,))]
     best = next(iter(one.outputs), None)
     caption = one.name + (f", and {best} running free" if best else "")
@@ -206,7 +207,7 @@ def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
 
 
 def _coupling(board: Leaderboard, recordings: Sequence[Recording]) -> list[Any]:
-    """Return how inputs move outputs, where there are several."""
+    """Return the coupling of inputs and outputs, if there are several."""
     found = coupling(list(recordings), board.inputs, board.outputs)
     one = fullest(list(recordings), board.inputs)
     label = f"Every output over every input, of {one.name}"

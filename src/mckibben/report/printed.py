@@ -1,4 +1,4 @@
-"""Figures for print: drawings set by matplotlib at the width of a journal's column.
+"""Figures for print: drawings rendered by matplotlib at the width of a journal's column.
 
 Neither pyplot nor any global state is touched, and the same drawing gives the same bytes.
 """
@@ -77,7 +77,7 @@ _WIDTHS = {"line": 0.9, "fine": 0.4, "broad": 2.6, "beads": 0.5}
 """Of lines [pt], by style."""
 
 _LEGEND = 45
-"""Letters of three names that stand side by side above a panel at most."""
+"""Largest number of letters of three names in one line of a legend."""
 
 _LEGEND_LINE = 0.14
 """Height that a figure gains by every line of a legend beyond two [in]."""
@@ -93,7 +93,7 @@ METADATA: Mapping[str, Mapping[str, str | None]] = MappingProxyType(
 
 
 def save(drawing: Drawing, path: str | Path) -> None:
-    """Write a drawing; a failure on the way leaves what was there before.
+    """Write a drawing; on failure an earlier file is unchanged.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def save(drawing: Drawing, path: str | Path) -> None:
 
 
 def format_of(path: Path) -> str:
-    """Return the format that a figure's name asks for, or refuse it as `save` does."""
+    """Return the format of a figure's file name; raise an error as `save` does."""
     demand("matplotlib", "figures", "figures for print")
     kind = path.suffix.lower().lstrip(".")
     if kind not in METADATA:
@@ -142,7 +142,7 @@ def drawn(drawing: Drawing) -> Figure:
 
 
 def axes_in(figure: Figure, drawing: Drawing, scale: float = 1.0) -> list[Axes]:
-    """Return the axes of a drawing's panels in a new figure, which is given its size."""
+    """Return the axes of a drawing's panels in a new figure of suitable size."""
     n = len(drawing.panels)
     columns = 1 if drawing.stacked else min(n, drawing.columns)
     rows = -(-n // columns)
@@ -172,12 +172,12 @@ def draw_into(axes: Sequence[Axes], drawing: Drawing) -> None:
 
 
 def verbatim(words: str) -> str:
-    """Return words without line breaks and other characters that cannot be printed."""
+    """Return text without line breaks and unprintable characters."""
     return "".join(letter if letter.isprintable() else " " for letter in words)
 
 
 def draw_panel(axis: Axes, panel: Panel, bottom: bool) -> None:
-    """Draw a panel into axes, with the label of x where it is the lowest of a stack."""
+    """Draw a panel into axes, with the label of x if it is the lowest of a stack."""
     if panel.zero:
         axis.axhline(0, color="#aaaaaa", linewidth=0.6, zorder=0)
     for curve in panel.curves:

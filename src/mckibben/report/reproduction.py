@@ -1,4 +1,4 @@
-"""The pages of a paper's re-run: one HTML file that needs nothing but itself, and Markdown."""
+"""Pages of a paper's re-run: one self-contained HTML file, and Markdown."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ FEWEST = 40
 
 
 def heading(one: Table | Figure, *, quick: bool = False) -> str:
-    """Return a title, what of the paper it stands beside, and whether the run was quick."""
+    """Return a title, with the corresponding item of the paper, and whether the run was quick."""
     beside_ = f" ({one.text.of})" if one.text.of else ""
     return f"{one.text.title}{beside_}{', quick run' if quick else ''}"
 
 
 def reproduction_page(found: Reproduction) -> str:
-    """Return the report of a re-run as HTML: what is printed beside ours first, figures last."""
+    """Return the report of a re-run as HTML: printed results with ours first, figures last."""
     paper = found.paper
     quick = ["A quick run: what takes long was left out, so figures are rougher."] * found.quick
     pictured = [table for table in found.tables if table.text.drawn]
@@ -69,7 +69,7 @@ def reproduction_page(found: Reproduction) -> str:
 
 
 def items(found: Reproduction) -> list[Item]:
-    """Return the tables of a re-run, and what it shows."""
+    """Return the tables of a re-run, and their findings."""
     return [*tables(found), Text(["", *found.summary])]
 
 
@@ -93,7 +93,7 @@ def chart(
 
 
 def beside(table: Table) -> Drawing:
-    """Return a table's drawn columns: what is printed in rings of ink, what was found in colours.
+    """Return a table's drawn columns: printed values as open rings, ours in colours.
 
     Drawn are those in the unit of ``table.text.drawn``, and all others if none names a unit of its own.
     """
@@ -121,7 +121,7 @@ def beside(table: Table) -> Drawing:
 
 
 def _drawn(table: Table) -> list[str]:
-    """Return the columns that are drawn: those of the measure, or with a printed figure beside."""
+    """Return the drawn columns: those of the measure, or with a printed figure."""
     named = [column for column in table.columns[1:] if table.text.drawn in column]
     printed = {c.removesuffix(", printed") for c in table.columns if c.endswith(", printed")}
     both = [c for c in table.columns[1:] if c.removesuffix(", printed") in printed]
@@ -129,7 +129,7 @@ def _drawn(table: Table) -> list[str]:
 
 
 def drawing(figure: Figure) -> Drawing:
-    """Return a paper's figure as a drawing: what a muscle did in ink, models in colours on top.
+    """Return a paper's figure as a drawing: measurements in ink, models in colours on top.
 
     A curve is named in the first panel that has one of its name.
     """
@@ -154,7 +154,7 @@ def drawing(figure: Figure) -> Drawing:
 
 
 def markdown(found: Reproduction, date: str, pictures: str) -> str:
-    """Return a re-run as a page in Markdown: an index of the paper first, then every table and figure.
+    """Return a re-run as a page in Markdown: an index of the paper first, then tables and figures.
 
     Parameters
     ----------
@@ -217,5 +217,5 @@ def _indexed(item: Indexed, found: Reproduction) -> str:
 
 
 def _anchor(title: str) -> str:
-    """Return the anchor that a heading has."""
+    """Return the anchor of a heading."""
     return re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", title.lower()))

@@ -1,4 +1,4 @@
-"""A paper's experiment run again, and its report written."""
+"""Re-run of a paper's experiment, with its report."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def rerun(
     force: bool = False,
     progress: Progress | None = None,
 ) -> Reproduction:
-    """Run a paper's experiment again on a rig or on a folder of recordings, and write its report.
+    """Re-run a paper's experiment on a rig or on a folder of recordings, and write its report.
 
     It runs in a process of its own, which can be ended whatever it is at. Parameters are those of
     `reproduce`; ``out`` is the folder for ``report.html`` and ``tables.json``.
@@ -67,7 +67,7 @@ def rerun(
 
 
 def _again(common: None, given: dict[str, Any], tell: Callable[..., None]) -> Reproduction:
-    """Run a paper again in a worker's process."""
+    """Re-run a paper in a worker process."""
     return reproduce(**given, clear=False, progress=tell)
 
 

@@ -1,4 +1,4 @@
-"""What is shown of every kind of result: one list of texts, tables and figures, for every face.
+"""Texts, tables and figures of every kind of result, for all interfaces.
 
 A terminal prints texts and tables, pages add the figures, and a card in a notebook has the first table.
 """
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from mckibben.studying.study import Study
 
 STARTS_MATTER = 0.05
-"""Relative difference of the errors from rest and from fitted starts from which both are given."""
+"""Relative difference of the errors from rest and from fitted starts above which both are shown."""
 
 BOARD = ("chosen", "test", "interval", "rank", "gap")
 """Columns of a leaderboard for a terminal of 80; the files have the rest."""
@@ -49,7 +49,7 @@ MOST = 12
 """Parameters of a plan that are listed."""
 
 UNFOLDED = 30
-"""Parameters that a page shows without being asked for."""
+"""Number of parameters that a page shows unfolded."""
 
 # --- Recordings -------------------------------------------------------------------------------------
 
@@ -72,7 +72,7 @@ def recording(found: Recording) -> list[Item]:
 
 
 def contents(found: Contents) -> list[Item]:
-    """Return the columns of files, the channels of recordings, and what these cannot identify."""
+    """Return the columns of files, the channels of recordings, and their data gaps."""
     items: list[Item] = []
     for file, columns in found.columns.items():
         rows = [[c.header, c.unit or "–", ", ".join(c.first), c.channel or "–"] for c in columns]
@@ -86,13 +86,13 @@ def contents(found: Contents) -> list[Item]:
 
 
 def data_gaps(gaps: Sequence[Gap]) -> list[Item]:
-    """Return what recordings cannot identify, and the runs that would."""
+    """Return data gaps, and the runs that close them."""
     rows = [[words.gap_sentence(gap), words.gap_run(gap)] for gap in gaps]
     return [Table(["Data gap", "Run that closes it"], rows)] if rows else []
 
 
 def characterization(found: Characterization) -> list[Item]:
-    """Return what a muscle does: sentences, then every figure with its 95 % interval."""
+    """Return a characterization: sentences, then every quantity with its 95 % interval."""
     quantities = [one for one in words.quantities(found) if one.value is not None]
     rows = [
         [one.name, one.value, " to ".join(numeral(x, 4) for x in one.limits or ()), one.unit]
@@ -107,7 +107,7 @@ def characterization(found: Characterization) -> list[Item]:
 
 
 def plan(found: Plan) -> list[Item]:
-    """Return the steps of a plan, and the standard errors to expect."""
+    """Return the steps of a plan, and the expected standard errors."""
     steps = [
         [f"{one.start:.0f} to {one.stop:.0f}", one.what, ", ".join(one.gaps) or "–"]
         for one in found.steps
@@ -128,7 +128,7 @@ def _at_most_whole(share: float | None) -> str:
 
 
 def fit(found: Fit) -> list[Item]:
-    """Return errors and parameters of a model that was fitted."""
+    """Return errors and parameters of a fitted model."""
     about, unit = found.to_dict(), found.estimator.model_.outputs[0].unit
     said = [
         f"{found.name}: free-running RMSE {numeral(about['rmse'], 4)} {unit} on "
@@ -160,7 +160,7 @@ def fit(found: Fit) -> list[Item]:
 
 
 def block(found: Block) -> list[Item]:
-    """Return what a model takes, gives and is."""
+    """Return inputs, outputs and kind of a model."""
     from mckibben.blocks.setting import summary
 
     rows = list(zip(found.parameter_names, map(float, found.pack()), strict=False))
@@ -168,7 +168,7 @@ def block(found: Block) -> list[Item]:
 
 
 def model(about: Mapping[str, Any]) -> list[Item]:
-    """Return what a saved model is, from its `summary`."""
+    """Return the description of a saved model, from its `summary`."""
     settable = ", ".join(f"{name}={value}" for name, value in about["settable"].items()) or "–"
     rows = [
         [key.replace("_", " "), ", ".join(value) if isinstance(value, list) else str(value)]
@@ -183,7 +183,7 @@ def versions(installed: Mapping[str, str]) -> list[Item]:
 
 
 def models(every: Mapping[str, Any]) -> list[Item]:
-    """Return what every model is, and its settings."""
+    """Return the description of every model, and its settings."""
     rows = [[name, one["summary"]] for name, one in every.items()]
     settings = [
         [name, ", ".join(f"{key}={value}" for key, value in one["settings"].items())]
@@ -196,7 +196,7 @@ def models(every: Mapping[str, Any]) -> list[Item]:
 
 
 def description(found: ModelDescription) -> list[Item]:
-    """Return what a model is on a page: equations, parameters, and answers to sines."""
+    """Return a model's equations, parameters, and frequency responses."""
     rows = [
         [
             one.name,
@@ -226,7 +226,7 @@ def description(found: ModelDescription) -> list[Item]:
 
 
 def simulation(found: Simulation) -> list[Item]:
-    """Return the errors of a model over a recording, and what its band holds."""
+    """Return the errors of a model on a recording, and the coverage of its band."""
     units = found.recording.units
     rows = [
         [f"{name} [{units[name]}]", *(one[key] for key in ("rmse", "mae", "max_error", "r2"))]
@@ -246,7 +246,7 @@ def simulation(found: Simulation) -> list[Item]:
 
 
 def inverse(found: Inverse) -> list[Item]:
-    """Return what an inverse takes, gives and reaches."""
+    """Return inputs, outputs and reachable range of an inverse."""
     made = found.block
     units = {channel.name: channel.unit for channel in (*made.inputs, *made.outputs)}
     given, wanted = (
@@ -275,7 +275,7 @@ def inverse(found: Inverse) -> list[Item]:
 
 
 def exported(found: Exported) -> list[Item]:
-    """Return what a self-test printed, and how many files were written."""
+    """Return the output of a self-test, and the number of files written."""
     libraries = [name for name in found.files if name.startswith("binaries/")]
     said = [
         *filter(None, (found.self_test, found.emulation)),
@@ -309,14 +309,14 @@ def board_table(board: Leaderboard, rows: Sequence[Row], keys: Sequence[str] = B
 
 
 def _summary(model: str) -> str:
-    """Return the full name of a model and what it can; nothing of unknown ones."""
+    """Return the full name of a model and what it represents; nothing for unknown ones."""
     from mckibben.estimators.catalogue import summary
 
     return summary(model) if model in registry.names("estimators") else ""
 
 
 def leaderboard(board: Leaderboard, keys: Sequence[str] = BOARD) -> list[Item]:
-    """Return how models are compared, their errors, which is chosen, and what failed."""
+    """Return the comparison of models: errors, choice, and failures."""
     ranked = [row for row in board.ranking if row.reason is None and row.test and row.train]
     split = f"{board.split[0].upper()}{board.split[1:]}"
     by = words.CHOICES[board.chosen_by][1]
@@ -345,8 +345,8 @@ def leaderboard(board: Leaderboard, keys: Sequence[str] = BOARD) -> list[Item]:
     return items
 
 
-def study_begun(found: Study) -> list[Item]:
-    """Return what the muscle and a loop do, before any model is fitted."""
+def study_started(found: Study) -> list[Item]:
+    """Return the characterization of the muscle and a loop, before any model is fitted."""
     known, reviewed = found.characterization, found.review
     return [
         Text(words.characterization_sentences(known)) if known is not None else None,
@@ -355,7 +355,7 @@ def study_begun(found: Study) -> list[Item]:
 
 
 def study(found: Study) -> list[Item]:
-    """Return the leaderboard, the three answers, what else is on the first screen, and loops."""
+    """Return the leaderboard, the three answers, further tiles, and loops."""
     said = [f"{question} {answer}" for question, answer in words.answers(found)]
     said += [f"{one.label}: {one.value}, {one.note}".rstrip(", ") for one in tiles(found)]
     said += filter(None, [words.not_looped(found)])
@@ -393,7 +393,7 @@ def tiles(study: Study) -> tuple[Tile, ...]:
 
 
 def _share(study: Study) -> str:
-    """Return the chosen model's error over the range of what it is tested on."""
+    """Return the chosen model's error relative to the range of the test data."""
     check = study.check
     if check is None or isinstance(check, str) or len(check.outputs) > 1:
         return ""
@@ -401,7 +401,7 @@ def _share(study: Study) -> str:
 
 
 def loops(found: Mapping[str, Tracked]) -> list[Item]:
-    """Return how controllers followed a reference."""
+    """Return the tracking errors of controllers."""
     rows = [
         [
             name,
@@ -418,12 +418,12 @@ def loops(found: Mapping[str, Tracked]) -> list[Item]:
 
 
 def tracked(found: Tracked) -> list[Item]:
-    """Return how a controller followed a reference."""
+    """Return the tracking errors of a controller."""
     return loops({"achieved": found})
 
 
 def tracking(found: Tracking) -> list[Item]:
-    """Return how a reference was followed, with and without compensation."""
+    """Return tracking errors with and without compensation."""
     ways = {found.law: found.tracked, "no compensation": found.uncompensated.tracked}
     items: list[Item] = [Text(found.notes, "note", listed=True) if found.notes else None]
     items += loops({name: one for name, one in ways.items() if one is not None})
@@ -434,7 +434,7 @@ def tracking(found: Tracking) -> list[Item]:
 
 
 def check(found: Validation) -> list[Item]:
-    """Return whether a model is right, and what it misses."""
+    """Return the verdict on a model, and its findings."""
     items: list[Item] = [Text([words.check_verdict(found)])]
     for one in found.outputs:
         items += [Text([one.output], "lead")] * (len(found.outputs) > 1) + checked(one)
@@ -443,7 +443,7 @@ def check(found: Validation) -> list[Item]:
 
 
 def checked(one: OutputCheck) -> list[Item]:
-    """Return what a residual follows, with its means over each, and all tests."""
+    """Return what a residual depends on, with its means over each variable, and all tests."""
     share, missing, tests = "Share of the variance [%]", [], []
     for each in one.missing:
         p = words.probability(each.p_value)
@@ -462,7 +462,7 @@ def checked(one: OutputCheck) -> list[Item]:
 
 
 def review(found: Review, points: int = POINTS) -> list[Item]:
-    """Return what a log's review found, and the parts of the error over time."""
+    """Return a log's review, and the parts of the error over time."""
     figures = [
         Figure(
             f"review {one.output}",
@@ -477,7 +477,7 @@ def review(found: Review, points: int = POINTS) -> list[Item]:
 
 
 def calibration(found: Calibration) -> list[Item]:
-    """Return what bands rest on, and how wide they are on average in cross-validation."""
+    """Return the calibration data of bands, and their mean width in cross-validation."""
     band, n = found.band, found.band.units
     said = f"Calibrated on {n} {band.unit}s, which allow levels up to {percent(n / (n + 1), 3)}."
     rows = [
@@ -492,13 +492,13 @@ def calibration(found: Calibration) -> list[Item]:
 
 
 def papers(found: Mapping[str, Paper]) -> list[Item]:
-    """Return what papers are about."""
+    """Return the questions of papers."""
     rows = [[str(one.number), name, f"{one.title}. {one.question}"] for name, one in found.items()]
     return [Table(["", "Paper", "What it asks"], rows)]
 
 
 def rig(found: Rig) -> list[Item]:
-    """Return what a rig is, and between which limits it is driven."""
+    """Return the description of a rig, and its limits."""
     limits = {name: found.limits(name) for name in found.inputs}
     rows = [[name, f"{numeral(one.low)} to {numeral(one.high)}"] for name, one in limits.items()]
     rows += [[name, "output"] for name in found.outputs if name not in limits]
@@ -531,7 +531,7 @@ def rigs(found: Mapping[str, Any]) -> list[Item]:
 
 
 def device(found: Driven) -> list[Item]:
-    """Return what a device is, its ports, and what it did."""
+    """Return the description of a device, its ports, and its recording."""
     one = found.device
 
     def state(when: str, now: State) -> str:

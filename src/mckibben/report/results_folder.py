@@ -1,4 +1,4 @@
-"""The folder of a comparison's or a study's results, written as they come."""
+"""The folder of a comparison's or a study's results, updated while it runs."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def write_leaderboard(board: Leaderboard, results: Results) -> None:
 
 
 class StudyFolder:
-    """A study's results: what the muscle does, leaderboard, models, inverse and report.
+    """A study's results: characterization, leaderboard, models, inverse and report.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class StudyFolder:
         self._next_page = 0.0
 
     def take(self, study: Study, *, last: bool = False) -> None:
-        """Write what is new; the page only when it is due, or the last."""
+        """Write new results; the page only when it is due, or at the end."""
         write, board = self._results.write_text, study.leaderboard
         if not board.rows and study.characterization is not None:
             found = study.characterization.to_dict()

@@ -1,4 +1,4 @@
-"""Which recordings of a study are shown, each once, with what the models make of it."""
+"""Recordings shown for a study, each once, with the outputs of the models."""
 
 from __future__ import annotations
 
@@ -47,15 +47,15 @@ class Shown:
     role: str
     test_from: int | None = None
     several: bool = False
-    """Whether the recording has other outputs, which are shown apart."""
+    """Whether the recording has other outputs, which are shown separately."""
 
     @property
     def name(self) -> str:
-        """What it is called where it is chosen."""
+        """Its name in the list of choices."""
         return f"{self.recording.name}: {self.output}" if self.several else self.recording.name
 
     def draw(self, kind: str, points: int = POINTS, models: int | None = None) -> Drawing:
-        """Draw it with the outputs of models, perhaps of the first few only; see `subjects.against`."""
+        """Draw it with the outputs of models, or of the first few; see `subjects.against`."""
         outputs = dict(list(self.outputs.items())[:models])
         if not outputs:
             problem, remedy = "no model of this study worked", "see the reasons in its leaderboard"
@@ -65,7 +65,7 @@ class Shown:
 
 
 def shown(study: Study) -> tuple[Shown, ...]:
-    """Return all recordings of a study, those tested on first; of several outputs, each once for each.
+    """Return all recordings of a study, test recordings first; one per output.
 
     Where the last part of a recording is held out, the study holds its first part once more to fit;
     that is not repeated here.
@@ -98,18 +98,18 @@ def shown(study: Study) -> tuple[Shown, ...]:
 
 
 def drawn(found: Sequence[Shown]) -> tuple[Shown, ...]:
-    """Return those with figures of their own: recordings tested on first, then the longest."""
+    """Return those with figures: test recordings first, then the longest."""
     by_weight = sorted(found, key=lambda one: (one.role == "fit", -len(one.recording)))
     return tuple(by_weight[:MOST_RECORDINGS])
 
 
 def unique(found: Sequence[Shown]) -> tuple[Shown, ...]:
-    """Return every recording once, whatever its outputs."""
+    """Return every recording once, for all its outputs."""
     return tuple({id(one.recording): one for one in reversed(found)}.values())[::-1]
 
 
 def _part_of(study: Study, whole: Recording) -> int | None:
-    """Return which training recording is the first part of a test recording, or None."""
+    """Return the training recording that is the first part of a test recording, or None."""
     for index, part in enumerate(study.train):
         n = len(part)
         if (

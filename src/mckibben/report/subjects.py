@@ -1,4 +1,4 @@
-"""Figures of recordings, of what models make of them, and of several muscles and loads."""
+"""Figures of recordings, of models on recordings, and of several muscles and loads."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from mckibben.report.drawing import (
 )
 
 HELD_OUT = "held out to test"
-"""What stands over the part of a recording that no model was fitted to."""
+"""Label of the part of a recording that no model was fitted to."""
 
 SMALL = 500
 """Points of a small picture."""
@@ -60,7 +60,7 @@ def time_course(
 def loop(
     recordings: Sequence[Recording], input_name: str, output_name: str, points: int = POINTS
 ) -> Drawing:
-    """Draw the output over the input: a single recording from early to late, several by colour."""
+    """Draw the output over the input: a single recording coloured by time, several by recording."""
     kept, note = _first(recordings)
     x_label, y_label = _label(kept[0], input_name), _label(kept[0], output_name)
     arrows = directions(kept[0][input_name], kept[0][output_name])
@@ -87,7 +87,7 @@ def against(
     test_from: int | None = None,
     points: int = POINTS,
 ) -> Drawing:
-    """Draw what models make of a recording.
+    """Draw the free runs of models with a recording.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def against(
 
 
 def directions(u: Array, y: Array) -> tuple[Arrow, ...]:
-    """Return the direction of time amid the widest rising and the widest falling branch.
+    """Return the direction of time in the middle of the widest rising and falling branch.
 
     There are none where the input jumps.
 
@@ -265,6 +265,6 @@ def loop_by(
 
 
 def third_channels(recording: Recording, used: Sequence[str]) -> list[str]:
-    """Return the channels that a loop can be coloured by: those that move and are not used already."""
+    """Return the channels for colouring a loop: varying ones that are not used already."""
     free = [name for name in recording.channels if name not in used]
     return [name for name in free if np.ptp(recording[name]) > 0][:N_COLOURS]

@@ -1,4 +1,4 @@
-"""Results as lines of text, for a terminal: what is shown of them but the figures."""
+"""Results as lines of text, for a terminal: texts and tables without figures."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def lines(items: Sequence[Item]) -> Iterator[str]:
 
 
 def table(one: Table) -> str:
-    """Return a table as wide as the terminal; numbers are aligned right, words left."""
+    """Return a table of the terminal's width; numbers are aligned right, text left."""
     from rich.console import Console
     from rich.table import Table as Grid
     from rich.text import Text as Verbatim

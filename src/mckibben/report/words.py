@@ -1,4 +1,4 @@
-"""Sentences about results: each is made from the numbers of a result, which stand beside it.
+"""Sentences about results, each made from numbers of the result.
 
 Library functions return numbers. Whatever says something about them to a person is here, in one section
 a room, so that all of it can be read, counted and tested on plants where it is false.
@@ -38,21 +38,19 @@ CHOICES = {
         "the last part of the training data, left out of a fit for it",
     ),
     "given": ("validation RMSE", "runs given for it, to which nothing is fitted"),
-    "fit": ("fit RMSE", "the error on the data fitted, for want of a validation"),
+    "fit": ("fit RMSE", "the error on the fitted data, as there is no validation"),
 }
 """What a model may be chosen by: the heading of its figure, and in words. The test is not among them."""
 
-LEVEL = (
-    "not distinguished from the chosen model by this test: the interval of the difference holds 0"
-)
+LEVEL = "not distinguished from the chosen model by this test: the interval of the difference contains 0"
 """Of a model that is `level`."""
 
-CAREFUL = "good only near the motions fitted, so its error counts twice in the order"
+CAREFUL = "reliable only near the fitted motions, so its error is doubled in the ranking"
 """Of a model with a caution."""
 
 
 def chosen(board: Leaderboard) -> str:
-    """Return which model is chosen and by what, its test error, and the lowest; empty without any."""
+    """Return the chosen model, its criterion, its test error, and the lowest; empty without any."""
     best, lowest = board.best, board.lowest
     if board.not_recommended is not None and board.constant is not None:
         first = next(row for row in board.rows if row.reason is None)
@@ -72,7 +70,7 @@ def chosen(board: Leaderboard) -> str:
 def not_recommended(
     where: Against, row: Mapping[str, Any], constant: Mapping[str, Any], unit: str
 ) -> str:
-    """Return why a model, the first in the order of the choice, is not recommended.
+    """Return why the model ranked first is not recommended.
 
     Parameters
     ----------
@@ -91,18 +89,18 @@ def not_recommended(
     own, mean = (f"{numeral(error, 3)} {unit}".strip() for error in errors)
     on = "the test data" if on_test else "what was left out to validate"
     return (
-        f"No model is recommended: on {on}, {row['model']} is off by {own} RMSE, and the mean of the "
+        f"No model is recommended: on {on}, {row['model']} has an RMSE of {own}, and the mean of the "
         f"training output by {mean}."
     )
 
 
 def comparison(board: Leaderboard) -> list[str]:
-    """Return what is to be said of a comparison beside its table."""
+    """Return notes on a comparison."""
     best, said = board.best, list(board.shared)
     if board.loads:
-        said.append(f"Given to models beside the inputs: {', '.join(board.loads)}.")
+        said.append(f"Further inputs of all models: {', '.join(board.loads)}.")
     said += [
-        f"{name} varies, and no model is given it: see `inputs` and `load`."
+        f"{name} varies, but is not an input of the models; see `inputs` and `load`."
         for name in board.ignored
     ]
     said += [
@@ -115,13 +113,13 @@ def comparison(board: Leaderboard) -> list[str]:
 
 
 def marks(board: Leaderboard) -> list[str]:
-    """Return what marks behind names of models mean, of those that there are."""
+    """Return the meaning of the marks after names of models."""
     careful = any(row.reason is None and row.caution for row in board.rows)
     return [f"≈ {LEVEL}."] * bool(board.level) + [f"* {CAREFUL}."] * careful
 
 
 def not_validated(board: Leaderboard) -> list[str]:
-    """Return which models' validation failed, and why."""
+    """Return the models whose validation failed, and why."""
     return [
         f"{row.model}: not chosen, as its validation failed: {row.validation_failed}"
         for row in board.rows
@@ -133,7 +131,7 @@ def not_validated(board: Leaderboard) -> list[str]:
 
 
 class Quantity(NamedTuple):
-    """A figure of a characterization, with its 95 % interval, unit and meaning."""
+    """A quantity of a characterization, with its 95 % interval, unit and meaning."""
 
     name: str
     value: float | int | str | None
@@ -143,8 +141,8 @@ class Quantity(NamedTuple):
 
 
 QUANTITIES = (
-    ("recordings", "n_recordings", "", "files or segments looked at"),
-    ("stretches", "n_stretches", "", "of them, those in which all other inputs stand still"),
+    ("recordings", "n_recordings", "", "files or segments analysed"),
+    ("stretches", "n_stretches", "", "those with all other inputs constant"),
     ("samples", "n_samples", "", "in all"),
     ("duration", "duration", "s", "in all; none without time"),
     ("sample time", "sample_time", "s", "none where unknown or not the same everywhere"),
@@ -160,18 +158,18 @@ QUANTITIES = (
     ("p of loop", "p_loop", "", "probability of such gaps between branches without a loop"),
     ("loop width e_w", "loop_width", "%", "largest cycles: branches at mid input over span"),
     ("branch distance at mid input", "mid_width", "{y}", "the same in the unit of the output"),
-    ("asymmetry", "asymmetry", "%", "from its image turned by half a turn; PI models have 0"),
+    ("asymmetry", "asymmetry", "%", "distance from its image rotated by 180°; 0 for PI models"),
     ("centre of width", "width_centroid", "", "-1 at low, 0 at mid, 1 at high input"),
     ("loop area", "loop_area", "{u} {y}", "enclosed by the largest cycles"),
-    ("loop area share", "loop_area_share", "%", "of the rectangle round it: a relay has 100"),
+    ("loop area share", "loop_area_share", "%", "of its bounding rectangle; 100 for a relay"),
     ("mean branch gap", "branch_gap", "{y}", "falling less rising output, free of steady drift"),
     ("dead zone after upper reversals", "dead_zone_upper", "{u}", "before the output moves back"),
     ("dead zone after lower reversals", "dead_zone_lower", "{u}", "the same from below"),
     ("gain", "gain", "{y}/{u}", "slope of the mean of both branches at mid input"),
     ("onset", "onset", "{u}", "below it the slope is under a fifth of its mean"),
     ("saturation", "saturation", "{u}", "above it the slope is under a fifth of its mean"),
-    ("creep", "creep", "{y}", "in a hold of all inputs; positive: on as it was going"),
-    ("creep time", "creep_time", "s", "the time over which it crept so far"),
+    ("creep", "creep", "{y}", "in a hold of all inputs; positive: in the direction of motion"),
+    ("creep time", "creep_time", "s", "time over which creep was measured"),
     ("drift", "drift", "{y}", "from one cycle to the next between the same extremes"),
     ("rate dependence", "rate_dependence", "%", "growth of e_w at twice the speed"),
     ("speed compared", "speeds", "{u}/s", "mean speed of the input in cycles alike"),
@@ -181,7 +179,7 @@ QUANTITIES = (
 
 
 def quantities(found: Characterization) -> Iterator[Quantity]:
-    """Yield every figure of a characterization."""
+    """Yield every quantity of a characterization."""
     names = {"input": found.input, "output": found.output}
     units = {"u": found.input_unit, "y": found.output_unit}
 
@@ -215,7 +213,7 @@ def quantities(found: Characterization) -> Iterator[Quantity]:
 
 
 def characterization_sentences(found: Characterization) -> list[str]:
-    """Return what a muscle does first of all; the table beside has everything, with intervals."""
+    """Return the main results of a characterization; its table has all, with intervals."""
     u, y = found.input, found.output
     ends = found.output_range[::-1] if found.falls else found.output_range
     slope = f"{found.output_unit}/{found.input_unit}".removesuffix("/")
@@ -238,11 +236,11 @@ def characterization_sentences(found: Characterization) -> list[str]:
     elif found.adjusted:
         names = listing([effect.channel for effect in found.effects])
         said.append(
-            f"{u} covers no half of its range while {names} stand still: straight-line effects of these "
-            "are taken away, and loop width is not measured."
+            f"{u} covers less than half of its range while {names} are constant: their linear effects "
+            "are removed, and loop width is not measured."
         )
     elif found.branch_gap is not None:
-        open_ = "Too few branches, or too much noise, to tell a loop: "
+        open_ = "Too few branches, or too much noise, to detect a loop: "
         shown = {True: "", False: "No loop: ", None: open_}[found.has_loop]
         gap = f"the mean gap between branches is {size(found.output_unit, found.branch_gap)}."
         said.append(f"{shown}{gap}")
@@ -252,13 +250,13 @@ def characterization_sentences(found: Characterization) -> list[str]:
         )
     if found.branch_gap is not None and found.p_loop is None:
         said.append(
-            "No recording has four branches: drift would part rising and falling output as well."
+            "No recording has four branches: drift would also separate rising and falling output."
         )
     return [f"{sentence[0].upper()}{sentence[1:]}" for sentence in said]
 
 
 def _spanning(limits: tuple[float, float], unit: str) -> str:
-    """Return limits to about a percent of their distance, so that noise at 0 is not spelled out."""
+    """Return limits rounded to about a percent of their distance."""
     digits = 2 - math.floor(math.log10(abs(limits[1] - limits[0]) or 1.0))
     low, high = (f"{round(limit, digits) + 0.0:.6g}" for limit in limits)
     return f"{low} to {high} {unit}".rstrip()
@@ -268,12 +266,12 @@ def _spanning(limits: tuple[float, float], unit: str) -> str:
 
 
 def check_verdict(found: Validation, *, sized: bool = True) -> str:
-    """Return what the residual of every output follows first, in a sentence each."""
+    """Return the main finding on every output's residual, one sentence each."""
     return " ".join(_residual(one, sized=sized) for one in found.outputs)
 
 
 def check_sentences(found: Validation) -> list[str]:
-    """Return everything that residuals follow, whether they are white, and one line of advice each."""
+    """Return all findings on residuals, whether they are white, and one line of advice each."""
     said = []
     for one in found.outputs:
         own = [] if one.exact else [_missed(one, each) for each in one.missing]
@@ -285,7 +283,7 @@ def check_sentences(found: Validation) -> list[str]:
 
 
 def check_notes(one: OutputCheck) -> list[str]:
-    """Return whether a residual is white, and what to do about what it follows first."""
+    """Return whether a residual is white, and advice on its main finding."""
     said = []
     if one.whiteness.p_value is not None:
         white = "white" if one.whiteness.p_value > WHITE else "not white"
@@ -296,7 +294,7 @@ def check_notes(one: OutputCheck) -> list[str]:
 
 
 def missed(one: OutputCheck, finding: Finding) -> str:
-    """Return in a few words what a residual follows, and what it may be as well."""
+    """Return the main finding on a residual in a few words, with alternatives."""
     causes = [
         _KINDS[kind].format(channel=channel or "the input")
         for kind, channel in ((finding.kind, finding.channel), *finding.or_causes)
@@ -375,7 +373,7 @@ def _p(value: float) -> str:
 
 
 def probability(value: float | None) -> str:
-    """Return a p-value as it is shown."""
+    """Return a formatted p-value."""
     return "–" if value is None else "< 0.000001" if value < 1e-6 else numeral(value, 2)
 
 
@@ -389,7 +387,7 @@ GAPS = {
     "coupling": "Effects of {channels} cannot be separated: one follows from the others (R² = {value}).",
     "spring load": "Load and stiffness cannot be separated: {channels} are proportional (R² = {value}).",
     "resting": "The effect of {channels} cannot be identified: constant at {levels}.",
-    "together": "Joint effects cannot be identified: {channels} are off their rest together in "
+    "together": "Joint effects cannot be identified: {channels} are away from rest together in "
     "{percent} of the samples.",
     "range": "Behaviour beyond the recorded range of {channels} cannot be identified: tests go further "
     "by {percent} of it.",
@@ -423,7 +421,7 @@ RUNS = {
 
 
 def gap_sentence(gap: Gap) -> str:
-    """Return what recordings cannot identify, with the number that shows it."""
+    """Return a data gap with its number."""
     return GAPS[gap.what].format(
         channels=listing(gap.channels),
         value=numeral(gap.value, 2),
@@ -434,19 +432,19 @@ def gap_sentence(gap: Gap) -> str:
 
 
 def gap_name(gap: Gap) -> str:
-    """Return what cannot be identified, without its number."""
+    """Return a data gap without its number."""
     return GAPS[gap.what].split(" cannot be ")[0].format(channels=listing(gap.channels)).lower()
 
 
 def gap_run(gap: Gap, ranges: bool = True) -> str:
-    """Return the run that would identify it, perhaps with the ranges recorded so far."""
+    """Return the run that closes a data gap, optionally with the recorded ranges."""
     moved = {name: ends for name, ends in gap.ranges.items() if ends[0] < ends[1] and ranges}
     levels = f" over {_levels(moved)}" if moved else ""
     return RUN.format(what=RUNS[gap.run].format(levels=levels))
 
 
 def plan_sentences(plan: Plan) -> list[str]:
-    """Return what a plan does, what it leaves open, and what of it is extrapolated."""
+    """Return the purpose of a plan, the gaps it leaves, and extrapolations."""
     parts = {step.what for step in plan.steps}
     open_gaps = [gap for gap in plan.gaps if not any(gap.what in one.gaps for one in plan.steps)]
     return [
@@ -468,7 +466,7 @@ def _levels(ranges: Mapping[str, tuple[float, float]]) -> str:
 
 
 def listing(names: Sequence[str]) -> str:
-    """Return names as a sentence has them.
+    """Return names joined by commas and "and".
 
     >>> listing(["a", "b", "c"])
     'a, b and c'
@@ -483,7 +481,7 @@ def listing(names: Sequence[str]) -> str:
 def band_on_test(
     level: float, coverage: Mapping[str, float], width: Mapping[str, float], unit: str
 ) -> list[str]:
-    """Return, an output a sentence, the share of the test's samples inside of a band, and its width."""
+    """Return, one sentence per output, the coverage of a band on the test, and its width."""
     return [
         f"The band for {percent(level, 3)} holds {percent(coverage[name], 3)} of the test's samples "
         f"of {name}; its half width is {numeral(wide / 2, 2)} {unit} on average."
@@ -492,7 +490,7 @@ def band_on_test(
 
 
 def calibrated_on_blocks(found: Calibration) -> str:
-    """Return what a band does not include whose units are blocks of runs."""
+    """Return the limitation of a band whose units are blocks of runs."""
     return (
         f"{found.band.units} blocks of {found.runs} run(s) count as exchangeable, so differences "
         "between runs are not in the band: calibrate on 9 runs or more."
@@ -502,7 +500,7 @@ def calibrated_on_blocks(found: Calibration) -> str:
 def outside_calibration(
     run: str, channel: Channel, share: float, values: Array, ends: tuple[float, float]
 ) -> str:
-    """Return how much of a run is beyond the range of a calibration."""
+    """Return the share of a run beyond the range of a calibration."""
     least, most = numeral(float(values.min()), 3), numeral(float(values.max()), 3)
     low, high = (numeral(end, 3) for end in ends)
     return (
@@ -513,7 +511,7 @@ def outside_calibration(
 
 
 def reviewed(found: Review) -> list[str]:
-    """Return what a log's review found: every output, then delays, limits and the refit."""
+    """Return the results of a log's review: every output, then delays, limits and the refit."""
     given = " of the compensator" if found.judged_by == "compensator" else ""
     said = []
     for one in found.outputs:
@@ -598,12 +596,12 @@ def _record_next(study: Study) -> str:
 
 
 def not_looped(study: Study) -> str:
-    """Return why no loop was closed; empty where one was."""
+    """Return why no loop was closed; empty if one was."""
     return f"No loop was closed: {study.not_looped}" if study.not_looped else ""
 
 
 def tracked(found: Tracking) -> list[str]:
-    """Return on what a reference was followed, and what of it is out of reach."""
+    """Return the plant of a tracked reference, and its part out of reach."""
     one = found.tracked
     unit = one.recording.units[next(iter(one.rmse))]
     kind = "virtual rig" if found.virtual else "model"

@@ -1,4 +1,4 @@
-"""Virtual rigs: physics that knows nothing of the models fitted to it."""
+"""Virtual rigs: physics, independent of the models fitted to it."""
 
 from mckibben.rigs.check import check_rig as check_rig
 from mckibben.rigs.data_sheet import rig_from_data_sheet as rig_from_data_sheet

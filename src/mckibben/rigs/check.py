@@ -1,4 +1,4 @@
-"""The contract of a rig as laws, to which its author can put it."""
+"""Contract tests of rigs, for authors of new ones."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STEPS = 50
 
 
 def check_rig(rig: Rig, *, seed: int = 0) -> None:
-    """Put a rig to the laws that every rig must obey.
+    """Test a rig against all laws of rigs.
 
     A saved copy is equal; runs are repeatable for a seed, and another seed changes the noise alone;
     stepping gives what running with held commands gives, to the last bit; halving the step of the
@@ -61,7 +61,7 @@ def _demand(rig: Rig, holds: bool, law: str) -> None:
 
 
 def _lively(rig: Rig, seed: int) -> Recording:
-    """Return inputs that move everything, over most of their ranges."""
+    """Return inputs that vary over most of their ranges."""
     time = np.arange(0.0, DURATION, max(rig.sample_time, 0.01))
     channels = {}
     for i, name in enumerate(rig.inputs):
@@ -87,7 +87,7 @@ def _saves(rig: Rig, inputs: Recording, seed: int) -> None:
 
 def _repeats(rig: Rig, inputs: Recording, seed: int) -> None:
     first, again = rig.run(inputs, seed), rig.run(inputs, seed)
-    _demand(rig, first == again, "running again with the same seed gives the same")
+    _demand(rig, first == again, "running again with the same seed returns the same outputs")
     _demand(rig, bool(np.isfinite(_matrix(rig, first)).all()), "measurements are finite")
     noisy = any(rig.sensor[quantity(name)].noise for name in rig.outputs)
     other = rig.run(inputs, seed + 1)
@@ -95,7 +95,7 @@ def _repeats(rig: Rig, inputs: Recording, seed: int) -> None:
     _demand(
         rig,
         rig.run(inputs, seed, ideal=True).channels.keys() >= set(rig.outputs),
-        "perfect sensors show every output",
+        "ideal sensors measure every output",
     )
 
 
@@ -132,9 +132,13 @@ def _saturates(rig: Rig, inputs: Recording, seed: int) -> None:
     _demand(
         rig,
         dict(recording.meta.get("saturated", {})) == dict.fromkeys(rig.inputs, len(inputs)),
-        "a recording says how many commands were limited",
+        "a recording states how many commands were limited",
     )
-    _demand(rig, bool(np.isfinite(_matrix(rig, recording)).all()), "extreme commands do no harm")
+    _demand(
+        rig,
+        bool(np.isfinite(_matrix(rig, recording)).all()),
+        "outputs stay finite under extreme commands",
+    )
 
 
 def _refuses(rig: Rig, inputs: Recording, seed: int) -> None:

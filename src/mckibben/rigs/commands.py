@@ -1,4 +1,4 @@
-"""What may be asked of a rig: commands checked, and limited as the hardware would."""
+"""Commands of rigs, checked, and limited as by the hardware."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mckibben.rigs.parameters import Range
 
 
 class Commands:
-    """What drives a rig, and within what limits.
+    """Inputs of a rig, and their limits.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Commands:
         self.high = np.array([limits.high for limits in ranges.values()])
 
     def of_recording(self, inputs: Recording) -> tuple[Array, dict[str, int]]:
-        """Return what the hardware makes of a recording of commands, shape (n, inputs).
+        """Return a recording of commands with the hardware's limits applied, shape (n, inputs).
 
         Inputs that are absent stay at rest, and channels that the rig measures are passed over. The
         second value counts the samples of each input that were limited, of which a warning tells.
@@ -83,7 +83,7 @@ class Commands:
         return given, saturated
 
     def of_action(self, action: ArrayLike | Mapping[str, float]) -> Array:
-        """Return an action as one command an input, shape (inputs,), not yet limited.
+        """Return an action as one command per input, shape (inputs,), not yet limited.
 
         Raises
         ------
@@ -116,5 +116,5 @@ class Commands:
         return asked
 
     def limited(self, asked: Array) -> Array:
-        """Return commands within what the hardware lets through."""
+        """Return commands limited to the hardware's range."""
         return np.clip(asked, self.low, self.high)

@@ -41,7 +41,7 @@ LARGEST = 1e6
 """Of every number of a data sheet."""
 
 PERIOD = 20.0
-"""Of the triangle whose loop has the width asked for [s]."""
+"""Period of the triangle for the desired loop width [s]."""
 
 
 def rig_from_data_sheet(
@@ -55,7 +55,7 @@ def rig_from_data_sheet(
     payload: float = 0.0,
     loop_width: float = 0.15,
 ) -> MovingEnd:
-    """Return a rig in which a muscle lifts a mass.
+    """Return a rig with a muscle that lifts a mass.
 
     The braid angle follows from the force at rest length, the bladder's stiffness from the largest
     contraction, and the friction from the loop's width on a triangle of 20 s over the whole range.
@@ -161,7 +161,7 @@ def _rig(
 
 
 def _braid_angle(diameter: float, pressure: float, force: float) -> float:
-    """Return the angle whose pull at rest is the force: a - b = 2/sin² - 3."""
+    """Return the angle at which the pull at rest is the force: a - b = 2/sin² - 3."""
     per_area = force / (NEWTON_PER_BAR_MM2 * pressure * math.pi * diameter**2 / 4)
     angle = math.degrees(math.asin(math.sqrt(2.0 / (per_area + 3.0))))
     if not 12.0 <= angle <= 50.0:
@@ -198,7 +198,7 @@ def _stiffness(muscle: Muscle, pressure: float, contraction: float) -> float:
 
 
 def _with_loop_width(rig: MovingEnd, wanted: float, force_per_bar: float) -> MovingEnd:
-    """Return the rig with as much friction as makes its loop that wide."""
+    """Return the rig with friction for the desired loop width."""
 
     def at(share: float) -> MovingEnd:
         return rig.changed(

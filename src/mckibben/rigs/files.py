@@ -1,4 +1,4 @@
-"""Rigs as files: TOML that a person can read, each number with its unit, meaning and range."""
+"""Rigs as readable TOML files, each number with its unit, meaning and range."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PUBLISHED = Path(__file__).parent / "published"
 
 @cache
 def rig_names() -> tuple[str, ...]:
-    """Return the names of the rigs that come with the package, in alphabetical order.
+    """Return the names of the rigs of the package, in alphabetical order.
 
     >>> "mas20-hanging" in rig_names()
     True
@@ -63,7 +63,7 @@ def load_rig(rig: str | Path) -> Rig:
 
 
 def save_rig(rig: Rig, path: str | Path) -> None:
-    """Write a rig as a documented file; what stood there before stays until all is written."""
+    """Write a rig as a documented file; an earlier file is replaced when all is written."""
     path = Path(path)
     if path.suffix != ".toml":
         raise DataError("a rig's file ends in .toml", file=path, remedy="name it so")
@@ -78,7 +78,7 @@ def describe(rig: Rig) -> str:
 
 
 def changes(rig: Rig) -> dict[str, Any] | None:
-    """Return how a rig differs from the published one of its name; None where there is none.
+    """Return the differences of a rig from the published one of its name; None without one.
 
     >>> changes(load_rig("mas20-hanging").changed({"payload": 10.0}))
     {'payload': 10.0}
@@ -89,7 +89,7 @@ def changes(rig: Rig) -> dict[str, Any] | None:
 
 
 def recorded_on(recording: Recording) -> Rig | None:
-    """Return the rig that a recording was made on, rebuilt; None where it names no published one.
+    """Return the rig of a recording, rebuilt; None if it names no published one.
 
     Raises
     ------
@@ -108,14 +108,14 @@ def recorded_on(recording: Recording) -> Rig | None:
         )
     if not isinstance(given, dict):
         raise DataError(
-            f"{recording.name} does not say whether its rig {name} was changed",
+            f"{recording.name} does not record whether its rig {name} was changed",
             remedy="record it again, or name the rig",
         )
     return rig.changed(given)
 
 
 def _fields(rig: Rig) -> dict[str, Any]:
-    """Return what makes a rig, as JSON has it."""
+    """Return the fields of a rig as JSON values."""
     return rig.model_dump(mode="json", exclude={"title", "source"})
 
 
@@ -202,7 +202,7 @@ def _from_fields(fields: dict[str, Any], path: Path) -> Rig:
 
 
 def _plain(value: Any) -> Any:
-    """Return TOML's nan, inf and endless integers as words, which every number field refuses."""
+    """Return TOML's nan, inf and very large integers as text, which every number field rejects."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""What a rig is made of: every number with its meaning, unit and range.
+"""Parameters of a rig: every number with its meaning, unit and range.
 
 A rig's file (TOML) holds these sections; see `mckibben.rigs.files`.
 """
@@ -29,7 +29,7 @@ EachPositive = Annotated[float, Field(gt=0)]
 
 
 class Section(BaseModel):
-    """One section of a rig's file; frozen, and refuses what it does not know."""
+    """One section of a rig's file; frozen, without unknown fields."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=False
@@ -43,11 +43,11 @@ class Friction(Section):
         "presliding stiffness of each element", "N/mm", max_length=MOST_ELEMENTS
     )
     contracting: tuple[Each, ...] = parameter(
-        "most that each resists contraction, per bar", "N/bar"
+        "limit of each element in contraction, per bar", "N/bar"
     )
-    extending: tuple[Each, ...] = parameter("most that each resists extension, per bar", "N/bar")
+    extending: tuple[Each, ...] = parameter("limit of each element in extension, per bar", "N/bar")
     preload: float = parameter(
-        "pressure that braid and bladder feel without air", "bar", ge=0, le=5
+        "contact pressure of braid and bladder without air", "bar", ge=0, le=5
     )
     viscosity: float = parameter("viscous resistance", "N s/mm", ge=0, le=100)
 
@@ -64,7 +64,7 @@ class Creep(Section):
     stiffness: tuple[EachPositive, ...] = parameter(
         "stiffness of each branch", "N/mm", max_length=MOST_BRANCHES
     )
-    time: tuple[EachPositive, ...] = parameter("time in which each branch fades", "s")
+    time: tuple[EachPositive, ...] = parameter("time constant of each branch", "s")
 
     @model_validator(mode="after")
     def _same_lengths(self) -> Self:
@@ -74,15 +74,13 @@ class Creep(Section):
 
 
 class Heat(Section):
-    """Warming by its own losses, which softens rubber and friction; an option, off by default."""
+    """Warming by internal losses, which softens rubber and friction; off by default."""
 
     softening: float = parameter(
         "stiffness and friction lost per kelvin", "1/K", ge=0, le=0.05, default=0.0
     )
-    capacity: float = parameter(
-        "heat that warms the muscle by a kelvin", "J/K", gt=0, default=100.0
-    )
-    cooling: float = parameter("time in which the warmth fades", "s", ge=1, default=600.0)
+    capacity: float = parameter("heat capacity of the muscle", "J/K", gt=0, default=100.0)
+    cooling: float = parameter("time constant of cooling", "s", ge=1, default=600.0)
 
 
 class Muscle(Section):
@@ -94,14 +92,16 @@ class Muscle(Section):
     braid_angle: float = parameter(
         "angle between threads and axis at rest", "degrees", ge=10, le=80
     )
-    end_cap: float = parameter("factor on contraction for the caps: 1 is a cylinder", ge=0.7, le=2)
+    end_cap: float = parameter(
+        "factor on contraction for the end caps; 1 for a cylinder", ge=0.7, le=2
+    )
     contact_pressure: float = parameter(
         "pressure at which the bladder meets the braid", "bar", ge=0, le=3
     )
     wall: float = parameter("thickness of the bladder", "mm", gt=0, le=20)
     c10: float = parameter("first Mooney-Rivlin constant of the bladder", "N/mm²", ge=0, le=20)
     c01: float = parameter("second Mooney-Rivlin constant", "N/mm²", ge=0, le=20, default=0.0)
-    push: float = parameter("force against which it stays straight", "N", ge=0, le=1e6, default=0.0)
+    push: float = parameter("buckling force", "N", ge=0, le=1e6, default=0.0)
     friction: Friction
     creep: Creep
     heat: Heat = Heat()
@@ -174,9 +174,9 @@ class Air(Section):
     critical_ratio: float = parameter(
         "pressure ratio at which flow chokes", ge=0, le=0.9, default=0.3
     )
-    valve_time: float = parameter("time in which the valve follows", "s", ge=0.001, le=1)
+    valve_time: float = parameter("time constant of the valve", "s", ge=0.001, le=1)
     gain: float = parameter("opening per bar of pressure error", "1/bar", gt=0, le=100)
-    dead_band: float = parameter("pressure error that moves nothing", "bar", ge=0, le=1)
+    dead_band: float = parameter("dead band of the pressure error", "bar", ge=0, le=1)
     line: float = parameter(
         "resistance of the line to the muscle, the inverse of its sonic conductance; pressure is "
         "measured at the regulator",
@@ -198,15 +198,15 @@ class Air(Section):
 
 
 class Sensor(Section):
-    """What a sensor adds to what it measures, in the unit of its channel."""
+    """Errors of a sensor, in the unit of its channel."""
 
     noise: float = parameter("standard deviation of white noise", ge=0, default=0.0)
-    resolution: float = parameter("smallest step it shows", ge=0, default=0.0)
-    offset: float = parameter("what it always adds", default=0.0)
+    resolution: float = parameter("resolution", ge=0, default=0.0)
+    offset: float = parameter("constant offset", default=0.0)
 
 
 class Range(Section):
-    """Lowest and highest value of a command that the hardware lets through."""
+    """Lowest and highest value of a command."""
 
     low: float = parameter("lowest", default=0.0)
     high: float = parameter("highest")

@@ -1,4 +1,4 @@
-"""From what pydantic refuses to an error that names the field, its range and its meaning."""
+"""Validation errors of pydantic as errors with field, range and meaning."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mckibben.errors import DataError
 def refused(
     error: ValidationError, model: type[BaseModel], file: str | Path | None = None
 ) -> DataError:
-    """Return the first thing that was refused as a `DataError`."""
+    """Return the first validation error as a `DataError`."""
     first = error.errors(include_url=False)[0]
     place = [part for part in first["loc"] if isinstance(part, str)]
     path = ".".join(str(part) for part in first["loc"])
@@ -40,7 +40,7 @@ def refused(
 
 
 def limits(field: FieldInfo) -> str:
-    """Return the range of a field in words, empty when it has none."""
+    """Return the range of a field in words, empty if there is none."""
     words = []
     for rule in field.metadata:
         for name, text in (("ge", "at least"), ("gt", "above"), ("le", "at most"), ("lt", "below")):
@@ -51,7 +51,7 @@ def limits(field: FieldInfo) -> str:
 
 
 def unit(field: FieldInfo) -> str:
-    """Return the unit of a field, empty when it has none."""
+    """Return the unit of a field, empty if there is none."""
     extra = field.json_schema_extra
     return str(extra["unit"]) if isinstance(extra, dict) and "unit" in extra else ""
 
@@ -65,7 +65,7 @@ def _wanted(field: FieldInfo | None) -> str:
 
 
 def _field(model: type[BaseModel], place: list[str]) -> FieldInfo | None:
-    """Return the field that a place within a model names, or the last one on the way to it."""
+    """Return the field of a path within a model, or the last one on the path."""
     found: FieldInfo | None = None
     inner: Any = model
     for part in place:

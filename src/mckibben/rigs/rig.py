@@ -27,7 +27,7 @@ ROOM_TEMPERATURE = 20.0
 
 
 class Rig(DrawsItself, Section, ABC):
-    """What every rig has, whatever its set-up.
+    """Base class of rigs of all set-ups.
 
     Run it over a recording of commands with `run`, or sample by sample with `reset` and `step`.
     """
@@ -36,12 +36,12 @@ class Rig(DrawsItself, Section, ABC):
 
     setup: str = parameter("which physics: the name of the set-up")
     name: str = parameter("short name", min_length=1, pattern=r"^[a-z0-9][a-z0-9-]*$")
-    version: int = parameter("counts up when results change", ge=1, default=1)
-    title: str = parameter("one line about it", default="")
-    source: str = parameter("where its numbers come from", default="")
+    version: int = parameter("incremented when results change", ge=1, default=1)
+    title: str = parameter("one-line description", default="")
+    source: str = parameter("source of its parameters", default="")
     sample_time: float = parameter("time between two samples", "s", gt=0, le=1)
     integration_step: float = parameter(
-        "longest step of the physics", "s", gt=0, le=0.005, default=5e-4
+        "longest integration step", "s", gt=0, le=0.005, default=5e-4
     )
     settling_time: float = parameter(
         "time from switching on to the first sample", "s", ge=1, default=20.0
@@ -50,7 +50,7 @@ class Rig(DrawsItself, Section, ABC):
     start: dict[str, float] = parameter(
         "commands at rest, where not the lowest", default_factory=dict
     )
-    range: dict[str, Range] = parameter("what the hardware lets through, by channel")
+    range: dict[str, Range] = parameter("limits of the hardware, by channel")
     sensor: dict[str, Sensor] = parameter("sensors, by channel")
     air: Air
 
@@ -95,11 +95,11 @@ class Rig(DrawsItself, Section, ABC):
     @property
     @abstractmethod
     def inputs(self) -> tuple[str, ...]:
-        """Channels that drive it, the first of which must be given."""
+        """Driving channels; the first must be given."""
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Channels that it measures: what there are sensors for."""
+        """Measured channels: those with sensors."""
         return tuple(name for name in self.measurable if name in self.sensor)
 
     @property
@@ -113,20 +113,20 @@ class Rig(DrawsItself, Section, ABC):
 
     @abstractmethod
     def demands(self, inputs: Array) -> Demands:
-        """Return what given inputs, shape (n, inputs), ask of the physics."""
+        """Return the physical demands of inputs, shape (n, inputs)."""
 
     @abstractmethod
     def readings(self, traces: Traces, inputs: Array, zero: Array) -> Mapping[str, Array]:
-        """Return what perfect sensors would show, by channel; ``zero`` is the place of the tare."""
+        """Return readings of ideal sensors, by channel; ``zero`` is the position of the tare."""
 
     @abstractmethod
     def known(self) -> Mapping[str, Any]:
-        """Return what a recording should say of the set-up: geometry, load."""
+        """Return the metadata of the set-up for recordings: geometry, load."""
 
     # --- what is the same for all
 
     def changed(self, settings: Mapping[str, Any]) -> Self:
-        """Return a rig with other parameters, checked like a new one.
+        """Return a rig with other parameters, validated.
 
         Parameters
         ----------
@@ -163,7 +163,7 @@ class Rig(DrawsItself, Section, ABC):
             raise refused(error, type(self), f"rig {self.name}") from None
 
     def aged(self, factors: Mapping[str, float]) -> Self:
-        """Return the rig with muscles that have aged, where this one is: it runs on, tare and all.
+        """Return the rig with aged muscles in its current state.
 
         Parameters
         ----------
@@ -256,7 +256,7 @@ class Rig(DrawsItself, Section, ABC):
         )
 
     def _refuse_divergence(self, readings: Mapping[str, Array]) -> None:
-        """Refuse what no muscle does: to move by far more than its length, or exceed the supply."""
+        """Raise an error for diverging motion, or pressure above the supply."""
         # what is thrown flies some way
         highest = {
             "pressure": 2 * self.air.supply,
@@ -314,12 +314,12 @@ class Rig(DrawsItself, Section, ABC):
         return self._measured(self._readings(traces, both), running)
 
     def limits(self, name: str) -> Range:
-        """Return what the hardware lets through on an input channel."""
+        """Return the hardware limits of an input channel."""
         return self.range[name] if name in self.range else self.range[quantity(name)]
 
     @property
     def signature(self) -> str:
-        """Return how recordings name it."""
+        """Return its name for recordings."""
         return f"{self.name} v{self.version} (virtual)"
 
     @property
@@ -335,7 +335,7 @@ class Rig(DrawsItself, Section, ABC):
     # --- inside
 
     def _measured(self, readings: Mapping[str, Array], running: _Running) -> Array:
-        """Return the last of some readings as the sensors show it."""
+        """Return the last of some readings, as measured by the sensors."""
         noise = running.rng.standard_normal(len(self.outputs))
         return np.array(
             [
@@ -391,7 +391,7 @@ class Rig(DrawsItself, Section, ABC):
 
 
 class _Running:
-    """What a rig that is being stepped remembers."""
+    """State of a rig that is being stepped."""
 
     def __init__(self, state: State, rng: np.random.Generator) -> None:
         self.state, self.rng = state, rng
@@ -399,7 +399,7 @@ class _Running:
 
 
 def _inside(traces: Traces) -> dict[str, Array]:
-    """Return what no sensor shows: volume [ml] and temperature [degC] of every muscle."""
+    """Return unmeasured quantities: volume [ml] and temperature [degC] of every muscle."""
     m = traces.room.shape[1]
     names = [""] if m == 1 else [f"_{j + 1}" for j in range(m)]
     found = {f"volume{name}": 1e-3 * traces.room[:, j] for j, name in enumerate(names)}
@@ -409,5 +409,5 @@ def _inside(traces: Traces) -> dict[str, Array]:
 
 
 def quantity(channel: str) -> str:
-    """Return what a channel measures: ``pressure_2`` and ``pressure_extensor`` are ``pressure``."""
+    """Return the quantity of a channel: ``pressure_2`` and ``pressure_extensor`` are ``pressure``."""
     return channel.partition("_")[0]

@@ -1,4 +1,4 @@
-"""A rig as the compiled physics sees it: what it is, what is asked of it, what it does."""
+"""The data of a rig for the compiled physics: parameters, demands, states."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ SETTLING_SHARE = 0.3
 
 
 class State(NamedTuple):
-    """What a system remembers: its muscles' records, and its coordinates'."""
+    """State of a system: of its muscles, and of its coordinates."""
 
     muscles: Records
     motion: Records
 
     def copy(self) -> State:
-        """Return a copy that shares nothing."""
+        """Return an independent copy."""
         return State(self.muscles.copy(), self.motion.copy())
 
 
 class System(NamedTuple):
-    """Muscles, regulator and mechanism, as the compiled physics reads them."""
+    """Muscles, regulator and mechanism, as data of the compiled physics."""
 
     muscles: Records
     air: Records
     mechanism: Records
 
     def as_made(self) -> State:
-        """Return the state before anything was switched on."""
+        """Return the state before switching on."""
         return State(np.zeros(self.muscles.size, MUSCLE_STATE), np.zeros(1, MOTION))
 
     def run(
@@ -60,7 +60,7 @@ class System(NamedTuple):
         return Traces(rows, n, m)
 
     def switched_on(self, demands: Demands, time: float, longest_step: float) -> State:
-        """Return the state after pressure and load have come slowly and all has settled.
+        """Return the settled state after a slow rise of pressure and load.
 
         ``demands`` has two samples: off, and at rest.
         """
@@ -76,7 +76,7 @@ class System(NamedTuple):
 
 
 class Demands(NamedTuple):
-    """What drives the physics at every sample: commands, loads on the coordinates, drive's target."""
+    """Demands at every sample: commands, loads on the coordinates, drive's target."""
 
     commands: Array
     loads: Array
@@ -84,7 +84,7 @@ class Demands(NamedTuple):
 
 
 class Traces:
-    """What sensors could see at every sample, by name; see `mckibben.rigs.physics.motion.march`."""
+    """Measurable quantities at every sample; see `mckibben.rigs.physics.motion.march`."""
 
     def __init__(self, rows: Array, n_coordinates: int, n_muscles: int) -> None:
         n, m = n_coordinates, n_muscles

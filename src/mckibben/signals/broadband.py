@@ -1,4 +1,4 @@
-"""Broadband signals: many frequencies at once, or one after another."""
+"""Broadband signals: random waves, multisines and chirps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every signal asks of its arguments."""
+"""Checks of arguments common to all signals."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mckibben.errors import DataError, require
 
 
 def as_time(given: ArrayLike) -> Array:
-    """Return times as an array, or say what is wrong with them."""
+    """Return times as an array; raise an error for invalid ones."""
     t = np.asarray(given, dtype=float)
     if t.ndim != 1 or t.size == 0 or not np.isfinite(t).all():
         raise DataError("time is not a row of finite numbers", remedy="give one time a sample")
@@ -18,7 +18,7 @@ def as_time(given: ArrayLike) -> Array:
 
 
 def require_positive(name: str, value: float) -> None:
-    """Refuse what is not a positive number."""
+    """Raise an error for a number that is not positive."""
     require(0 < value < np.inf, name, value, "a positive number", DataError)
 
 
@@ -27,18 +27,18 @@ LARGEST_SEED = 2**64 - 1
 
 
 def require_finite(name: str, values: ArrayLike) -> Array:
-    """Return numbers as an array, or refuse those that are not finite."""
+    """Return numbers as an array; raise an error if one is not finite."""
     numbers = np.atleast_1d(np.asarray(values, dtype=float))
     require(bool(np.isfinite(numbers).all()), name, values, "finite numbers", DataError)
     return numbers
 
 
 def require_order(low: float, high: float) -> None:
-    """Refuse limits that are not finite, or not in order."""
+    """Raise an error for limits that are not finite, or not in order."""
     require(-np.inf < low < high < np.inf, "high", high, f"more than low, {low:g}", DataError)
 
 
 def generator(seed: int) -> np.random.Generator:
-    """Return what draws random numbers, or say that the seed is impossible."""
+    """Return a random number generator; raise an error for an invalid seed."""
     require(0 <= seed <= LARGEST_SEED, "seed", seed, f"0 to {LARGEST_SEED}", DataError)
     return np.random.default_rng(seed)

@@ -1,4 +1,4 @@
-"""Fewer samples for models to be fitted to, without losing a turning point of what drives them."""
+"""Reduction of samples for fitting, without losing turning points of the inputs."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from mckibben.recording import Recording
 from mckibben.signals.reversals import reversals
 
 FEWEST = 10
-"""Samples that a recording keeps; shorter ones are left out."""
+"""Smallest number of samples of a thinned recording; shorter ones are left out."""
 
 MOST = 100_000
-"""Samples to fit to, and to test on, of recordings that are longer."""
+"""Largest number of samples to fit to, and to test on."""
 
 HUGE = 1_000_000
 """Samples above which fewer are taken, of stretches: tens of models are then done in minutes."""
@@ -24,14 +24,14 @@ HUGE = 1_000_000
 MOST_OF_HUGE = 40_000
 
 PER_SWING = 20
-"""Samples that a swing of the input keeps, the median one, before stretches are cut out instead."""
+"""Smallest number of samples per swing of the input, before segments are cut out instead."""
 
 STRETCHES = 4
 """Taken of each recording, spread evenly."""
 
 
 def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
-    """Return a recording with one sample for every ``factor``, turning points kept.
+    """Return a recording with one sample per ``factor``, including turning points.
 
     Of every bin the sample at which the channel turns is taken, else the first: levels at turning
     points, on which memory depends, stay as they are, while times are off by less than a bin. Of
@@ -82,14 +82,14 @@ def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
 
 
 def _beyond(u: NDArray[np.float64]) -> bool:
-    """Tell whether the last sample is the highest or the lowest."""
+    """Return whether the last sample is the highest or the lowest."""
     return bool(u[-1] >= u.max() or u[-1] <= u.min())
 
 
 def made_manageable(
     train: Sequence[Recording], test: Sequence[Recording], channel: str, most: int | None = None
 ) -> tuple[list[Recording], list[Recording], tuple[str, ...]]:
-    """Return recordings thinned alike, so that no more than so many samples are fitted or tested on.
+    """Return recordings thinned alike to at most so many samples for fit and test.
 
     Without a number given, huge recordings are thinned no further than leaves their swings in shape; of
     what is then still too much, stretches of samples in a row are taken, each with a start of its own.
@@ -140,7 +140,7 @@ def made_manageable(
         lost += sum(_lost(recording[channel], factor) for recording in long)
         left_out = [r.name for r in recordings if len(r) < FEWEST * factor]
         if left_out:
-            notes.append(f"Too short beside the others, so left out: {', '.join(left_out)}.")
+            notes.append(f"Left out as too short: {', '.join(left_out)}.")
         if recordings and not long:
             raise DataError(
                 f"these recordings have {max(map(len, recordings))} samples at most, of which one in "
@@ -166,13 +166,13 @@ def made_manageable(
 
 
 def _swing(recordings: Sequence[Recording], channel: str) -> int:
-    """Return how many samples the median swing of the input takes."""
+    """Return the samples of the median swing of the input."""
     swings = [np.diff(reversals(recording[channel])) for recording in recordings]
     return int(np.median(np.concatenate(swings)))
 
 
 def _stretches(recordings: Sequence[Recording], most: int) -> list[Recording]:
-    """Return stretches of recordings, evenly spread, together no longer than a limit."""
+    """Return segments of recordings, evenly spaced, with a total length up to a limit."""
     share = most / max(sum(map(len, recordings)), 1)
     if share >= 1:
         return list(recordings)
@@ -190,13 +190,13 @@ def _stretches(recordings: Sequence[Recording], most: int) -> list[Recording]:
 
 
 def _continuing(recording: Recording, others: Sequence[Recording], factor: int) -> Recording:
-    """Return a recording that continues another one without what their common bin has of it."""
+    """Return a recording without the samples of a bin shared with its predecessor."""
     before = next((other for other in others if recording.continues(other)), None)
     skipped = 0 if before is None else -len(before) % factor
     return recording.slice(skipped, len(recording)) if skipped + 2 <= len(recording) else recording
 
 
 def _lost(u: NDArray[np.float64], factor: int) -> int:
-    """Return how many turning points share a bin with another one."""
+    """Return the number of turning points that share a bin with another one."""
     turns = reversals(u)[1:-1]
     return int(turns.size - np.unique(np.maximum(turns // factor, 1)).size)

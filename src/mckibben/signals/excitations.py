@@ -1,4 +1,4 @@
-"""Excitations: how to drive a muscle so that its hysteresis can be seen."""
+"""Excitation signals that reveal hysteresis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Noise and drift taken out of a recording, without delay."""
+"""Removal of noise and drift from a recording, without delay."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ORDER = 4
 def low_pass(
     recording: Recording, cutoff: float, channels: Sequence[str] | None = None
 ) -> Recording:
-    """Return a recording whose fast parts are damped, without delay.
+    """Return a recording with high frequencies damped, without delay.
 
     A Butterworth filter runs forth and back.
 
@@ -55,7 +55,7 @@ def low_pass(
 
 
 def detrend(recording: Recording, channels: Sequence[str] | None = None) -> Recording:
-    """Return a recording without the straight line that its channels drift along; their mean stays.
+    """Return a recording without the linear trend of its channels; their means are unchanged.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Holds: stretches in which several signals, such as all inputs and all loads, stand still."""
+"""Holds: segments in which several signals, such as all inputs and loads, are constant."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mckibben.arrays import Array, true_runs
 from mckibben.signals.reversals import NOISE_SHARE, noise_level, swing_threshold
 
 STILL = 0.01
-"""Share of its range within which a signal stands still, unless noise or resolution is wider."""
+"""Share of its range within which a signal is constant, unless noise or resolution is wider."""
 
 CLEAR = 20.0
 """A step this many times the noise shows movement."""
@@ -20,7 +20,7 @@ ALTERNATING = 0.1
 
 
 def holds(columns: Array, spans: Sequence[float] | None = None, shortest: int = 10) -> list[slice]:
-    """Return the stretches in which every column stands still, in order of time.
+    """Return the segments in which every column is constant, in order of time.
 
     A column stands still while it stays within 1 % of its range, what its noise reaches or one step
     of its resolution to either side, whichever is widest. Stretches are as long as they can be and do
@@ -75,7 +75,7 @@ def holds(columns: Array, spans: Sequence[float] | None = None, shortest: int = 
 
 
 def shortest_hold(x: Array, span: float) -> int:
-    """Return how many samples a signal, when it moves, takes for half of its range; at least ten.
+    """Return the samples in which a moving signal covers half of its range; at least ten.
 
     A turning point lasts less, so that it is no hold. The mean speed is weighted with the way covered,
     and taken over steps that are long enough to stand out of the noise.
@@ -90,20 +90,20 @@ def shortest_hold(x: Array, span: float) -> int:
 
 
 def moves(signals: Sequence[Array]) -> bool:
-    """Tell whether a channel moves, within its pieces or between them, by more than white noise does."""
+    """Return whether a channel varies, within its pieces or between them, by more than white noise."""
     steps = np.concatenate([np.diff(x) for x in signals])
     # of white noise it is twice the variance
     return float(np.mean(steps**2)) < float(np.concatenate(signals).var())
 
 
 def _band(x: Array, span: float) -> float:
-    """Return how far a signal moves that stands still."""
+    """Return the variation of a constant signal."""
     noise = noise_level(x, span) if x.size > 1 else float("nan")
     return max(STILL * span, swing_threshold(noise, 0.0, x.size), 2.5 * _resolution(x, span))
 
 
 def _resolution(x: Array, span: float) -> float:
-    """Return the step between readings of a coarse sensor, 0 for one that is fine.
+    """Return the resolution of a coarse sensor, 0 for a fine one.
 
     Two readings side by side alternate under noise; the levels of a staircase do only where it turns.
     """

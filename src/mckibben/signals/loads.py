@@ -1,4 +1,4 @@
-"""Load profiles: what pulls at a muscle while it works."""
+"""Load profiles."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def constant(time: ArrayLike, value: float) -> Array:
 
 
 def ramps(time: ArrayLike, instants: Sequence[float], values: Sequence[float]) -> Array:
-    """Return straight lines through points; before the first and after the last, their values.
+    """Return straight lines through points, constant before the first and after the last.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def ramps(time: ArrayLike, instants: Sequence[float], values: Sequence[float]) -
 def pulls(
     time: ArrayLike, high: float, n_pulls: int = 3, duration: float = 8.0, low: float = 0.0
 ) -> Array:
-    """Return pulls as by a hand, evenly spread over the time: smoothly up, held a moment, let go.
+    """Return pulls as by a hand, evenly spaced in time: smooth rise, short hold, release.
 
     Parameters
     ----------

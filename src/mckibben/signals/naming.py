@@ -1,4 +1,4 @@
-"""Signals by name, with settings as a command line gives them."""
+"""Signals by name, with settings as on a command line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mckibben.errors import DataError
 
 
 def settings_of(name: str) -> dict[str, tuple[str, Any]]:
-    """Return what a signal can be told: setting -> (what it may be, default or None if required).
+    """Return the settings of a signal: name -> (type, default or None if required).
 
     Raises
     ------
@@ -48,7 +48,7 @@ def build(name: str, time: ArrayLike, **settings: Any) -> Array:
     time : array_like, shape (n,)
         Time [s].
     **settings
-        What it is told; numbers may be words, and sequences words joined by slashes: ``"1/2/3"``.
+        Its settings; numbers may be texts, and sequences words joined by slashes: ``"1/2/3"``.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Signals of which one period is known, between their samples."""
+"""Periodic signals, interpolated between samples."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from mckibben.arrays import Array
 
 
 def band_limited(samples: Array, ratio: int) -> Array:
-    """Return a period so many times as fine, with no frequency that its samples do not have.
+    """Return a period resampled so many times finer, without higher frequencies.
 
     Parameters
     ----------

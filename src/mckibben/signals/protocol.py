@@ -1,4 +1,4 @@
-"""A protocol: what a rig is to be driven with, run by run, and what each run is for."""
+"""A protocol: driving signals of a rig, run by run, with the role of each run."""
 
 from __future__ import annotations
 

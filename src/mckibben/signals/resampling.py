@@ -15,7 +15,7 @@ STOP_BAND = 60.0
 """Attenuation of what could alias [dB]."""
 
 PASS_SHARE = 0.8
-"""Share of the new Nyquist frequency up to which signals pass unchanged."""
+"""Share of the new Nyquist frequency up to which signals are unchanged."""
 
 
 def cut(recording: Recording, start: float, stop: float = np.inf) -> Recording:

@@ -1,4 +1,4 @@
-"""Turning points of a signal, told from noise; the branches and cycles between them."""
+"""Turning points of a noisy signal, and the branches and cycles between them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mckibben.system.compiling import deferred
 Indices = NDArray[np.int64]
 
 NOISE_SHARE = 0.05
-"""Sample-to-sample scatter above this share of the range is taken for movement, not for noise."""
+"""Sample-to-sample scatter, as a share of the range, above which it counts as motion, not noise."""
 
 SLIGHT = 1e-3
 """Scatter below this share of the range is small whatever makes it."""
@@ -29,8 +29,7 @@ RANGE_SHARE = 0.01
 """Smallest swing that counts as a movement, relative to the range."""
 
 WHOLE = 0.9
-"""A cycle at either end of a signal counts when its branch there is at least this share of the
-other one."""
+"""Smallest ratio of a first or last branch to its partner for a cycle to count."""
 
 
 def noise_level(x: ArrayLike, span: float | None = None) -> float:
@@ -49,9 +48,10 @@ def noise_level(x: ArrayLike, span: float | None = None) -> float:
     Returns
     -------
     float
-        NaN where noise cannot be told from movement: fewer than eight samples, or a scatter above
-        5 % of the range, as in levels chosen at random of which each was recorded once; or one above
-        0.1 % that grows where every second sample is left out, as that of fast motion does.
+        NaN where noise cannot be distinguished from movement: fewer than eight samples, or a
+        scatter above 5 % of the range, as in levels chosen at random of which each was recorded
+        once; or one above 0.1 % that grows where every second sample is left out, as that of fast
+        motion does.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def third_differences(x: Array) -> tuple[float, float]:
 
 
 def swing_threshold(noise: float, span: float, n: int) -> float:
-    """Return the smallest swing that is a movement: above the noise, and at least 1 % of the range.
+    """Return the smallest significant swing: above the noise, and at least 1 % of the range.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def branches(x: ArrayLike, threshold: float | None = None) -> list[tuple[int, in
 
 
 def branches_between(x: Array, turns: Indices) -> list[tuple[int, int, int]]:
-    """Return the branches between turning points that are known already, as `branches` does."""
+    """Return the branches between known turning points, as `branches` does."""
     ways = np.sign(np.diff(x[turns])).astype(int)
     return [
         (int(start), int(stop) + 1, int(way))
@@ -188,7 +188,7 @@ def cycles(x: ArrayLike, threshold: float | None = None) -> list[slice]:
 
 
 def whole_cycles(x: Array, turns: Indices, whole: float = WHOLE) -> list[slice]:
-    """Return the whole cycles between turning points that are known already.
+    """Return the whole cycles between known turning points.
 
     At either end of the signal, so much of the other branch as ``whole`` says is enough.
     """

@@ -80,7 +80,7 @@ def split_cycles(recording: Recording, channel: str, n_blocks: int) -> list[tupl
 def branches_of(
     recording: Recording, channel: str, threshold: float | None = None
 ) -> list[Recording]:
-    """Return the monotonic branches of a recording, each a recording of its own.
+    """Return the monotonic branches of a recording, each as a recording.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Steps: levels that are held, so that creep and the speed of the air can be seen."""
+"""Step signals, for creep and air dynamics."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ REGISTER_BITS = 15
 
 
 def staircase(time: ArrayLike, levels: Sequence[float], hold: float, ramp: float = 0.0) -> Array:
-    """Return levels that are held one after another, so that creep can be seen.
+    """Return a staircase of constant levels, for identifying creep.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def random_steps(
     *,
     seed: int,
 ) -> Array:
-    """Return random levels, held for random times.
+    """Return random levels of random durations.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def random_steps(
 
 
 def _holds(t: Array, hold: float, ramp: float) -> int:
-    """Return how many holds it takes to fill the time."""
+    """Return the number of holds that fill the time."""
     require_positive("hold", hold)
     require(
         0 <= ramp < hold, "ramp", ramp, f"0 s or more, less than a hold of {hold:g} s", DataError

@@ -10,7 +10,7 @@ from mckibben.errors import DataError
 
 
 def decimate_minmax(t: ArrayLike, *series: ArrayLike, max_points: int) -> tuple[Array, ...]:
-    """Return a few samples that look like all of them: lowest and highest of every bin.
+    """Return the lowest and highest sample of every bin, for display.
 
     Bins hold equally many samples. Every series keeps its own extrema, and all are thinned to the
     same samples, so that one may be drawn over another. The first and last sample stay where there

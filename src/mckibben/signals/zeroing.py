@@ -1,4 +1,4 @@
-"""Zeros of sensors: where a channel rests, and recordings that do not rest at the same place."""
+"""Zero offsets of sensors: rest values of channels, and their differences between recordings."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, moves, shortest_hold
 
 LOADS = ("pressure", "pressure_extensor", "force", "torque", "load")
-"""Quantities that stand still at rest, besides the input's own."""
+"""Quantities that are constant at rest, in addition to the input."""
 
-APART = 0.25
-"""Share of the travel by which recordings rest apart that are not of one zero."""
+LARGEST_DIFFERENCE = 0.25
+"""Largest difference of rest values, as a share of the travel, of recordings with one zero."""
 
 
 def rests(recordings: Sequence[Recording], channel: str, over: str) -> list[float] | None:
-    """Return where a channel rests in each recording.
+    """Return the rest value of a channel in each recording.
 
     At rest, every input and every load stands still, loads as in all other recordings, and the input is
     at the lowest value that all recordings have. None where some recording has no such rest.
@@ -66,7 +66,7 @@ def rests(recordings: Sequence[Recording], channel: str, over: str) -> list[floa
 
 
 def zeroed(recording: Recording, channels: Sequence[str], over: str) -> Recording:
-    """Return a recording whose channels are zero where it rests at the lowest input; see `rests`.
+    """Return a recording whose channels are zero at rest at the lowest input; see `rests`.
 
     Of a load that hangs on a muscle, this takes away where it hangs, too.
 
@@ -97,7 +97,7 @@ def zeroed(recording: Recording, channels: Sequence[str], over: str) -> Recordin
 
 
 def apart(recordings: Sequence[Recording], channel: str, over: str) -> tuple[float, float] | None:
-    """Return the lowest and the highest rest of recordings that are not of one zero, or None.
+    """Return the lowest and the highest rest value if recordings have different zeros, or None.
 
     They are not where all of them rest, by more than a quarter of what the one that moves most travels
     apart.
@@ -115,7 +115,7 @@ def apart(recordings: Sequence[Recording], channel: str, over: str) -> tuple[flo
     """
     found = rests(recordings, channel, over) if len(recordings) > 1 else None
     travel = max((float(np.ptp(one[channel])) for one in recordings), default=0.0)
-    if found is None or travel == 0 or max(found) - min(found) <= APART * travel:
+    if found is None or travel == 0 or max(found) - min(found) <= LARGEST_DIFFERENCE * travel:
         return None
     return min(found), max(found)
 

@@ -1,4 +1,4 @@
-"""A loop at a fixed rate, which knows how late it was.
+"""A loop at a fixed rate, with deadline statistics.
 
 Deadlines are counted from the start, so that lateness does not add up: after a late step the next
 ones catch up, and deadlines that passed while a step took too long are skipped and counted as missed.
@@ -19,8 +19,8 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.errors import require
 
-KEPT = 1_000_000
-"""Steps that statistics are of, at most: the latest."""
+MOST_STORED = 1_000_000
+"""Largest number of steps in the statistics: the latest."""
 
 SPIN = 0.0005
 """Before a deadline, how long to watch the clock instead of sleeping [s]: sleep is never exact."""
@@ -28,7 +28,7 @@ SPIN = 0.0005
 
 @dataclass(frozen=True)
 class Deadlines:
-    """How well a loop kept its rate.
+    """Deadline statistics of a loop.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Deadlines:
 
 @dataclass
 class FixedRate:
-    """Deadlines to iterate over: each turn starts at the next one.
+    """Iterable of deadlines: each iteration starts at the next one.
 
     Parameters
     ----------
@@ -99,12 +99,12 @@ class FixedRate:
 
     @property
     def deadlines(self) -> Deadlines:
-        """How well the rate was kept so far."""
+        """Deadline statistics so far."""
         return Deadlines(self.period, np.array(self._lateness), np.array(self._work), self._missed)
 
     def __iter__(self) -> Iterator[int]:
-        """Give the number of every deadline, from 0, at its time."""
-        self._lateness, self._work = deque(maxlen=KEPT), deque(maxlen=KEPT)
+        """Yield the number of every deadline, from 0, at its time."""
+        self._lateness, self._work = deque(maxlen=MOST_STORED), deque(maxlen=MOST_STORED)
         self._missed = 0
         n = math.inf if math.isinf(self.duration) else round(self.duration / self.period)
         start, number = self._now(), 0
@@ -123,7 +123,7 @@ class FixedRate:
             number = following
 
     def _now(self) -> float:
-        """Return the time, which never goes back, whatever the clock does."""
+        """Return the time from a monotonic clock."""
         read = self.clock()
         self._back += max(self._read - read, 0.0)
         self._read = read

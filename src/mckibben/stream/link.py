@@ -1,4 +1,4 @@
-"""Numbers over UDP, in a form that a microcontroller reads without a library.
+"""Numbers over UDP, in a format that a microcontroller can read without a library.
 
 A packet is ``b"mck1"``, a 32-bit sequence number, a 32-bit count, as many 64-bit floating-point
 numbers, and the CRC-32 of all before; everything little-endian. Packets that are not that, come late or
@@ -66,7 +66,7 @@ def unpacked(packet: bytes) -> tuple[int, Array] | None:
 
 
 class UDPLink:
-    """A two-way link to one peer: send numbers, and take the newest that came from it.
+    """A two-way link to one peer: sends numbers, and receives its newest ones.
 
     Nobody is heard or answered before the peer is named, by its address and port, here or by `accept`.
     That keeps out strangers and mistakes, not someone on the same network who forges the peer's
@@ -138,7 +138,7 @@ class UDPLink:
         return str(host), int(port)
 
     def accept(self, peer: tuple[str, int]) -> None:
-        """Name the peer: the one that is sent to, and the only one that is heard.
+        """Set the peer: the only one to send to and receive from.
 
         Parameters
         ----------
@@ -169,7 +169,7 @@ class UDPLink:
         return self._connected
 
     def send(self, values: ArrayLike) -> None:
-        """Send numbers to the peer; one that does not listen is no error.
+        """Send numbers to the peer; an unreachable peer is not an error.
 
         Parameters
         ----------
@@ -202,7 +202,7 @@ class UDPLink:
         self.dropped += 1
 
     def newest(self, timeout: float = 0.0) -> Array | None:
-        """Return the newest numbers that came since the last call, or None.
+        """Return the newest numbers received since the last call, or None.
 
         Whatever else comes, it returns when the time is up, with the newest good numbers of the packets
         that a buffer holds.
@@ -273,7 +273,7 @@ class UDPLink:
 
 
 def _resolved(peer: tuple[str, int]) -> tuple[str, int]:
-    """Return an address as packets carry it."""
+    """Return an address as in packets."""
     try:
         host, port = peer
         if 0 < port < 2**16:

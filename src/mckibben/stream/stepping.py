@@ -1,4 +1,4 @@
-"""A block in a loop: read, step, write, whatever comes."""
+"""A block in a real-time loop: read, step, write."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mckibben.stream.fixed_rate import Deadlines, FixedRate
 
 
 class Step(Stream):
-    """A stream that is called, and whose outputs are the caller's to keep."""
+    """A callable stream whose outputs are newly allocated."""
 
     def __call__(self, inputs: ArrayLike) -> Array:
         """Take one sample of every input and return the outputs, shape (n_outputs,)."""

@@ -1,1 +1,1 @@
-"""The main job: what the muscle does, which model to use, how sure that is, and its inverse."""
+"""Studies: characterization, model choice with uncertainty, and inverse."""

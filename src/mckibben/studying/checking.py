@@ -1,4 +1,4 @@
-"""Is the chosen model right? What it leaves of the test, at the samples that are scored."""
+"""Check of the chosen model on the scored samples of the test."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mckibben.errors import DataError
 def check_on_test(
     model: Block, split: Split, modelled: Sequence[Array], outputs: Sequence[str]
 ) -> Validation | str:
-    """Return what a model misses on the test, or why that cannot be told.
+    """Return the check of a model on the test, or why it cannot be checked.
 
     Parameters
     ----------

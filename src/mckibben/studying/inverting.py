@@ -1,4 +1,4 @@
-"""The inverse of a model, tried on the model itself."""
+"""Check of a model's inverse on the model itself."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ MOST_RISE = 20_000
 """Samples of a slow rise, and as many without time."""
 
 FOLLOWED = 1e-6
-"""Largest error of an inverse that counts as one, relative to the reachable range."""
+"""Largest error of a valid inverse, relative to the reachable range."""
 
 NEARLY = 0.01
-"""The same on what a model makes of a recording, whose start may be out of reach."""
+"""The same for a model's output on a recording, whose start may be out of reach."""
 
 
 @dataclass(frozen=True)
 class InverseCheck:
-    """The inverse of a model, tried on the model itself.
+    """Result of an inverse on its own model.
 
     Of one muscle, on a reference it can reach: where nothing is known of that, on what the model makes
     of a recording. Of several, on a measured motion, which it may not reach.
@@ -73,11 +73,11 @@ class InverseCheck:
 
     @property
     def given(self) -> str:
-        """What the inverse gives, in words."""
+        """Label of the inverse's outputs."""
         return ", ".join(channel.name for channel in self.inverse.outputs)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return which model is inverted, and how well."""
+        """Return the inverted model, and the errors."""
         reachable = None if self.reachable is None else list(self.reachable)
         found = {"model": self.model, "error": self.error, "reachable": reachable}
         return found | {"uncompensated_error": self.uncompensated_error}
@@ -105,7 +105,7 @@ def invert_best(board: Leaderboard, recording: Recording) -> InverseCheck | None
 
 
 def check_inverse(model: str, block: Block, recording: Recording) -> InverseCheck:
-    """Send a reference through the inverse and back through the model.
+    """Pass a reference through the inverse and back through the model.
 
     The reference has minor loops over all that can be reached; where a model does not say what that is,
     it is the output that the model gives for the recording, and of several inputs, the recorded motion.
@@ -127,17 +127,17 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
     """
     inverse = compensator(block)
     step, most, reachable, own = recording.sample_time, float("inf"), None, False
-    wished = recording
+    desired = recording
     if len(block.inputs) == 1:
         (output,) = block.outputs
         low, high = (float(end[0]) for end in block.reachable())
         own, most = bool(np.isinf([low, high]).all()), NEARLY
         if own:
             given = recording.select([channel.name for channel in block.inputs])
-            wished = given.with_channels(**{output.name: block.simulate(given)[output.name]})
+            desired = given.with_channels(**{output.name: block.simulate(given)[output.name]})
         elif np.isfinite([low, high]).all() and low < high:
             reachable, most = (low, high), FOLLOWED
-            wished = Recording(
+            desired = Recording(
                 {output.name: minor_loops(low, high)}, step, units={output.name: output.unit}
             )
         else:
@@ -145,13 +145,13 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
                 f"{model!r} has no output that it can reach whatever happened before",
                 remedy="identify it on a recording that covers the range of interest",
             )
-    reference = wished.matrix(channel.name for channel in block.outputs)
+    reference = desired.matrix(channel.name for channel in block.outputs)
     span = np.ptp(reference, axis=0) if reachable is None else np.array([high - low])
     span = np.maximum(span, np.finfo(float).tiny)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
-        found = inverse.simulate(wished.select([channel.name for channel in inverse.inputs]))
-        others = {c.name: wished[c.name] for c in block.inputs if c.name not in found}
+        found = inverse.simulate(desired.select([channel.name for channel in inverse.inputs]))
+        others = {c.name: desired[c.name] for c in block.inputs if c.name not in found}
         driven = found.with_channels(**others).select([c.name for c in block.inputs])
         output_of = block.simulate(driven).matrix(channel.name for channel in block.outputs)
     error = float((np.abs(output_of - reference) / span).max())
@@ -168,7 +168,7 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
         reference=reference,
         pressure=found.matrix(channel.name for channel in inverse.outputs),
         output=output_of,
-        time=wished.time,
+        time=desired.time,
         reachable=reachable,
         error=error,
         uncompensated=plain,
@@ -191,7 +191,7 @@ def minor_loops(low: float, high: float) -> Array:
 def _without(
     block: Block, recording: Recording, reference: Array, step: float | None
 ) -> Array | None:
-    """Return what a model does where its inputs are read off its own slow rise, shape (n, outputs).
+    """Return a model's outputs for inputs from its own slow rise, shape (n, outputs).
 
     Inputs rise from the lowest to the highest recorded, with what schedules as the recording begins.
     """

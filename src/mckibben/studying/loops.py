@@ -1,4 +1,4 @@
-"""Loops closed on a virtual rig with what a comparison found: nothing, every inverse, PID, and both."""
+"""Closed loops on a virtual rig: uncompensated, with every inverse, PID, and both."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from mckibben.rigs import Rig
 from mckibben.rigs.files import changes, recorded_on
 
 LONGEST = 200.0
-"""Of the motion that is followed [s]."""
+"""Longest motion that is tracked [s]."""
 
 SMOOTHED = 0.5
-"""Half of the window that a measured motion is smoothed over before it is followed [s]."""
+"""Half width of the window that smooths a measured motion before it is tracked [s]."""
 
 
 def recorded_rig(recordings: Sequence[Recording]) -> Rig | None:
-    """Return the virtual rig that recordings come from, as it was then; None where they name none.
+    """Return the virtual rig of recordings, in its recorded configuration; None if they name none.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def recorded_rig(recordings: Sequence[Recording]) -> Rig | None:
 
 
 def named(rig: Rig) -> str:
-    """Return the name of a rig, and what is changed of the published one."""
+    """Return the name of a rig, and its changes from the published one."""
     changed = ", ".join(changes(rig) or ())
     return f"{rig.name} (changed: {changed})" if changed else rig.name
 
@@ -48,7 +48,7 @@ def named(rig: Rig) -> str:
 def closed_loops(
     board: Leaderboard, chosen: str, rig: Rig, tests: Sequence[Recording], seed: int
 ) -> dict[str, Tracked]:
-    """Return what came of following a measured motion without compensation, and with what there is.
+    """Return tracking results of a measured motion, uncompensated and with every controller.
 
     That is every inverse, PID, and both together.
 
@@ -88,7 +88,7 @@ def closed_loops(
 
 
 def _followed(tests: Sequence[Recording], outputs: Sequence[str], held: Sequence[str]) -> Recording:
-    """Return a measured motion, smoothed, with what schedules held at its mean."""
+    """Return a smoothed measured motion, with scheduling inputs at their means."""
     model = max(tests, key=lambda run: min(float(np.ptp(run[name])) for name in outputs))
     step = model.sample_time or 0.05
     n = min(len(model), round(LONGEST / step))

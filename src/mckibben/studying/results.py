@@ -1,4 +1,4 @@
-"""What operations return: models, inverses, loops and code, with their numbers for JSON."""
+"""Results of operations: models, inverses, loops and code, with numbers for JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Price(NamedTuple):
-    """RMSE of the force from rest [N]: within the limits of a format, and without them."""
+    """RMSE of the force from rest [N]: with the limits of an export format, and without them."""
 
     force_rmse: float
     force_rmse_unlimited: float
@@ -26,7 +26,7 @@ class Price(NamedTuple):
 
 @dataclass(frozen=True)
 class Fit:
-    """A model that was identified.
+    """A fitted model.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class Tracking:
-    """How a reference was followed by a controller, and how without compensation.
+    """Tracking of a reference by a controller, and without compensation.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def _errors(found: Tracked) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Inverse:
-    """A compensator, or an estimate of force.
+    """A compensator, or a force estimator.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ class Inverse:
     file: Path | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what kind of inverse it is and what it reaches, for JSON."""
+        """Return the kind of inverse and its reachable range, for JSON."""
         return {
             "file": _text(self.file),
             "kind": self.kind,
@@ -170,7 +170,7 @@ class Inverse:
 
 @dataclass(frozen=True)
 class Exported:
-    """Code that was written.
+    """Exported code.
 
     Parameters
     ----------

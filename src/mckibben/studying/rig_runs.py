@@ -1,4 +1,4 @@
-"""What drives a rig from a command's words, and whole protocols recorded into a folder."""
+"""Commands of rigs from text, and recording of whole protocols to a folder."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mckibben.system.atomic import to_json, write_text, written
 
 
 def catalogue() -> dict[str, Any]:
-    """Return the rigs, the protocols made for them, and the signals that can drive them."""
+    """Return the rigs, their protocols, and the available signals."""
     rigs = {name: load_rig(name) for name in rig_names()}
     plans = {name: protocol(name) for name in registry.names("protocols")}
     signals = {name: settings_of(name) for name in registry.names("signals")}
@@ -95,7 +95,7 @@ def commands(
 
 
 def at_first_commands(rig: Rig, given: Recording) -> Rig:
-    """Return a rig that is at rest at the first commands, unless it has a start of its own."""
+    """Return a rig at rest at the first commands, unless it has its own start."""
     if rig.start:
         return rig
     limits = {name: rig.limits(name) for name in rig.inputs if name in given}
@@ -119,7 +119,7 @@ def record_protocol(
     force: bool = False,
     progress: Callable[[float, str], None] | None = None,
 ) -> tuple[list[str], list[str]]:
-    """Record a protocol into a folder: one file a run, and ``protocol.json``.
+    """Record a protocol to a folder: one file per run, and ``protocol.json``.
 
     Returns
     -------

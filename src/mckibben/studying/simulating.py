@@ -1,4 +1,4 @@
-"""A saved model run over a recording, with its errors and its band."""
+"""Simulation of a saved model on a recording, with its errors and its band."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def simulated(
 
 
 def _with_band(block: Block, interval: float | None) -> tuple[Any, Any]:
-    """Return the model with its band at a level, if one is asked for, and the model."""
+    """Return the model with its band at the requested level, if any, and the model."""
     if interval is None:
         return None, block.forward if isinstance(block, Banded) else block
     if not isinstance(block, Banded):
@@ -166,8 +166,10 @@ def _start(rule: str, block: Block, recording: Recording) -> Any:
 
 
 def _other_start(block: Block, recording: Recording, outputs: list[str]) -> list[str]:
-    """Return that a run does not begin as the model does, if so, while its band has how it begins."""
+    """Return a warning if a run starts in another state than the model with its band."""
     own = block.initial_state(recording.matrix(c.name for c in block.inputs)[0])
     if np.array_equal(measured_start(block, recording, outputs), own):
         return []
-    return ["the run does not begin as the model does; the band is for `initial=measured`"]
+    return [
+        "the run does not begin in the model's initial state; the band is for `initial=measured`"
+    ]

@@ -1,4 +1,4 @@
-"""The main job: what the muscle does, which model to use, and its inverse."""
+"""Studies: characterization, model choice, and inverse."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from mckibben.system.showing import DrawsItself
 
 @dataclass(frozen=True, repr=False)
 class Study(DrawsItself):
-    """Everything that ``mckibben study`` finds.
+    """Results of ``mckibben study``.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Study(DrawsItself):
         return self.leaderboard.output
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what was found, without the models and what they give."""
+        """Return the results without models and their outputs."""
         known = self.characterization
         return {
             "characterization": None if known is None else known.to_dict(),
@@ -128,29 +128,29 @@ def study(
     compensator: Block | None = None,
     **choices: Any,
 ) -> Study:
-    """Characterize recordings, choose a model by cross-validation, test it, and invert it if it can be.
+    """Characterize recordings, choose a model by cross-validation, test it, and invert it if possible.
 
-    Where it cannot, the next in the order of the choice is inverted that can. Where no model is worth
-    recommending, none is inverted.
+    If the chosen model has no inverse, the next best one with an inverse is inverted. If no model
+    is recommended, none is inverted.
 
-    Of several muscles, or under a load, a motion of the test is followed on a virtual rig by every
-    inverse, with PID feedback beside. An interrupt ends the work at once; the study then holds what was
-    finished.
+    For several muscles, or under a load, a test motion is tracked on a virtual rig with every
+    inverse, and with PID feedback. An interrupt ends the work at once; the study then has the
+    finished results.
 
     Parameters
     ----------
     train, test, seed, jobs, folder, clear, progress
         As for `compare`.
     rig : str, optional
-        Virtual rig to close loops on; default the one that recordings of several muscles say they come
-        from, with what was changed of it.
+        Virtual rig to close loops on; by default the rig of the recordings, with its changed
+        parameters.
     found : callable, optional
         Called with the study so far: once the muscle is characterized, before any model is fitted,
         then whenever a model is finished.
     model, compensator : Block, optional
-        What ran when ``train`` was logged, which is then reviewed first; see `review`.
+        Model and compensator of the loop logged in ``train``, which is then reviewed; see `review`.
     **choices
-        What else `compare` takes: channels, models, settings, what is allowed.
+        Further arguments of `compare`.
 
     Returns
     -------
@@ -239,7 +239,7 @@ def study(
 
 
 def _driven(log: Recording) -> Recording:
-    """Return a log with its commands for pressures, where it has none that are measured."""
+    """Return a log with its commands as pressures, if these were not measured."""
     names = [name.removeprefix(COMMAND) for name in log.channels if name.startswith(COMMAND)]
     blind = [name for name in names if name not in log]
     units = {name: log.units[COMMAND + name] for name in blind}

@@ -1,1 +1,1 @@
-"""What the operating system is asked for, safely: files, processes, threads, compiled functions."""
+"""Operating-system services: files, processes, threads, compiled functions."""

@@ -1,4 +1,4 @@
-"""Files are written under a temporary name and renamed, so that none is ever half there."""
+"""Atomic file writing, through a temporary name that is renamed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PART = ".mckibben-"
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """Open a temporary path in the same folder, and rename it to ``path`` when all went well.
+    """Open a temporary path in the same folder, and rename it to ``path`` on success.
 
     The temporary file is new, and has the rights of the file that it replaces. A link of that name is
     replaced itself: the file that it leads to stays as it is.
@@ -49,7 +49,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def written(path: str | Path) -> Iterator[None]:
-    """Raise a `DataError` that names this file in place of an `OSError`."""
+    """Convert an `OSError` to a `DataError` that names this file."""
     try:
         yield
     except OSError as error:
@@ -61,21 +61,21 @@ def written(path: str | Path) -> Iterator[None]:
 
 
 def demand_room(path: Path) -> None:
-    """Refuse a path that `replacing` would refuse, before any work is done for it."""
+    """Raise an error for a path that `replacing` would reject, before any work."""
     with written(path):
         _replaceable(path)
         tempfile.TemporaryFile(dir=path.parent).close()
 
 
 def _temporary(path: Path) -> Path:
-    """Make a file beside one, which was not there before."""
+    """Create a new temporary file in the same folder."""
     new = path.with_name(f"{PART}{secrets.token_hex(8)}.part")
     os.close(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
     return new
 
 
 def _replaceable(path: Path) -> os.stat_result | None:
-    """Return what has that name, if anything; folders, pipes and devices are refused."""
+    """Return an existing file of that name, if any; raise an error for folders, pipes and devices."""
     try:
         found = path.lstat()
     except (FileNotFoundError, NotADirectoryError):
@@ -98,7 +98,7 @@ def digest(content: bytes) -> str:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text file in UTF-8; what was there before stays until all is written."""
+    """Write a text file in UTF-8; an earlier file is replaced when all is written."""
     with replacing(path) as new:
         new.write_text(text, encoding="utf-8", newline="")
 
@@ -109,12 +109,12 @@ def to_json(value: Any) -> str:
 
 
 def write_json(path: str | Path, value: Any) -> None:
-    """Write a value as JSON, likewise."""
+    """Write a value as JSON, in the same way."""
     write_text(path, to_json(value) + "\n")
 
 
 def plain(value: Any) -> Any:
-    """Return dataclasses and arrays as JSON holds them; numbers that are not finite become None."""
+    """Return dataclasses and arrays as JSON values; non-finite numbers become None."""
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if hasattr(value, "tolist"):  # NumPy's

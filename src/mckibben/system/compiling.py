@@ -1,4 +1,4 @@
-"""Functions that numba compiles when they are first run, so that importing them does not load it.
+"""Functions compiled by numba at their first call, so that imports do not load it.
 
 What is compiled is cached for the next process, in the user's cache folder by version of the package, or
 in ``NUMBA_CACHE_DIR``. A compiled function holds those that it calls, wherever they are, and the numbers
@@ -73,7 +73,7 @@ def _note(text: str) -> None:
 
 
 class Deferred:
-    """A function that becomes numba's when it is first called, from Python or from another one."""
+    """A function compiled at its first call, from Python or from another compiled function."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
@@ -97,7 +97,7 @@ class Deferred:
         import numba
 
         digest = made_of(self)  # once: it looks at all that is called
-        compiled = numba.njit(**self.targetoptions)(_apart(self.py_func, digest))
+        compiled = numba.njit(**self.targetoptions)(_with_digest(self.py_func, digest))
         _compile_alike(compiled)
         if folder := cache_folder():
             compiled._cache = _Cache(folder, self.py_func.__qualname__, digest)
@@ -105,11 +105,11 @@ class Deferred:
 
     @property
     def _numba_type_(self) -> Any:
-        """What numba asks for where a compiled function calls this one."""
+        """Return the type that numba requests when a compiled function calls this one."""
         return self.dispatcher._numba_type_  # type: ignore[attr-defined]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how it is found elsewhere, and what it is made of, by which numba keeps its callers.
+        """Return how to find it in another process, and its digest for numba's cache.
 
         One that another function made stays in its process.
         """
@@ -135,15 +135,15 @@ def _again(function: Callable[..., Any], options: dict[str, Any], _: str) -> Def
 
 
 def deferred(function: Function, **options: Any) -> Function:
-    """Compile a function when it is first called, with exact arithmetic if not told otherwise.
+    """Compile a function at its first call, by default with exact arithmetic.
 
     ``options`` are those of `numba.njit`; other threads run meanwhile, and division is as NumPy's.
     """
     return cast("Function", Deferred(function, _OPTIONS | options))
 
 
-def _apart(given: Any, digest: str) -> Callable[..., Any]:
-    """Return a function named after the digest of all that it is made of, too.
+def _with_digest(given: Any, digest: str) -> Callable[..., Any]:
+    """Return a function with a digest of its content in its name.
 
     Numba calls compiled code by name. Two functions of one name, as those that one function makes, would
     be taken for each other where they come from files that two processes wrote.
@@ -157,7 +157,7 @@ def _apart(given: Any, digest: str) -> Callable[..., Any]:
 
 
 def _compile_alike(compiled: Any) -> None:
-    """Let a function be compiled once for constants and variables of one type, wherever it is called."""
+    """Compile a function once for constants and variables of one type, for all callers."""
     from numba.core import types
 
     unliteral: Any = types.unliteral
@@ -170,7 +170,7 @@ def _compile_alike(compiled: Any) -> None:
 
 
 class _Cache:
-    """What numba compiled of a function: a file for every signature, named after all that it is made of.
+    """Cache of compiled functions: a file per signature, named after a digest of the content.
 
     So a file is never of anything else, whatever other processes write at the same time. Numba's own
     cache shares one file among functions of one name, as of kernels that one function made.
@@ -191,7 +191,7 @@ class _Cache:
         return self._stem.with_name(f"{self._stem.name}-{digest[:40]}.nbc")
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """Return what was compiled for a signature; None if that is not there, or damaged."""
+        """Return the compiled code of a signature; None if it is missing or damaged."""
         from numba.core import compiler
 
         result: Any = compiler.CompileResult
@@ -208,7 +208,7 @@ class _Cache:
             return None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
-        """Write what was compiled for a signature, done without where that fails, as on a full disk."""
+        """Write the compiled code of a signature; failures, such as a full disk, are ignored."""
         from numba.core import serialize
 
         dumps: Any = serialize.dumps
@@ -221,7 +221,7 @@ class _Cache:
 
 
 def made_of(function: Deferred) -> str:
-    """Return a digest of a function, of those that it calls, however far, and of what they name."""
+    """Return a digest of a function, its callees, and the constants they use."""
     digest = sha256()
     for part in _parts(function, {}):
         digest.update(part.encode() + b"\n")
@@ -229,7 +229,7 @@ def made_of(function: Deferred) -> str:
 
 
 def _parts(value: Any, seen: dict[int, int]) -> Iterator[str]:
-    """Give what tells a value from another, to compiled code that holds it."""
+    """Yield the parts that distinguish a value for compiled code."""
     if isinstance(value, Deferred):
         new = id(value) not in seen
         yield f"function {seen.setdefault(id(value), len(seen))}"
@@ -277,7 +277,7 @@ def _code_parts(code: CodeType, known: dict[str, Any], seen: dict[int, int]) -> 
 
 
 def resolved(function: Function) -> Function:
-    """Return numba's own function, which is called without the detour, for calls sample by sample."""
+    """Return numba's function itself, for calls sample by sample without overhead."""
     return cast("Function", function.dispatcher) if isinstance(function, Deferred) else function
 
 
@@ -285,7 +285,7 @@ _entries: dict[tuple[Any, ...], Callable[..., None]] = {}
 
 
 def bound(function: Callable[..., None], *arrays: Any) -> Callable[[], None]:
-    """Return a call with these arrays; of one sample, their types are looked at now, not every time.
+    """Return a call with these arrays; the types for a single sample are resolved only once.
 
     The last array has a row, or number, for every sample.
     """
@@ -301,7 +301,7 @@ def bound(function: Callable[..., None], *arrays: Any) -> Callable[[], None]:
 
 
 def in_turn(*runs: Callable[[], None]) -> Callable[[], None]:
-    """Return one call of several."""
+    """Return one call of several in sequence."""
 
     def run() -> None:
         for each in runs:

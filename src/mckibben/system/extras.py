@@ -1,4 +1,4 @@
-"""Libraries that only some need."""
+"""Optional libraries."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from mckibben.errors import DataError
 
 
 def demand(module: str, extra: str, what: str, *, file: Path | None = None) -> None:
-    """Raise `DataError` where a library is not installed, naming the extra that brings it.
+    """Raise a `DataError` if a library is not installed, naming its extra.
 
     ``what`` needs it, in the plural or as a mass: "figures", "Parquet"; ``file`` is read with it.
     """

@@ -1,4 +1,4 @@
-"""Files are opened for reading here: ordinary ones only, and no more of one than allowed.
+"""Opening regular files for reading, with a size limit.
 
 A pipe or a device would wait or flow for ever, and a file may be larger than memory. What was opened is
 looked at, so that nothing can be put in its place in between.
@@ -24,7 +24,7 @@ _SMALL = 2**16
 
 
 class _Ordinary(io.BufferedReader):
-    """A file that makes no room for more than is left in it, whatever a format says there is."""
+    """A file whose reads are limited to its remaining size, whatever a format states."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         if size is not None and size > _SMALL:
@@ -34,7 +34,7 @@ class _Ordinary(io.BufferedReader):
 
 @contextmanager
 def opened(path: str | Path, *, most: int) -> Iterator[BufferedReader]:
-    """Open an ordinary file of at most so many bytes for reading.
+    """Open a regular file of at most so many bytes for reading.
 
     Raises
     ------
@@ -67,13 +67,13 @@ def opened(path: str | Path, *, most: int) -> Iterator[BufferedReader]:
 
 
 def read_bytes(path: str | Path, *, most: int) -> bytes:
-    """Return what an ordinary file holds; errors are those of `opened`."""
+    """Return the bytes of a regular file; errors as in `opened`."""
     with opened(path, most=most) as file:
         return file.read(most)
 
 
 def read_text(path: str | Path, *, most: int) -> str:
-    """Return what an ordinary file holds as text; it is also refused if that is not UTF-8."""
+    """Return the text of a regular file; raise an error also if it is not UTF-8."""
     try:
         return read_bytes(path, most=most).decode("utf-8-sig")  # which Windows' editors write
     except UnicodeDecodeError:

@@ -1,4 +1,4 @@
-"""Progress of long work: ``progress=True`` shows a bar, and a callable is called with it.
+"""Progress of long work: ``progress=True`` shows a bar; a callable is called.
 
 It is called with the share done, from 0 to 1, perhaps with words or the least error so far; or with an
 object that has a ``share`` and prints as words.
@@ -29,7 +29,7 @@ Item = TypeVar("Item")
 def telling(
     progress: bool | Tell | None, what: str, *, lines: bool = False
 ) -> Iterator[Tell | None]:
-    """Return what is called with the progress of work; None where nobody wants it.
+    """Return the callback of the progress of work; None without progress.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def telling(
 
 
 def words_of(given: str | float = "", *_: object) -> str:
-    """Return words, or the least error in words.
+    """Return a text, or the smallest error as text.
 
     >>> words_of(1.234), words_of("folds"), words_of(math.inf), words_of()
     ('best so far 1.23', 'folds', '', '')
@@ -74,7 +74,7 @@ def words_of(given: str | float = "", *_: object) -> str:
 
 
 def time_left(share: float, started: float) -> str:
-    """Return the time left, such as "about 40 s left", by the share done since a monotonic time.
+    """Return the time left, such as "about 40 s left", from the share done since a start time.
 
     Nothing within the first second, and at the end.
     """
@@ -85,7 +85,7 @@ def time_left(share: float, started: float) -> str:
 
 
 def one_by_one(items: Iterable[Item], tell: Tell | None) -> Iterator[Item]:
-    """Yield items one after another, and report the share that is done."""
+    """Yield items one after another, and report the share done."""
     listed = list(items)
     for place in range(len(listed) + 1):
         if tell is not None:
@@ -124,7 +124,7 @@ def _in_lines(what: str) -> Iterator[Show]:
 
 
 def _line(what: str, words: str) -> str:
-    """Return a line about work: names of recordings may hold anything."""
+    """Return a progress line, with control characters of names escaped."""
     words = "".join(c if c.isprintable() else " " for c in words)
     return f"{what}: {words}" if words else what
 

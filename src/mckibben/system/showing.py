@@ -1,4 +1,4 @@
-"""What shows itself: on a terminal, in a notebook, and in plots.
+"""Base classes of results with display on terminals, in notebooks, and in plots.
 
 How each kind is shown is in the report, which lies above all that is shown; it is looked up by name
 when it is asked for.
@@ -12,7 +12,7 @@ from mckibben.registry import load
 
 
 class ShowsItself:
-    """Prints as at most three lines of 80 columns, and shows in a notebook as a small card."""
+    """Prints as at most three lines of 80 columns, and displays as a small card in notebooks."""
 
     face: ClassVar[str]
     """Name of its kind, by which its card and its figures are found."""
@@ -27,7 +27,7 @@ class ShowsItself:
 
 
 class DrawsItself(ShowsItself):
-    """Is drawn, too: the figures of the reports, by name."""
+    """Also has the figures of the reports, by name."""
 
     def plot(self, kind: str | None = None, *, ax: Any = None, **choices: Any) -> Any:
         """Draw it with matplotlib.

@@ -1,4 +1,4 @@
-"""How many cores a call may use.
+"""Number of cores used by a call.
 
 Matrices here are small: linear algebra on all cores takes longer than on one, and many times as long
 beside other work. So it gets one thread, and cores are for models, folds and starts.
@@ -18,7 +18,7 @@ _cores: int | None = None
 
 
 def cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores that this process may use."""
     if _cores is not None:
         return _cores
     if hasattr(os, "sched_getaffinity"):
@@ -27,14 +27,14 @@ def cores() -> int:
 
 
 def use_cores(n: int) -> None:
-    """Let this process use so many cores from now on."""
+    """Set the number of cores of this process."""
     global _cores
     _cores = n
 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Give linear algebra one thread, in the whole process, until the last one inside leaves."""
+    """Limit linear algebra to one thread, in the whole process, until the last context exits."""
     global _inside
     with _lock:
         if _inside == 0:

@@ -1,4 +1,4 @@
-"""Processes that work for this one: quick to start, and ended at once.
+"""Worker processes that start fast and can be ended at once.
 
 joblib's cannot be stopped within a second and load the library each for themselves; it serves clusters
 (`mckibben.comparison.backends`). These are forked, where the system can, from a server that has loaded
@@ -26,7 +26,7 @@ from mckibben.errors import DataError, MckibbenError
 from mckibben.system import threads
 
 PRELOADED = ("mckibben.comparison.ranking", "mckibben.control", "numba", "scipy.optimize")
-"""What the server loads, so that no process has to."""
+"""Modules that the server of processes preloads."""
 
 ONE_THREAD = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
@@ -74,14 +74,14 @@ class Outcome:
 
 
 def in_turn(
-    work: Work, common: Any, items: Sequence[Any], told: Tell | None = None
+    work: Work, common: Any, items: Sequence[Any], report: Tell | None = None
 ) -> Iterator[Outcome]:
-    """Do the work in this process, one item after the other; see `Workers.results`."""
+    """Do the work in this process, item after item; see `Workers.results`."""
     for index, item in enumerate(items):
 
         def tell(*progress: Any, index: int = index) -> None:
-            if told is not None:
-                told(index, *progress)
+            if report is not None:
+                report(index, *progress)
 
         tell()
         try:
@@ -91,7 +91,7 @@ def in_turn(
 
 
 class Workers:
-    """A few processes; leaving the context ends them, whatever they are at.
+    """Worker processes; leaving the context ends them at once.
 
     Parameters
     ----------
@@ -118,9 +118,9 @@ class Workers:
             self._end(link)
 
     def results(
-        self, work: Work, items: Sequence[Any], told: Tell | None = None
+        self, work: Work, items: Sequence[Any], report: Tell | None = None
     ) -> Iterator[Outcome]:
-        """Yield the outcome of every item, as it comes; items are begun in their order.
+        """Yield the outcome of every item as it finishes; items are started in order.
 
         Parameters
         ----------
@@ -128,7 +128,7 @@ class Workers:
             A function of a module.
         items : sequence
             What to work on.
-        told : callable, optional
+        report : callable, optional
             Called with an item's index when it is begun, and with its progress.
         """
         waiting = list(enumerate(items))[::-1]
@@ -136,8 +136,8 @@ class Workers:
 
         def begin(link: connection.Connection) -> None:
             busy[link], item = waiting.pop()
-            if told is not None:
-                told(busy[link])
+            if report is not None:
+                report(busy[link])
             with suppress(ConnectionError):  # of one that has died, which is noticed next
                 link.send_bytes(pickle.dumps((work, item)))
 
@@ -162,8 +162,8 @@ class Workers:
                     del busy[link]
                     link = self._start() if waiting else link
                 if kind == "progress":
-                    if told is not None:
-                        told(index, *what)
+                    if report is not None:
+                        report(index, *what)
                     continue
                 if waiting:
                     begin(link)
@@ -198,33 +198,33 @@ def checked(jobs: int | None) -> int | None:
 
 
 def outcomes(
-    work: Work, common: Any, items: Sequence[Any], n: int, told: Tell | None = None
+    work: Work, common: Any, items: Sequence[Any], n: int, report: Tell | None = None
 ) -> Iterator[Outcome]:
-    """Yield the outcome of every item, from so many processes, or this one; see `Workers.results`."""
+    """Yield the outcome of every item, from worker processes or this one; see `Workers.results`."""
     if min(n, len(items)) <= 1 or multiprocessing.current_process().daemon:  # has no children
         with threads.one_blas_thread():
-            yield from in_turn(work, common, items, told)
+            yield from in_turn(work, common, items, report)
     else:
         with Workers(min(n, len(items)), common) as workers:
-            yield from workers.results(work, items, told)
+            yield from workers.results(work, items, report)
 
 
 def all_of(work: Work, items: Sequence[Any], jobs: int | None = None) -> list[Any]:
-    """Return the results of all items, from ``jobs`` processes, default as many as cores."""
+    """Return the results of all items, from ``jobs`` processes, by default as many as cores."""
     n = checked(jobs) or threads.cores()
     found = {outcome.index: outcome.result() for outcome in outcomes(work, None, items, n)}
     return [found[index] for index in range(len(items))]
 
 
 def leave(code: int) -> NoReturn:
-    """End this process at once, without its temporary folders; those that work for it end, too."""
+    """End this process and its workers at once, without removing temporary folders."""
     with suppress(Exception):
         util._run_finalizers()  # type: ignore[attr-defined]  # typeshed lacks it
     os._exit(code)
 
 
 def prepare(*more: str) -> None:
-    """Start loading what processes will need, in the background; call it as early as can be.
+    """Start preloading the libraries of workers in the background; call it early.
 
     ``more`` are modules besides `PRELOADED`.
     """
@@ -247,7 +247,7 @@ def prepare(*more: str) -> None:
 
 
 def _forget_the_server() -> None:
-    """Let a process forked from this one start a server of its own: this one's is not its child."""
+    """Let a forked process start its own server, as this one's is not its child."""
     forkserver._forkserver._forkserver_pid = None  # type: ignore[attr-defined]  # no public way
 
 
@@ -256,7 +256,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def context(*more: str) -> Any:
-    """Return how processes start: from a server that has loaded the library, or else spawned.
+    """Return the start method of processes: a preloaded server, or spawning.
 
     They are spawned where the caller set multiprocessing to that, or the system can do nothing else.
     """
@@ -269,7 +269,7 @@ def context(*more: str) -> Any:
 
 
 def end_with_parent() -> None:
-    """End this process when the one that started it ends, however it does.
+    """End this process when its parent ends.
 
     On Linux the system does so: a thread would wait as long as compiled code keeps all others from
     running.
@@ -314,7 +314,7 @@ def _serve(link: connection.Connection, common: Any, cores: int) -> None:
 
 
 def answered(work: Work, common: Any, item: Any, tell: Tell) -> bytes:
-    """Do the work, and return its value or error as it is sent; what cannot be sent is an error."""
+    """Do the work, and return its value or error for sending; unsendable values become errors."""
     try:
         return pickle.dumps(("value", work(common, item, tell)))
     except Exception as error:
@@ -327,7 +327,7 @@ def answered(work: Work, common: Any, item: Any, tell: Tell) -> bytes:
 
 
 def understood(answer: bytes) -> tuple[str, Any]:
-    """Return whether an answer is progress, a value or an error, and what."""
+    """Return whether a message is progress, a value or an error, and its content."""
     try:
         kind, what = pickle.loads(answer)
         return kind, what
@@ -337,7 +337,7 @@ def understood(answer: bytes) -> tuple[str, Any]:
 
 
 def said(error: Exception) -> str:
-    """Return an error in words, whatever its own words do."""
+    """Return the text of an error, guarding against errors in its formatting."""
     try:
         return f"{type(error).__name__}: {error}"
     except Exception:
@@ -346,7 +346,7 @@ def said(error: Exception) -> str:
 
 @contextmanager
 def _without_the_script() -> Iterator[None]:
-    """Hide the user's script from processes being started, which else run it again."""
+    """Hide the user's script from started processes, which would run it again."""
     with _starting:
         script = sys.modules["__main__"]
         sys.modules["__main__"] = ModuleType("__main__")

@@ -1,1 +1,1 @@
-"""Blocks of several muscles, or of a muscle and its load."""
+"""Blocks of several muscles, or of one muscle and its load."""

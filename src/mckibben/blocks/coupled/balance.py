@@ -1,4 +1,4 @@
-"""Muscles in parallel under load as a balance of forces that is the minimum of a convex energy.
+"""Force balance of muscles in parallel under load, as the minimum of a convex energy.
 
 What a muscle's pressure gives over its effective area holds its load, springs (its own and those that
 couple muscles, which stiffen with whatever schedules them), its rubber's elasticity, friction of the
@@ -57,7 +57,7 @@ from mckibben.errors import ModelError, ModelWarning
 def balance_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Give pressures; the last state counts samples that muscles cannot reach."""
+    """Compute pressures; the last state counts samples that are out of reach."""
     c = coefficients
     m, n_x = int(c[1]), int(c[2]) + int(c[4])
     way = give_pressures(c, state, scratch, inputs, outputs)
@@ -68,7 +68,7 @@ def balance_step(
 def balance_inverse_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Give coordinates; the last state counts samples that were not solved."""
+    """Compute coordinates; the last state counts samples that were not solved."""
     c = coefficients
     n, m, n_x = int(c[0]), int(c[1]), int(c[2]) + int(c[4])
     q, p, x = scratch[:m], inputs[:n], inputs[n : n + n_x]
@@ -87,7 +87,7 @@ def balance_inverse_step(
 def balance_inverse_start(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
 ) -> None:
-    """Start muscles at rest without pressure, or where the first pressures hold them."""
+    """Start muscles at rest without pressure, or in equilibrium with the first pressures."""
     c = coefficients
     n, m, n_x = int(c[0]), int(c[1]), int(c[2]) + int(c[4])
     p, x, q = inputs[:n], inputs[n : n + n_x], scratch[:m]
@@ -99,7 +99,7 @@ def balance_inverse_start(
 
 @dataclass(frozen=True, config=STRICT)
 class Balance(Invertible):
-    """From coordinates that n muscles move, and what schedules and loads them, to their pressures.
+    """Force balance: from coordinates of n muscles, scheduling inputs and loads to pressures.
 
     Forces are in N, or, of a model that knows no force, in bar on muscle 1's area at rest. Coordinates
     are the displacements of the muscles, or fewer: then each shortens along its direction, and loads and
@@ -251,7 +251,7 @@ class Balance(Invertible):
         self._check_physics()
 
     def _check_sizes(self) -> None:
-        """Refuse fields that do not fit one another, by their names."""
+        """Raise an error for fields of inconsistent sizes."""
         n, m, n_x = len(self.given), len(self.driven), self.n_schedules
         if n_x < 0:
             raise ModelError(
@@ -297,7 +297,7 @@ class Balance(Invertible):
                 )
 
     def _check_physics(self) -> None:
-        """Refuse numbers that would make energy, or mean nothing."""
+        """Raise an error for numbers that would generate energy or have no meaning."""
         if self.pressure_range is not None and not self.pressure_range[0] < self.pressure_range[1]:
             raise ModelError(
                 f"pressure_range of {self.kind!r} is {self.pressure_range}",
@@ -317,7 +317,7 @@ class Balance(Invertible):
         for name, values in named.items():
             if any(value < 0 for value in np.ravel(values)):
                 raise ModelError(
-                    f"{name} of {self.kind!r} has a number below 0, which would make energy",
+                    f"{name} of {self.kind!r} has a number below 0, which would generate energy",
                     remedy="give none below 0",
                 )
         if self.mass and self.pushes:
@@ -329,7 +329,7 @@ class Balance(Invertible):
             raise ModelError(f"hull of {self.kind!r} is {self.hull}", remedy="lower ends first")
 
     def equations(self) -> tuple[str, ...]:
-        """Return the balance of forces, without what this one lacks; then area and elasticity."""
+        """Return the force balance with the terms of this model, then area and elasticity."""
         schedules, y = self.n_schedules > 0, "q" if self.directions else "y"
         springs = rf"\sum_j S_{{kj}} {y}_j"
         if schedules:
@@ -372,50 +372,50 @@ class Balance(Invertible):
 
     @property
     def n_loads(self) -> int:
-        """How many of the scheduling inputs are loads: the last ones."""
+        """Number of loads: the last scheduling inputs."""
         return len(self.loads[0]) if self.loads else 0
 
     @property
     def n_schedules(self) -> int:
-        """How many of them schedule springs: the first ones."""
+        """Number of inputs that schedule springs: the first ones."""
         return len(self.scheduled) - self.n_loads
 
     @property
     def moves(self) -> Array:
-        """How much every muscle shortens by every coordinate, shape (n, m)."""
+        """Shortening of every muscle per coordinate, shape (n, m)."""
         return np.array(self.directions) if self.directions else np.eye(len(self.given))
 
     @property
     def known_coordinates(self) -> Array:
-        """Lowest and highest coordinates that the shortenings known come to, shape (m, 2)."""
+        """Lowest and highest coordinates of the identified range of shortening, shape (m, 2)."""
         ends = np.linalg.pinv(self.moves)[:, :, np.newaxis] * np.array(self.hull)
         return np.stack([ends.min(axis=2).sum(axis=1), ends.max(axis=2).sum(axis=1)], axis=1)
 
     @property
     def n_obstacles(self) -> int:
-        """How many obstacles every coordinate may meet."""
+        """Number of obstacles per coordinate."""
         return len(self.obstacles[0]) // (3 + self.n_schedules) if self.obstacles else 0
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether anything relaxes, damps or is heavy."""
+        """Whether there is relaxation, damping or mass."""
         return bool(self.lags) or any(self.damping) or any(self.lines) or any(self.mass)
 
     @property
     def n_states(self) -> int:
-        """Coordinates and tare; stretch, stops, lags and moves of muscles; a start, samples amiss."""
+        """States: coordinates, tare; stretch, stops, lags, moves of muscles; start, failed samples."""
         own = 1 + len(self.limits) + len(self.lags) + (2 if self.mass else 0)
         return len(self.given) * own + 2 * len(self.driven) + 2
 
     @property
     def n_scratch(self) -> int:
-        """Coordinates, pressures, four vectors and a matrix, a muscle's terms, and shares of muscles."""
+        """Scratch: coordinates, pressures, four vectors and a matrix, terms and shares of a muscle."""
         n, m, row = len(self.given), len(self.driven), (self.elasticity, self.areas)
         terms = 4 + sum(len(table[0]) for table in row) + len(self.limits) + len(self.lags)
         return 3 * n + 5 * m + m * m + 2 * terms
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what `mckibben.blocks.coupled.balance_law` says.
+        """Return the coefficients described in `mckibben.blocks.coupled.balance_law`.
 
         Raises
         ------
@@ -454,7 +454,7 @@ class Balance(Invertible):
         return np.full(len(self.given), low), np.full(len(self.given), high)
 
     def report(self, state: Array) -> None:
-        """Warn of references that would need pressures out of range, or muscles that push."""
+        """Warn of references that need pressures out of range, or pushing muscles."""
         if not state[-1] > 0:
             return
         low, high = self.pressure_range or (-np.inf, np.inf)
@@ -471,7 +471,7 @@ class Balance(Invertible):
         )
 
     def n_clipped(self, state: Array) -> int:
-        """Return how many samples needed pressures out of range."""
+        """Return the number of samples that needed pressures out of range."""
         return int(state[-1]) if state[-1] > 0 else 0
 
     solved: ClassVar[bool] = True
@@ -483,27 +483,27 @@ class Balance(Invertible):
 
     @property
     def n_inverse_states(self) -> int:
-        """As many as this block's, which count already."""
+        """Number of states of the inverse: as many as this block's."""
         return self.n_states
 
     def inverse_complaint(self, state: Array) -> str:
-        """Tell of pressures for which no equilibrium was found."""
+        """Return a warning about pressures without equilibrium."""
         return (
             f"{self.kind!r} found no equilibrium in {int(state[-1])} samples: the model was not made "
             "for such pressures"
         )
 
     def cost(self, sample_time: float | None) -> Cost:
-        """Return about six operations a number, for friction is looked at again for its root."""
+        """Return the cost: about six operations per number, as friction is evaluated twice."""
         operations = 6 * self.coefficients(sample_time).size
         return Cost(operations, 20 * operations)
 
     def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return what steps of Newton's method cost."""
+        """Return the cost of the Newton steps."""
         return newton_cost(4 * self.coefficients(sample_time).size + len(self.driven) ** 3)
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
-        """Return the unit of a number: forces are in N, or, of relative areas, in the input's."""
+        """Return the unit of a parameter: forces in N, or in the input's unit for relative areas."""
         moved, driving = self.driven[0].unit, self.given[0].unit
         force = driving if self.areas[0][0] == 1.0 else "N"
         if field in ("springs", "obstacles"):
@@ -527,7 +527,7 @@ class Balance(Invertible):
         return re.sub(r"\b(N|mm|bar)\b", lambda unit: units[unit[0]], declared)
 
     def name_of(self, field: str, index: tuple[int, ...]) -> str:
-        """Return what a number is called: by its muscle, what it acts on, and what schedules it."""
+        """Return the label of a parameter: its muscle, channel, and scheduling input."""
         if field in ("grip", "asymmetry"):
             return field
         on = self.driven if field in ("springs", "loads", "obstacles") else self.given
@@ -537,7 +537,7 @@ class Balance(Invertible):
             return f"{ONE_EACH[field]}{of}"
         place = index[-1]
         if field == "grips":
-            return f"grip by {self.scheduled[place].name}"
+            return f"friction offset by {self.scheduled[place].name}"
         if field == "springs":
             power, to = divmod(place, 1 + len(on))
             name = f"{'constant force' if to == 0 else 'spring'}{of}"
@@ -564,7 +564,7 @@ class Balance(Invertible):
 
     @classmethod
     def example(cls) -> Self:
-        """Return two muscles beside an extensor, one of them under a load."""
+        """Return two muscles with an extensor, one of them under a load."""
         return cls(
             springs=((0.0, 10.0, -2.0, -3.0, 1.0, 0.4), (0.0, -2.0, 11.0, -3.0, 0.4, 1.2)),
             elasticity=((6.0, 4.0), (3.0, 8.0)),
@@ -593,7 +593,7 @@ NOT_NEGATIVE = (
     *("friction", "relaxation", "damping", "walls", "lines", "grip", "bladders", "pushes", "mass"),
     "grips",
 )
-"""Fields without numbers below 0."""
+"""Fields of non-negative numbers."""
 
 ONE_EACH = {
     "damping": "damping",
@@ -603,11 +603,11 @@ ONE_EACH = {
     "pushes": "force of slackening",
     "mass": "mass",
 }
-"""Fields that have one number for every muscle, in words."""
+"""Fields with one number per muscle, and their labels."""
 
 
 class Placed(NamedTuple):
-    """A balance, whether the model solves it for coordinates, and what comes before and behind."""
+    """A balance, its direction in the model, and the parts before and after it."""
 
     balance: Balance
     solved: bool
@@ -616,7 +616,7 @@ class Placed(NamedTuple):
 
 
 def balance_in(model: Block) -> Placed | None:
-    """Return the balance of a model, a compensator or its inverse; None if it has none."""
+    """Return the balance of a model, compensator or inverse; None if it has none."""
     parts = model.parts if isinstance(model, Series) else (model,)
     for place, part in enumerate(parts):
         solved = isinstance(part, Inverse)

@@ -1,4 +1,4 @@
-"""How a balance of forces follows what is measured, and stays one that it can be.
+"""Adaptation of a force balance to measurements, within its physical bounds.
 
 Of every muscle a constant force and four factors are learnt: on its springs and elasticity, its area,
 its friction, and what relaxes. Springs of coordinates go with the factors of the muscles that move them,
@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     from mckibben.blocks.coupled.balance import Balance
 
 OFFSET, STIFFNESS, AREA, FRICTION, RELAXATION = range(5)
-"""What is learnt of a muscle."""
+"""Adaptive parameters of a muscle."""
 
 GROUPS = {
     STIFFNESS: Group("springs", "stiffer", "softer"),
@@ -73,7 +73,7 @@ GROUPS = {
     RELAXATION: Group("relaxation", "more", "less"),
     OFFSET: Group("pull", "more", "less"),
 }
-"""Their names; a force that is added is a pull that is less."""
+"""Names of the adaptive parameters; an added force reduces the pull."""
 
 ROW = 9
 """Numbers of a parameter: its muscle, the first of the terms that it is a factor on and the first
@@ -81,26 +81,26 @@ behind, the constant force of the muscle that it adds, its ends, the same by the
 the place of that factor among parameters, or -1; then its share in the springs of every coordinate."""
 
 FACTORS = 0.5, 2.0
-"""Least and most of what was fitted."""
+"""Smallest and largest factor on fitted values."""
 
 MOST_FORCE = 0.3
-"""Constant force, relative to its scale."""
+"""Largest constant force, relative to its scale."""
 
 USUAL_TOP = 10.0
-"""Highest pressure where none is said [bar]."""
+"""Highest pressure if the model has no limit [bar]."""
 
 LEAST_LEFT = 0.05
-"""Area that friction has to leave, relative to that at rest, as where it was identified."""
+"""Smallest area left after friction, relative to the area at rest, as in identification."""
 
 GRID = 21
-"""Places along what is known of a displacement where conditions are looked at."""
+"""Grid points over the known range of a displacement at which constraints are checked."""
 
 
 @step
 def balance_adaptive_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Learn, and give pressures.
+    """Adapt parameters, and compute pressures.
 
     The family's coefficients are [coordinates, a row for every parameter, the balance's]. The state is
     [the balance's, coordinates of the last sample, their slopes by parameters, what is learnt]; scratch
@@ -145,7 +145,7 @@ def balance_adaptive_step(
 
 @kernel
 def own_states(learner: Array, state: Array) -> int:
-    """Return how many of the states are the balance's."""
+    """Return the number of states of the balance."""
     size, m = int(learner[0]), int(learner[family_at(learner)])
     return state.size - m - (m + 2) * size - root_size(size) - SENSES * m
 
@@ -154,7 +154,7 @@ def own_states(learner: Array, state: Array) -> int:
 def balance_adaptive_start(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
 ) -> None:
-    """Start as the balance does, with the parameters as fitted."""
+    """Start as the balance does, with the fitted parameters."""
     size, at, n_own = int(coefficients[0]), family_at(coefficients), own_states(coefficients, state)
     m = int(coefficients[at])
     fitted = coefficients[at + 1 + (ROW + m) * size :]
@@ -165,7 +165,7 @@ def balance_adaptive_start(
 
 @kernel
 def retune(fitted: Array, family: Array, changes: Array, c: Array, g: Array) -> None:
-    """Fill the coefficients with changes of parameters, and the factors on springs of coordinates."""
+    """Set the coefficients from parameter changes, and the factors on springs of coordinates."""
     fill(c, fitted)
     m, n_powers = int(c[1]), 1 + int(c[2]) * int(c[3])
     g[:] = 1.0
@@ -196,7 +196,7 @@ def slopes_of(
     slopes: Array,
     work: Array,
 ) -> None:
-    """Fill the slopes of coordinates by parameters, those of each coordinate in turn."""
+    """Fill the derivatives of each coordinate by the parameters."""
     m, width, elastic = int(c[1]), n_terms(c), DYNAMIC + int(c[7])
     size, square = slopes.size // m, m * m
     forces, rest = work[: slopes.size].reshape((m, size)), work[slopes.size :]
@@ -240,7 +240,7 @@ def slopes_of(
 
 @kernel
 def keep_balanced(c: Array, family: Array, learnt: Array, along: Array, work: Array) -> None:
-    """Bring parameters into what a balance can have.
+    """Project parameters onto the physical bounds of a balance.
 
     What is changed takes the others along as they are known to go together, which may not be possible
     twice.
@@ -269,7 +269,7 @@ def keep_balanced(c: Array, family: Array, learnt: Array, along: Array, work: Ar
 
 
 def learnable_balance(balance: Balance) -> Learnable:
-    """Return what is learnt of a balance of forces, a compensator: factors of 1, and forces of 0.
+    """Return the adaptive parameters of a balance: factors of 1, and forces of 0.
 
     Factors are expected to change by 30 %, forces by 10 % of that of the highest pressure at rest.
     """
@@ -306,7 +306,7 @@ def learnable_balance(balance: Balance) -> Learnable:
 
 
 def learnt_of(balance: Balance) -> list[tuple[int, int]]:
-    """Return the muscle and the kind of every parameter that is learnt."""
+    """Return muscle and kind of every adaptive parameter."""
     found = []
     for k in range(len(balance.given)):
         lasting = any(balance.friction[k]), any(balance.relaxation[k])
@@ -324,7 +324,7 @@ def top_of(balance: Balance) -> float:
 
 
 def family_of(balance: Balance, learnt: list[tuple[int, int]], scales: Array) -> Array:
-    """Return a row for every parameter, shape (k, `ROW` + m)."""
+    """Return a row per parameter, shape (k, `ROW` + m)."""
     counts = (balance.elasticity[0], balance.areas[0], balance.limits, balance.lags)
     behind = DYNAMIC + np.cumsum([0, *map(len, counts)])
     table = np.zeros((len(learnt), ROW + len(balance.driven)))
@@ -345,13 +345,13 @@ def family_of(balance: Balance, learnt: list[tuple[int, int]], scales: Array) ->
 
 
 def shares_of(balance: Balance) -> Array:
-    """Return every muscle's share in the springs of coordinates, shape (n, m)."""
+    """Return each muscle's share in the springs of the coordinates, shape (n, m)."""
     squares = balance.moves**2
     return np.asarray(squares / squares.sum(axis=0))
 
 
 def changed(balance: Balance, learnt: list[tuple[int, int]], changes: Array) -> Balance:
-    """Return the balance with other forces and factors."""
+    """Return the balance with changed forces and factors."""
     n, m = balance.moves.shape
     table = np.zeros((len(GROUPS), n))
     table[tuple(np.array(learnt).T[::-1])] = changes
@@ -373,7 +373,7 @@ def changed(balance: Balance, learnt: list[tuple[int, int]], changes: Array) -> 
 
 
 def ratios(balance: Balance, k: int) -> tuple[float, float]:
-    """Return most friction by area, and most area by stiffness, as factors, of a muscle.
+    """Return the bounds on friction over area, and on area over stiffness, as factors.
 
     At least 1: what was fitted may be. Springs of coordinates add what they have for all muscles
     whatever their factors: f w w' is at most f diag(w w'), times how many coordinates one moves.
@@ -393,7 +393,7 @@ def ratios(balance: Balance, k: int) -> tuple[float, float]:
 
 
 def softest_of(balance: Balance) -> float:
-    """Return the least stiffness of the springs of coordinates, whatever schedules them."""
+    """Return the smallest stiffness of the coordinates' springs over all scheduling inputs."""
     m, n_x = len(balance.driven), balance.n_schedules
     springs = np.array(balance.springs).reshape(m, -1, 1 + m)[:, :, 1:]
     ends, least = balance.known[:n_x] or n_x * ((0.0, 0.0),), np.inf

@@ -1,4 +1,4 @@
-"""Forces in balance: the terms of every muscle, and the two solutions of their equation.
+"""Forces of the balance: the terms of every muscle, and the two solvers of the balance.
 
 Of coordinates q that n muscles move, with y_k = W_k q the shortening of muscle k (W is the identity
 where every coordinate has a muscle of its own), virtual work asks at every coordinate j
@@ -43,23 +43,24 @@ OWN, DYNAMIC = 4, 4
 """Coefficients of a muscle before its directions; terms before elasticity."""
 
 LEAST_AREA = 0.01
-"""Smallest area, relative to that at rest: a muscle that is as short as it gets pulls no more."""
+"""Smallest area, relative to that at rest: a fully contracted muscle has no pull."""
 
 AT_REST, FROM_REST, IN_TIME = 0, 1, 2
-"""Ways to a sample: without friction and lags; all at once, before anything relaxes or damps; in the
-sample time."""
+"""How a sample is computed: without friction and lags; as a step before relaxation and damping;
+over the sample time.
+"""
 
 NEVER = 1e30
-"""Force at which what never goes slack would."""
+"""Slack force of muscles that never go slack."""
 
 MOST_STEPS, MOST_SEARCHED = 60, 25
-"""Of Newton's method, and along each step."""
+"""Maximum number of Newton steps, and of line-search steps in each."""
 
 BALANCED, NEARLY = 2e-15, 1e-9
-"""Residual, relative to the forces, that is an equilibrium, and that is one but for rounding."""
+"""Relative residual of an equilibrium, and of one to within rounding."""
 
 SURE = 1e-11
-"""Residual from which one step more, be it not looked at, ends at an equilibrium."""
+"""Residual from which one further Newton step converges without a check."""
 
 HAIR = 1e-9
 """Relative difference of pressures that is rounding."""
@@ -72,7 +73,7 @@ SINGLE = {"BALANCED": 1e-6, "NEARLY": 1e-4, "SURE": 1e-5, "HAIR": 1e-6}
 
 @kernel
 def coordinate_at(c: Array, j: int) -> int:
-    """Return the place of the first coefficient of a coordinate."""
+    """Return the index of the first coefficient of a coordinate."""
     springs = (1 + int(c[2]) * int(c[3])) * (1 + int(c[1]))
     width = springs + int(c[4]) + int(c[9]) * (3 + int(c[2]))
     return HEAD + int(c[5]) + 2 * int(c[6]) + int(c[2]) + j * width
@@ -80,25 +81,25 @@ def coordinate_at(c: Array, j: int) -> int:
 
 @kernel
 def n_terms(c: Array) -> int:
-    """Return how many terms the resistance of a muscle has."""
+    """Return the number of force terms of a muscle."""
     return DYNAMIC + int(c[7]) + int(c[8]) + int(c[5]) + int(c[6])
 
 
 @kernel
 def muscle_at(c: Array, k: int) -> int:
-    """Return the place of the first coefficient of a muscle."""
+    """Return the index of the first coefficient of a muscle."""
     return coordinate_at(c, int(c[1])) + k * (OWN + int(c[1]) + n_terms(c))
 
 
 @kernel
 def terms_at(c: Array, k: int) -> int:
-    """Return the place of the first coefficient of a muscle's terms."""
+    """Return the index of the first coefficient of a muscle's terms."""
     return muscle_at(c, k) + OWN + int(c[1])
 
 
 @kernel
 def work_size(c: Array) -> int:
-    """Return how many numbers `solve_equilibrium` computes in."""
+    """Return the length of the working memory of `solve_equilibrium`."""
     m = int(c[1])
     return 4 * m + m * m + 2 * n_terms(c)
 
@@ -108,7 +109,7 @@ def work_size(c: Array) -> int:
 
 @short_kernel
 def shortening(c: Array, k: int, q: Array) -> float:
-    """Return how much shorter muscle k is at coordinates."""
+    """Return the shortening of muscle k at given coordinates."""
     if c[20] == 0.0:
         return q[k]
     own = muscle_at(c, k) + OWN
@@ -120,7 +121,7 @@ def shortening(c: Array, k: int, q: Array) -> float:
 
 @kernel
 def spring_row(c: Array, j: int, x: Array, row: Array) -> float:
-    """Fill the springs of coordinate j to all, as scheduled; return its constant force."""
+    """Fill the scheduled springs of coordinate j to all others; return its constant force."""
     m, degree = int(c[1]), int(c[3])
     place = coordinate_at(c, j)
     constant = c[place]
@@ -162,7 +163,7 @@ def coupling_force(c: Array, j: int, q: Array, x: Array, gradient: Array) -> flo
 
 @short_kernel
 def area(c: Array, k: int, y: float) -> tuple[float, float]:
-    """Return a muscle's effective area, and its slope; beyond what is known it goes on straight."""
+    """Return a muscle's effective area and its slope, extrapolated linearly beyond the known range."""
     own, place = muscle_at(c, k), terms_at(c, k) + DYNAMIC + int(c[7])
     inside = min(max(y, c[own]), c[own + 1])
     u = inside / c[10]
@@ -180,7 +181,7 @@ def area(c: Array, k: int, y: float) -> tuple[float, float]:
 
 @short_kernel
 def friction_pressure(c: Array, p: float, x: Array) -> float:
-    """Return the pressure that the limits of friction are proportional to."""
+    """Return the pressure that friction limits are proportional to."""
     total = p + c[11]
     place = HEAD + int(c[5]) + 2 * int(c[6])
     for s in range(int(c[2])):
@@ -200,7 +201,7 @@ def friction(
     terms: Array,
     by_y: Array,
 ) -> tuple[float, float]:
-    """Fill the stops of muscle k, and their slopes by y; return their force, and its slope by p."""
+    """Fill the stops of muscle k and their slopes by y; return their force and its slope by p."""
     n, m, n_s = int(c[0]), int(c[1]), int(c[5])
     first = n_terms(c) - int(c[6]) - n_s
     place = terms_at(c, k) + first
@@ -314,7 +315,7 @@ def muscle_force(
     terms: Array,
     by_y: Array,
 ) -> tuple[float, float, float]:
-    """Do as `resistance`; of a slack muscle terms are 0, and the force is the most it resists with."""
+    """As `resistance`; for a slack muscle, terms are 0 and the force is its largest resistance."""
     force, slope, size = resistance(c, k, state, way, y, p, x, terms, by_y)
     most = c[muscle_at(c, k) + 3]
     if not force > most:
@@ -327,7 +328,7 @@ def muscle_force(
 
 @kernel
 def update_state(c: Array, state: Array, way: int, q: Array, p: Array, x: Array) -> None:
-    """Bring the state to where the muscles are now, after which something has come before."""
+    """Update the state to the current position of the muscles."""
     n, m, n_s, n_l = int(c[0]), int(c[1]), int(c[5]), int(c[6])
     for k in range(n):
         y = shortening(c, k, q)
@@ -370,7 +371,7 @@ def unbalanced(
     sizes: Array,
     terms: Array,
 ) -> float:
-    """Fill what forces on every coordinate lack to a balance, and its slopes; return the largest share.
+    """Fill the residual force of every coordinate and its slopes; return the largest relative one.
 
     That is infinite where forces are. ``terms`` has two numbers a term to compute in.
     """
@@ -408,7 +409,7 @@ def unbalanced(
 def solve_equilibrium(
     c: Array, state: Array, way: int, q: Array, x: Array, p: Array, work: Array
 ) -> float:
-    """Move coordinates to where pressures hold them; return what is left of the residual.
+    """Solve for the coordinates in equilibrium with the pressures; return the residual.
 
     Where no place is found, they stay where they were. ``work`` has `work_size` numbers; those after
     the first four vectors begin with the slopes of the residual.
@@ -473,7 +474,7 @@ def solve_equilibrium(
 
 @kernel
 def start_at_rest(c: Array, state: Array, x: Array, q: Array, p: Array, work: Array) -> None:
-    """Rest without pressure, and take the tare there; nothing has come before the first sample."""
+    """Start at rest without pressure, and set the tare there."""
     for i in range(state.size):
         state[i] = 0.0
     for j in range(q.size):
@@ -495,7 +496,7 @@ def start_at_rest(c: Array, state: Array, x: Array, q: Array, p: Array, work: Ar
 def pressure_for(
     c: Array, k: int, state: Array, way: int, y: float, wanted: float, x: Array, terms: Array
 ) -> float:
-    """Return the pressure at which muscle k resists with a force.
+    """Return the pressure at which muscle k exerts a force.
 
     It is the one root of a function that falls piecewise straight, since areas are larger than what
     friction grows with pressure.
@@ -530,7 +531,7 @@ def pressure_for(
 def solve_pressures(
     c: Array, state: Array, way: int, q: Array, x: Array, p: Array, work: Array
 ) -> bool:
-    """Fill the pressures that hold muscles at coordinates; return whether there are such.
+    """Fill the pressures that hold the muscles at coordinates; return whether they exist.
 
     Muscles that are more than coordinates take the forces that they rest with at the pressure they
     share, and the least changes of them that balance; those that would leave the range of pressures, or
@@ -594,7 +595,7 @@ def solve_pressures(
 
 @kernel
 def give_pressures(c: Array, state: Array, scratch: Array, given: Array, p: Array) -> int:
-    """Give the pressures of a sample, and the way to it; then scratch begins with where muscles are.
+    """Compute the pressures of a sample; scratch then starts with the muscles' positions.
 
     The last state counts samples that muscles cannot reach.
     """
@@ -619,7 +620,7 @@ def give_pressures(c: Array, state: Array, scratch: Array, given: Array, p: Arra
 def start_balance(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
 ) -> None:
-    """Start muscles at rest without pressure, or at the first displacements, with nothing loaded."""
+    """Start muscles at rest without pressure, or at the first displacements with unloaded friction."""
     c = coefficients
     n, m, n_x = int(c[0]), int(c[1]), int(c[2]) + int(c[4])
     x, q, p, work = inputs[m : m + n_x], scratch[:m], scratch[m : m + n], scratch[m + n :]

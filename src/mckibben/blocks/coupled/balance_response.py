@@ -1,4 +1,4 @@
-"""What muscles do about mid-range: loops and steps, the same whether a model is asked or a rig.
+"""Mid-range responses of muscles, loops and steps, evaluated alike for models and rigs.
 
 Nothing is read off coefficients: pressures and loads are moved up and down, stepped and held, as one
 would at a bench.
@@ -19,12 +19,12 @@ KINDS = ("reach", "width", "stiffness", "creep")
 input over how far it moves; share of a step's way that comes after the first second."""
 
 AFTER = 1.0
-"""Time after a step from which what moves is creep [s]."""
+"""Time after a step from which motion counts as creep [s]."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Loops of every pressure and load in turn, about mid-range of all, and steps of pressures.
+    """Loops of every pressure and load about mid-range, and steps of pressures.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Trial:
     seconds: float
 
     def response(self, respond: Callable[[Array], Array], quarter: int) -> Array:
-        """Return what is found, shape (KINDS, inputs, outputs), in the units of all; NaN of no trial.
+        """Return the responses, shape (KINDS, inputs, outputs), in channel units; NaN without a trial.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Lags and play operators of several inputs, read out by a polynomial: many inputs to many outputs.
+"""Lags and play operators of several inputs with a polynomial readout.
 
 Every input passes first-order lags, every lagged input play operators; outputs are linear in those, and
 in products of the first lag's inputs up to a degree, and of these with all other lags and plays:
@@ -30,7 +30,7 @@ from mckibben.errors import ModelError
 
 @step
 def coupled_memory_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run lags, then plays, then the readout.
+    """Advance lags, then play operators, then the readout.
 
     Coefficients are [lags, thresholds, degree, crossed, decays, thresholds (inputs by thresholds),
     readout].
@@ -78,7 +78,7 @@ def coupled_memory_step(coefficients: Array, state: Array, inputs: Array, output
 
 @kernel
 def coupled_memory_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start at rest at the first inputs, reached from zero, or with all at zero."""
+    """Start at rest at the first inputs, reached from zero, or with all states zero."""
     n, n_lags, m = inputs.size, int(coefficients[0]), int(coefficients[1])
     radii = coefficients[4 + n_lags : 4 + n_lags + n * m]
     for lag in range(n_lags):
@@ -116,7 +116,7 @@ class CoupledMemory(Block):
     kernel = coupled_memory_step
     start_kernel = coupled_memory_start
     parameters = ("readout",)
-    no_inverse = "has no inverse: its lags cannot be undone within a sample"
+    no_inverse = "has no inverse: its lags cannot be inverted within a sample"
     instead = "invert balance or sdchm, or close a loop"
     notation = Notation(
         r"\tau_l \dot{x}_{li} = u_i - x_{li},\quad z_{lik} = F_{r_{ik}}[x_{li}]",
@@ -161,7 +161,7 @@ class CoupledMemory(Block):
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether any lag takes time."""
+        """Whether there are lags."""
         return any(self.lags)
 
     @property
@@ -170,7 +170,7 @@ class CoupledMemory(Block):
         return len(self.lags) * len(self.inputs) * (1 + len(self.thresholds[0]))
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return sizes, decays over a sample, thresholds and readout."""
+        """Return sizes, decays per sample, thresholds and readout."""
         step = needs_sample_time(self.kind, sample_time) if self.rate_dependent else 1.0
         head = [len(self.lags), len(self.thresholds[0]), self.degree, self.crossed]
         decays = [math.exp(-step / tau) if tau else 0.0 for tau in self.lags]
@@ -178,7 +178,7 @@ class CoupledMemory(Block):
         return np.concatenate([head, decays, radii, self.pack()])
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
-        """Return the unit of a number: a readout is the output per inputs multiplied."""
+        """Return the unit of a parameter: for the readout, the output per product of inputs."""
         if field != "readout":
             return super().unit_of(field, index)
         units = [channel.unit for channel in self.inputs]
@@ -197,7 +197,7 @@ class CoupledMemory(Block):
 
     @classmethod
     def example(cls) -> Self:
-        """Return two inputs that move one tip."""
+        """Return a model of two inputs and one tip."""
         width = readout_width(2, 2, 1, 2)
         readout = 0.5 / (1.0 + np.arange(width))
         return cls(
@@ -214,7 +214,7 @@ class CoupledMemory(Block):
 def readout_width(
     n: int, n_lags: int, n_thresholds: int, degree: int, crossed: bool = False
 ) -> int:
-    """Return how many numbers the readout of one output has."""
+    """Return the number of readout weights of one output."""
     products = sum(
         len(list(combinations_with_replacement(range(n), power))) for power in range(2, degree + 1)
     )

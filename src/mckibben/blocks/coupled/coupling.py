@@ -1,4 +1,4 @@
-"""Linear coupling of muscles: what each gives is felt by all, h = G^T v.
+"""Linear coupling of muscles, h = G^T v.
 
 Muscles may be more than the coordinates that they move together, or the other way round.
 
@@ -22,12 +22,12 @@ from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 WORST_CONDITION = 1e8
-"""Beyond this condition number a coupling is taken for singular."""
+"""Condition number above which a coupling counts as singular."""
 
 
 @step
 def coupling_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Multiply by a matrix; coefficients are the matrix, row after row, one row an output."""
+    """Multiply by a matrix; coefficients are its rows, one per output."""
     n = inputs.size
     for j in range(outputs.size):
         total = 0.0
@@ -93,7 +93,7 @@ class Coupling(Block):
         return float(np.abs(np.linalg.eigvals(np.eye(n) - self.matrix.T)).max())
 
     def inverse(self) -> Block:
-        """Return the decoupling v = G^-T h, by direct solution; of several v, the least.
+        """Return the decoupling v = G^-T h; for redundant v, the one of least norm.
 
         Raises
         ------
@@ -103,7 +103,7 @@ class Coupling(Block):
         condition = float(np.linalg.cond(self.matrix))
         if not condition < WORST_CONDITION:
             raise ModelError(
-                "the coupling cannot be undone: its gains are singular (condition "
+                "the coupling cannot be inverted: its gains are singular (condition "
                 f"{condition:.1e})",
                 remedy="identify it from runs in which each muscle is driven alone",
             )
@@ -111,7 +111,7 @@ class Coupling(Block):
         return Coupling(rows(undone(self.matrix)), self.given, self.driven)
 
     def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return the outputs reached over a box of inputs, each by itself."""
+        """Return the range of each output over a box of inputs."""
         at_low, at_high = self.matrix.T * low, self.matrix.T * high
         return np.minimum(at_low, at_high).sum(axis=1), np.maximum(at_low, at_high).sum(axis=1)
 

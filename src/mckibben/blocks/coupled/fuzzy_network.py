@@ -34,20 +34,20 @@ from mckibben.blocks.solving import eliminate, newton_cost
 from mckibben.errors import ModelError
 
 MOST_STEPS = 40
-"""Of Newton's method in a sample."""
+"""Maximum number of Newton steps per sample."""
 
 SOLVED = 1e-11
-"""Residual by the size of the outputs that is rounding."""
+"""Residual, relative to the outputs, that is rounding."""
 
 SINGLE = {"SOLVED": 1e-5}
 
 STARTS = 5
-"""Places from the lowest to the highest inputs from which the first sample is sought."""
+"""Number of initial guesses for the first sample, from the lowest to the highest inputs."""
 
 
 @kernel
 def fill_memberships(x: float, centres: Array, widths: Array, memberships: Array) -> None:
-    """Fill an input's normalised memberships; in the log domain, so that none underflow far away."""
+    """Fill an input's normalised memberships, computed in logarithms to avoid underflow."""
     largest, total = -np.inf, 0.0
     for s in range(centres.size):
         z = (x - centres[s]) / widths[s]
@@ -62,7 +62,7 @@ def fill_memberships(x: float, centres: Array, widths: Array, memberships: Array
 
 @kernel
 def fill_between(c: Array, first: int, last: int, x: Array, memberships: Array) -> int:
-    """Fill the memberships of inputs ``first`` to ``last`` alone; return the combinations of their sets.
+    """Fill the memberships of inputs ``first`` to ``last``; return the number of their combinations.
 
     ``c`` is what `contract` reads; ``x`` begins at the first of these inputs.
     """
@@ -85,7 +85,7 @@ def fill_between(c: Array, first: int, last: int, x: Array, memberships: Array) 
 
 @kernel
 def contract(c: Array, m: int, known: Array, memberships: Array, left: Array) -> None:
-    """Fill the rules that are left of the first m inputs where the others are known.
+    """Contract the rules over known inputs, for the remaining first m inputs.
 
     ``c`` is [inputs, outputs, all sets, constants, most sets, sets of every input, centres, widths,
     consequents]; a rule's consequents are one row an output: a coefficient for every input, and the
@@ -170,7 +170,7 @@ def sloped_answer(
 def fuzzy_network_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Answer a sample; scratch are the memberships."""
+    """Evaluate a sample; scratch holds the memberships."""
     contract(coefficients, 0, inputs, scratch, outputs)
 
 
@@ -178,7 +178,7 @@ def fuzzy_network_step(
 def solve_driven(
     coefficients: Array, start: Array, scratch: Array, inputs: Array, best: Array
 ) -> float:
-    """Fill the best driven inputs within their limits, by Newton's method from a start.
+    """Solve for the driven inputs within their limits by Newton's method from a start.
 
     Coefficients are the limits, lowest then highest, then the network's. Returns the largest error by
     the size of the outputs.
@@ -241,7 +241,7 @@ def solve_driven(
 def fuzzy_network_inverse_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Solve for the driven inputs from the last ones; the state is these, and samples clipped."""
+    """Solve for the driven inputs from the last ones; the state is these, and the clip count."""
     m = state.size - 1
     error = solve_driven(coefficients, state[:m], scratch, inputs, outputs)
     if error > SLACK:
@@ -253,7 +253,7 @@ def fuzzy_network_inverse_step(
 def fuzzy_network_inverse_start(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
 ) -> None:
-    """Start at the best solution for the first sample that is found from several places."""
+    """Start at the best solution for the first sample from several initial guesses."""
     m = state.size - 1
     low, high = coefficients[:m], coefficients[m : 2 * m]
     trial, driven = scratch[:m], scratch[m : 2 * m]
@@ -352,25 +352,25 @@ class FuzzyNetwork(Invertible):
         return np.concatenate([[*sizes, *sets], self.pack()])
 
     def cost(self, sample_time: float | None) -> Cost:
-        """Return what memberships and all rules cost."""
+        """Return the cost of memberships and all rules."""
         n = len(self.centres)
         each = n + len(self.given) * (2 * n + 2)
         operations = self._n_rules(n) * each + 10 * sum(map(len, self.centres))
         return Cost(operations, operations)
 
     def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return what contracting what schedules costs, then steps of Newton's method with slopes."""
+        """Return the cost of contracting the scheduling inputs, then of Newton steps."""
         m, n = len(self.driven), len(self.centres)
         once = self._n_rules(n) * m * (2 * n + 2) + 10 * sum(map(len, self.centres[m:]))
         step = self._n_rules(m) * (2 * m + m * (6 * m + 2)) + 16 * sum(map(len, self.centres[:m]))
         return Cost(once, once) + newton_cost(step + m**3)
 
     def _n_rules(self, n: int) -> int:
-        """Return the combinations of the first inputs' sets."""
+        """Return the number of combinations of the first inputs' sets."""
         return math.prod(map(len, self.centres[:n]))
 
     def check_invertible(self) -> None:
-        """Demand as many outputs as driven inputs, and limits."""
+        """Require as many outputs as driven inputs, and limits."""
         if len(self.given) != len(self.driven) or self.limits is None:
             raise ModelError(
                 f"{self.kind!r} with {len(self.driven)} driven inputs, {len(self.given)} "
@@ -380,7 +380,7 @@ class FuzzyNetwork(Invertible):
 
     @property
     def n_inverse_states(self) -> int:
-        """The last solution, and the count of samples clipped."""
+        """States of the inverse: the last solution, and the clip count."""
         return len(self.driven) + 1
 
     @property
@@ -391,18 +391,18 @@ class FuzzyNetwork(Invertible):
         return self.n_scratch + solving
 
     def inverse_numbers(self, own: Array) -> Array:
-        """Return the limits, lowest then highest, and the network's."""
+        """Return the limits, lowest then highest, and the network's coefficients."""
         return np.concatenate([*np.array(self.limits).T, own])
 
     def inverse_complaint(self, state: Array) -> str:
-        """Tell of references that the network cannot give."""
+        """Return a warning about references out of reach."""
         return (
             f"{int(state[-1])} samples of the reference are out of reach of the network and were "
             "clipped to the nearest that is"
         )
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
-        """Return the unit of a number: a consequent is the output, or that per input."""
+        """Return the unit of a parameter: of a consequent, the output, or output per input."""
         if field != "consequents":
             return super().unit_of(field, index)
         per = [channel.unit for channel in self.inputs]

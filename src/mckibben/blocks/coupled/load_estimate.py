@@ -1,4 +1,4 @@
-"""Loads of muscles in parallel by their displacements and pressures: a balance of forces read for loads.
+"""Load estimates from displacements and pressures of muscles, by the force balance.
 
 Where displacements and pressures are known, all in the equation of
 `mckibben.blocks.coupled.balance_law` is known but the loads:
@@ -43,7 +43,7 @@ from mckibben.errors import ModelError
 def load_estimate_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Give loads; behind the balance's coefficients stands the pseudo-inverse."""
+    """Compute loads; the pseudo-inverse follows the balance's coefficients."""
     m = int(coefficients[1])
     q, loads = scratch[:m], scratch[scratch.size - outputs.size :]
     for j in range(m):
@@ -60,7 +60,7 @@ def load_estimate_step(
 def estimate(
     c: Array, state: Array, way: int, q: Array, inputs: Array, loads: Array, scratch: Array
 ) -> None:
-    """Fill the loads that hold muscles at coordinates, the last of what schedules and loads them."""
+    """Fill the loads in equilibrium at given coordinates."""
     n, m, n_x, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[4])
     residual, sizes = scratch[m : 2 * m], scratch[2 * m : 3 * m]
     x = scratch[scratch.size - n_x - n_loads :]
@@ -80,7 +80,7 @@ def estimate(
 def load_estimate_start(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
 ) -> None:
-    """Start as the balance does, under the loads that the first sample has without friction."""
+    """Start as the balance does, under the frictionless loads of the first sample."""
     c = coefficients
     n, m, n_x, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[4])
     q, p, x = scratch[:m], scratch[m : m + n], scratch[scratch.size - n_x - n_loads :]
@@ -100,7 +100,7 @@ def load_estimate_start(
 
 @dataclass(frozen=True, config=STRICT)
 class LoadEstimate(Block):
-    """From displacements and pressures of muscles, and what schedules them, to their loads.
+    """Load estimator: from displacements, pressures and scheduling inputs of muscles to their loads.
 
     Its memory begins where the balance's does: at rest without pressure, under the loads that the
     first sample tells without friction. Of a balance with a tare it tells none: then muscles rest
@@ -132,7 +132,7 @@ class LoadEstimate(Block):
         n, n_loads = loads.shape
         if n_loads == 0:
             raise ModelError(
-                "a balance without a load estimates none",
+                "this balance has no load to estimate",
                 remedy="identify it on recordings with a measured force",
             )
         if any(channel.unit != "bar" for channel in self.forward.given):
@@ -150,17 +150,17 @@ class LoadEstimate(Block):
 
     @property
     def loads(self) -> tuple[Channel, ...]:
-        """What schedules the balance last."""
+        """The estimated loads."""
         return self.forward.scheduled[len(self.scheduled) :]
 
     @property
     def scheduled(self) -> tuple[Channel, ...]:
-        """What else schedules it."""
+        """The scheduling inputs other than loads."""
         return self.forward.scheduled[: len(self.forward.scheduled) - self.forward.n_loads]
 
     @property
     def n_scratch(self) -> int:
-        """The balance's, and what schedules."""
+        """Scratch of the balance, and the scheduling inputs."""
         return self.forward.n_scratch + len(self.forward.scheduled)
 
     def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
@@ -168,13 +168,13 @@ class LoadEstimate(Block):
         return self.forward.strictly_increasing()
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the balance's, and the pseudo-inverse of its shares of loads."""
+        """Return the balance's coefficients, and the pseudo-inverse of its shares of loads."""
         solving = np.linalg.pinv(np.array(self.forward.loads))
         return np.concatenate([self.forward.coefficients(sample_time), solving.ravel()])
 
 
 def load_of(model: Block) -> Block:
-    """Return what tells the loads of a model by its balance, whose sensors may count otherwise.
+    """Return the load estimator of a model, allowing for offsets of its channels.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def load_of(model: Block) -> Block:
         If the model knows no load, or its coordinates are not measured one by one.
     """
     if isinstance(model, LoadEstimate):
-        raise ModelError("this is an estimate of loads already", remedy="simulate it")
+        raise ModelError("this is already a load estimator", remedy="simulate it")
     if isinstance(model, Balance):
         return LoadEstimate(model)
     placed = balance_in(model)
@@ -204,7 +204,7 @@ def load_of(model: Block) -> Block:
 
 
 def _each(block: Block | None, channels: Sequence[Channel]) -> tuple[Block, ...]:
-    """Return what is done to every channel: a block's parts, or nothing."""
+    """Return the block of every channel: a block's parts, or none."""
     if block is None:
         return tuple(Affine(1.0, 0.0, channel, channel) for channel in channels)
     return block.parts if isinstance(block, PerChannel) else (block,)

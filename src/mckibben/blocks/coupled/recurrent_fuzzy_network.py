@@ -1,4 +1,4 @@
-"""Recurrent fuzzy network in a NARMAX loop: its own past output, a driven input and what schedules it.
+"""Recurrent fuzzy network in a NARMAX loop, from past outputs, driven and scheduling inputs.
 
 Memberships remember: what a set answered one sample ago shifts its centre,
 
@@ -33,7 +33,7 @@ from mckibben.blocks.parameters import same_as
 from mckibben.errors import ModelError
 
 LEAST_FIRING = 1e-290
-"""Sum of the firing of rules below which no rule counts."""
+"""Smallest total firing strength; below it no rule is active."""
 
 SINGLE = {"LEAST_FIRING": 1e-36}
 
@@ -42,7 +42,7 @@ SINGLE = {"LEAST_FIRING": 1e-36}
 def recurrent_fuzzy_network_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Run free.
+    """Advance the network, free-running.
 
     Coefficients are [n_a, n_b, n_c, sets, constants, centres, widths, feedbacks (each inputs by sets),
     consequents (rule by rule, each a coefficient for every x, then a constant if there is one)]; the
@@ -98,7 +98,7 @@ def recurrent_fuzzy_network_step(
 
 @kernel
 def recurrent_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start where inputs always were the first ones, and outputs at the driven one."""
+    """Start with constant past inputs, and outputs equal to the driven input."""
     n_a, n_b, n_c = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
     state[:] = 0.0
     state[: n_a + n_b] = inputs[0]
@@ -153,7 +153,7 @@ class RecurrentFuzzyNetwork(Block):
         (Channel("force", "N"),),
         (Channel("displacement", "mm"),),
     )
-    no_inverse = "has no inverse: a sample of its input moves its output by next to nothing"
+    no_inverse = "has no inverse: within one sample its input hardly changes its output"
     instead = "invert balance, or close a loop"
     parameters = ("centres", "widths", "feedbacks", "consequents")
     notation = Notation(
@@ -196,7 +196,7 @@ class RecurrentFuzzyNetwork(Block):
         rows = {len(self.centres), len(self.widths), len(self.feedbacks)}
         if rows != {self.n_regressors} or len(sets) != 1 or sets == {0}:
             raise ModelError(
-                f"{self.kind!r} wants centres, widths and feedbacks of {self.n_regressors} "
+                f"{self.kind!r} needs centres, widths and feedbacks of {self.n_regressors} "
                 "inputs, as many sets for each",
                 remedy="give them",
             )
@@ -210,23 +210,23 @@ class RecurrentFuzzyNetwork(Block):
 
     @property
     def n_sets(self) -> int:
-        """Sets of every x."""
+        """Number of sets per regressor."""
         return len(self.centres[0])
 
     @property
     def n_regressors(self) -> int:
-        """N: how many x there are."""
+        """Number N of regressors."""
         scheduled = len(self.scheduled) * (1 + self.scheduling_lags)
         return self.output_lags + 1 + self.input_lags + scheduled
 
     @property
     def n_states(self) -> int:
-        """Past outputs and inputs, and the last memberships."""
+        """States: past outputs and inputs, and the last memberships."""
         past = self.n_regressors - 1 - len(self.scheduled)
         return past + self.n_regressors * self.n_sets
 
     def state_at(self, first: Array, output: Array) -> Array:
-        """Return the state at rest at the first inputs, where the output is known."""
+        """Return the equilibrium state at the first inputs if the output is known."""
         state = self.initial_state(first)
         state[: self.output_lags] = output[0]
         return state
@@ -238,14 +238,14 @@ class RecurrentFuzzyNetwork(Block):
         return np.concatenate([lags, [self.n_sets, self.constants], self.pack()])
 
     def cost(self, sample_time: float | None) -> Cost:
-        """Return what memberships and all rules cost."""
+        """Return the cost of memberships and all rules."""
         n, sets = self.n_regressors, self.n_sets
         operations = sets**n * (3 * n + 3) + 10 * n * sets
         return Cost(operations, operations)
 
     @property
     def _regressor_units(self) -> list[str]:
-        """The unit of every x: past outputs, the driven input, what schedules."""
+        """Return the unit of every regressor: past outputs, driven input, scheduling inputs."""
         units = [self.outputs[0].unit] * self.output_lags
         units += [self.inputs[0].unit] * (1 + self.input_lags)
         for channel in self.scheduled:
@@ -253,7 +253,7 @@ class RecurrentFuzzyNetwork(Block):
         return units
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
-        """Return the unit of a number: a consequent is the output, or that per input."""
+        """Return the unit of a parameter: of a consequent, the output, or output per input."""
         if field in ("centres", "widths", "feedbacks"):
             return self._regressor_units[index[0]]
         if field != "consequents":

@@ -1,4 +1,4 @@
-"""Air and command: from what a valve or regulator is told to the pressure that is there.
+"""Valve and air: from a valve's or regulator's command to the pressure.
 
 The command u (a voltage, or a pressure asked for) is a goal for the pressure x, while filling and while
 venting another, between which the valve stays closed:
@@ -35,13 +35,15 @@ from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError, ModelWarning
 
 LONGEST_LAG = 1e6
-"""Seconds."""
+"""Largest time constant [s]."""
 
 APPROACHED = 0.05
-"""Share of the range at both ends that lags only creep through, which is not counted as reachable."""
+"""Share of the range at either end that is approached only asymptotically and not counted as
+reachable.
+"""
 
 WHOLE = 1e-6
-"""Share of a sample by which a dead time may be off a whole number of them."""
+"""Share of a sample by which a dead time may differ from a whole number of samples."""
 
 
 @kernel
@@ -58,13 +60,13 @@ def _moved(c: Array, x: float, u: float) -> float:
 
 @kernel
 def _middle_of(c: Array) -> float:
-    """Return the command that aims for no pressure, in the middle between filling and venting."""
+    """Return the command for zero pressure, midway between filling and venting."""
     return 0.5 * (c[1] + c[2])
 
 
 @kernel
 def _resting(c: Array, u: float, virgin: bool) -> float:
-    """Return the pressure where a command leads; or, virgin, that of the surroundings, or 0."""
+    """Return the steady pressure of a command; for a virgin start, the ambient pressure or 0."""
     if virgin:
         return c[5] if c[5] > -math.inf else 0.0
     return min(max(c[0] * (u - _middle_of(c)), c[5]), c[6])
@@ -72,7 +74,7 @@ def _resting(c: Array, u: float, virgin: bool) -> float:
 
 @step
 def air_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; the state is [pressure, past pressures, latest first].
+    """Advance the model; the state is [pressure, past pressures, latest first].
 
     Coefficients are [gain, offset while filling, while venting, share of the way that a sample fills,
     that it vents, lowest, highest pressure, dead time in samples].
@@ -85,13 +87,13 @@ def air_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -
 
 @kernel
 def air_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start at rest where the first command leads, or at the pressure of the surroundings."""
+    """Start at the steady pressure of the first command, or at ambient pressure."""
     state[:] = _resting(coefficients, inputs[0], virgin)
 
 
 @step
 def air_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Undo the model; coefficients are [forward ones, lowest, highest command].
+    """Advance the inverse; coefficients are [forward ones, lowest, highest command].
 
     The state is [pressure, samples clipped].
     """
@@ -120,7 +122,7 @@ def air_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: 
 
 @kernel
 def air_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start at rest where the command for the first pressure leads, within its limits."""
+    """Start at the steady pressure of the first command, within its limits."""
     c = coefficients
     u = min(max(inputs[0] / c[0] + _middle_of(c), c[c.size - 2]), c[c.size - 1])
     state[0], state[1] = _resting(c, u, virgin), 0.0
@@ -128,7 +130,7 @@ def air_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: 
 
 @dataclass(frozen=True, config=fields.STRICT)
 class Air(Invertible):
-    """Valve or regulator, and the air behind it, from command to measured pressure.
+    """Valve or regulator with air, from command to measured pressure.
 
     Parameters
     ----------
@@ -203,28 +205,28 @@ class Air(Invertible):
 
     @property
     def pressures(self) -> tuple[float, float]:
-        """Lowest and highest pressure aimed for; infinite where there is no limit."""
+        """Lowest and highest target pressure; infinite without limits."""
         lowest = -math.inf if self.ambient is None else self.ambient
         return lowest, math.inf if self.supply is None else self.supply
 
     @property
     def offsets(self) -> tuple[float, float]:
-        """Where the goal is 0 while filling, and while venting [command]."""
+        """Commands of zero target pressure while filling, and while venting."""
         return self.offset + 0.5 * self.hysteresis, self.offset - 0.5 * self.hysteresis
 
     @property
     def n_states(self) -> int:
-        """The pressure and, with a dead time, past ones."""
+        """States: the pressure and, with a dead time, past ones."""
         return 1 + (fields.LONGEST_DELAY if self.dead_time > 0 else 0)
 
     def goal(self, command: float, way: Literal[-1, 1]) -> float:
-        """Return the pressure where a held command leads: in filling, 1, or in venting, -1."""
+        """Return the steady pressure of a command when filling, 1, or venting, -1."""
         lowest, highest = self.pressures
         aimed = self.gain * (command - self.offset - 0.5 * way * self.hysteresis)
         return min(max(aimed, lowest), highest)
 
     def check_time(self, sample_time: float | None) -> None:
-        """Warn where the dead time is no whole number of samples."""
+        """Warn if the dead time is not a whole number of samples."""
         late = self.coefficients(sample_time)[-1]
         assert sample_time is not None
         if abs(self.dead_time / sample_time - late) > WHOLE:
@@ -236,7 +238,7 @@ class Air(Invertible):
             )
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [gain, offsets, shares of the way, pressures, dead time], for a sample time."""
+        """Return [gain, offsets, shares per step, pressures, dead time] for a sample time."""
         step = needs_sample_time(self.kind, sample_time)
         late = self.dead_time / step
         if not late <= fields.LONGEST_DELAY + 0.5:
@@ -250,15 +252,15 @@ class Air(Invertible):
         return np.array([self.gain, *self.offsets, *shares, *self.pressures, round(late)])
 
     def start_numbers(self) -> Array:
-        """Return the coefficients at a sample time that its dead time allows."""
+        """Return the coefficients at a sample time compatible with the dead time."""
         return self.coefficients(self.dead_time or 1.0)
 
     def inverse_state(self, state: Array) -> Array:
-        """Return the pressure, and no samples clipped."""
+        """Return the pressure, and a clip count of 0."""
         return np.array([state[0], 0.0])
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the pressures that can be reached whatever happened before, each of shape (1,).
+        """Return the pressures that are reachable from every state, each of shape (1,).
 
         With lags the ends of the range are only approached: a twentieth is left out at both. How
         fast references may change there depends on the lags.
@@ -271,7 +273,7 @@ class Air(Invertible):
         return np.array([lowest + left]), np.array([highest - left])
 
     def inverse_complaint(self, state: Array) -> str:
-        """Tell of references that were clipped."""
+        """Return a warning about clipped references."""
         low, high = self.reachable()
         return (
             f"{int(state[-1])} sample(s) of the reference {self.output.name!r} were clipped: they are "

@@ -1,4 +1,4 @@
-"""Creep: a visco-elastic follow-up of what goes in, and its exact inverse.
+"""Viscoelastic creep, and its exact inverse.
 
 y = u + sum_k c_k x_k,  tau_k x_k' = u - x_k: a spring in series with Kelvin-Voigt elements. Behind a
 hysteresis model it adds the lag (short time constants) and creep (long ones) of a muscle's braid and
@@ -25,7 +25,7 @@ from mckibben.errors import ModelError
 
 @step
 def creep_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; coefficients are [a, c], the state is x."""
+    """Advance the model; coefficients are [a, c], the state is x."""
     n = state.size
     u = inputs[0]
     y = u
@@ -43,7 +43,7 @@ def creep_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) 
 
 @kernel
 def creep_matrix(coefficients: Array, columns: Array, state: Array, found: Array) -> None:
-    """Fill ``found`` with columns (n, k), each with creep, from elements at rest at its first value.
+    """Fill ``found`` (n, k) with the creeping response of each column, from rest at its first value.
 
     ``state`` is room for elements by columns.
     """
@@ -63,7 +63,7 @@ def creep_matrix(coefficients: Array, columns: Array, state: Array, found: Array
 
 @step
 def creep_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Undo the model; coefficients and state as forward."""
+    """Advance the inverse; coefficients and state as forward."""
     n = state.size
     gain = 1.0
     for k in range(n):
@@ -79,7 +79,7 @@ def creep_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs
 
 @kernel
 def creep_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start with the elements at rest: where the first output is held, or at 0."""
+    """Start with the elements at rest: for a constant first output, or at 0."""
     crept = 0.0
     for k in range(state.size):
         crept += coefficients[state.size + k]
@@ -88,7 +88,7 @@ def creep_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin
 
 @dataclass(frozen=True, config=STRICT)
 class Creep(Invertible):
-    """Visco-elastic creep behind a model of the immediate response.
+    """Viscoelastic creep after a model of the immediate response.
 
     Parameters
     ----------
@@ -139,17 +139,17 @@ class Creep(Invertible):
             )
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [decays over a sample, compliances]."""
+        """Return [decays per sample, compliances]."""
         step = needs_sample_time(self.kind, sample_time)
         return np.array([*np.exp(-step / np.array(self.time_constants)), *self.compliances])
 
     def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return the outputs that can be reached at once, however far the elements have crept."""
+        """Return the range of immediate outputs, for any creep state."""
         crept = float(np.sum(self.compliances))
         return low + crept * high, high + crept * low
 
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return the elements, each a state."""
+        """Return the elements as a state-space system."""
         decays, c = self.coefficients(sample_time).reshape(2, -1)
         matrices = (np.diag(decays), (1 - decays)[:, np.newaxis], (c * decays)[np.newaxis])
         at_once = np.array([[1.0 + c @ (1 - decays)]])

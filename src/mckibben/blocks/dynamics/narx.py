@@ -31,11 +31,12 @@ from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 HEAD = 7
-"""Coefficients before the thresholds: lags of the output, of the input, operators, and the scales."""
+"""Number of coefficients before the thresholds: lags of output and input, operators, and scales."""
 
 FARTHEST, SPACING, PLACES = 1.5, 0.0025, 1201
-"""Where rest is looked for, in scaled output: from one end of the data's range, and half of it more, to
-the other."""
+"""Grid of scaled outputs on which an equilibrium is searched: the data's range and half of it
+beyond either end.
+"""
 
 HIGHEST_DEGREE, MOST_TERMS = 20, 10_000
 
@@ -59,7 +60,7 @@ SYMBOLS = {
 
 @kernel
 def take_input(u: float, coefficients: Array, state: Array) -> None:
-    """Put a new input among the past ones, and move the play operators."""
+    """Shift a new input into the past ones, and update the play operators."""
     n, m, k = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
     x = (u - coefficients[3]) / coefficients[4]
     remember(x, state[n : n + m])
@@ -71,21 +72,21 @@ def take_input(u: float, coefficients: Array, state: Array) -> None:
 
 @kernel
 def give_output(y: float, coefficients: Array, state: Array) -> float:
-    """Put a new output among the past ones, and return it in its own unit."""
+    """Shift a new output into the past ones, and return it in its unit."""
     remember(y, state[: int(coefficients[0])])
     return coefficients[5] + coefficients[6] * y
 
 
 def narx_kernels(regression: Callable[[Array, Array], float]) -> tuple[Step, Start]:
-    """Return the step and the start of a model by its scaled output of the regressors in the state."""
+    """Return step and start kernel of a model, from its scaled output of the regressors."""
 
     def narx_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-        """Run the model."""
+        """Advance the model."""
         take_input(inputs[0], coefficients, state)
         outputs[0] = give_output(regression(coefficients, state), coefficients, state)
 
     def narx_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-        """Start at rest at the first input: where the regression gives back the output it is given.
+        """Start at equilibrium with the first input: a fixed point of the regression.
 
         Of several such outputs within the data's range, the lowest for an input that has risen, the
         middle one for a virgin start; where there is none, the output that changes least.
@@ -167,7 +168,7 @@ def network(coefficients: Array, state: Array) -> float:
 
 @dataclass(frozen=True, kw_only=True, config=fields.STRICT)
 class Narx(Block):
-    """Fields and states of NARX models.
+    """Fields and states shared by NARX models.
 
     Parameters
     ----------
@@ -190,7 +191,7 @@ class Narx(Block):
     """
 
     rate_dependent = True
-    no_inverse = "has no exact inverse: nothing keeps its output rising with its input"
+    no_inverse = "has no exact inverse: its output need not increase with its input"
 
     output_lags: Lags
     input_lags: Lags
@@ -215,17 +216,17 @@ class Narx(Block):
 
     @property
     def past_inputs(self) -> int:
-        """Inputs kept: those between now and the last lag."""
+        """Number of stored inputs: between the current one and the last lag."""
         return self.delay + self.input_lags if self.input_lags else 0
 
     @property
     def places(self) -> tuple[int, ...]:
-        """Where in the state the regressors are, in the order of f's arguments."""
+        """Indices of the regressors in the state, in the order of f's arguments."""
         n, m = self.output_lags, self.past_inputs
         return (*range(n), *range(n + min(self.delay, m), self.n_states))
 
     def head(self, sample_time: float | None) -> list[float]:
-        """Return the coefficients that all NARX kernels start with."""
+        """Return the leading coefficients of all NARX kernels."""
         own_sample_time(self.kind, self.sample_time, sample_time)
         counts = [self.output_lags, self.past_inputs, len(self.thresholds)]
         return [*counts, *self.input_scale, *self.output_scale, *self.thresholds]
@@ -238,7 +239,7 @@ class Narx(Block):
         """
 
     def state_at(self, first: Array, output: Array) -> Array | None:
-        """Return the state at rest at a first input where the output is known."""
+        """Return the equilibrium state at a first input if the output is known."""
         centre, half = self.output_scale
         state = self.initial_state(first, "first_sample")
         state[: self.output_lags] = (float(output[0]) - centre) / half

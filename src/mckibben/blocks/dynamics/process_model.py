@@ -31,7 +31,7 @@ from mckibben.errors import ModelError
 
 @step
 def process_model_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; the state is [x, past inputs, latest first].
+    """Advance the model; the state is [x, past inputs, latest first].
 
     Coefficients are [n, delay in samples, u_0, y_0, D now, D before, C, three input vectors,
     matrix].
@@ -57,7 +57,7 @@ def process_model_step(coefficients: Array, state: Array, inputs: Array, outputs
 
 @kernel
 def process_model_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start with the lags at rest: at the first input, or at the operating point."""
+    """Start the lags in equilibrium with the first input, or at the operating point."""
     n = int(coefficients[0])
     u = 0.0 if virgin else inputs[0] - coefficients[2]
     state[:] = 0.0
@@ -67,7 +67,7 @@ def process_model_start(coefficients: Array, state: Array, inputs: Array, virgin
 
 @dataclass(frozen=True, config=fields.STRICT)
 class ProcessModel(Block):
-    """A gain, one to three lags, perhaps a zero and a delay, about an operating point.
+    """Gain, one to three lags, optional zero and delay, about an operating point.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class ProcessModel(Block):
 
     @property
     def parameters(self) -> tuple[str, ...]:  # type: ignore[override]
-        """The fields that this structure has."""
+        """The fields of this structure."""
         optional = [n for n in ("damping", "zero_time") if getattr(self, n) is not None]
         late = ["delay"] if self.delay > 0 else []
         return ("gain", "time_constants", *optional, *late, "input_offset", "output_offset")
@@ -154,7 +154,7 @@ class ProcessModel(Block):
 
     @property
     def no_inverse(self) -> str:  # type: ignore[override]
-        """Which structure has none, and why."""
+        """Why this structure has no inverse."""
         return (
             f"({self.name}) has no exact inverse: its output lags its input, so following a reference "
             "would take derivatives of it"
@@ -162,7 +162,7 @@ class ProcessModel(Block):
 
     @property
     def n_states(self) -> int:
-        """Of the lags, past inputs, and as many for the lags again, to compute in."""
+        """Number of states: lags, past inputs, and working memory for the lags."""
         return 2 * self.order + (3 if self.delay == 0 else fields.LONGEST_DELAY + 3)
 
     def denominator(self) -> Array:
@@ -176,11 +176,11 @@ class ProcessModel(Block):
         return found
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads; refuse delays of more than 254 samples."""
+        """Return the coefficients of the kernel; raise an error for delays above 254 samples."""
         return _discretised(self, sample_time).copy()
 
     def start_numbers(self) -> Array:
-        """Return [n, 0, u_0], which is what the start reads."""
+        """Return [n, 0, u_0], the coefficients of the start."""
         return np.array([self.order, 0.0, self.input_offset])
 
     def equations(self) -> tuple[str, ...]:
@@ -191,7 +191,7 @@ class ProcessModel(Block):
         )
 
     def worked(self) -> tuple[str, ...]:
-        """Return the transfer function with its numbers."""
+        """Return the transfer function with numerical values."""
         a, b = (tex(float(c)) for c in self.denominator()[:2])
         zero = rf"{tex(self.zero_time or 0.0)}\,s"
         lags = [rf"{tex(t)}\,s + 1" for t in self.time_constants]
@@ -205,7 +205,7 @@ class ProcessModel(Block):
         return rf"\frac{{Y(s) - y_0}}{{U(s) - u_0}} = \frac{{{above}}}{{{below}}}{late}"
 
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return the lags behind the past inputs that the dead time and the hold remember."""
+        """Return the lags after the past inputs of dead time and hold."""
         found = _discretised(self, sample_time)
         n, m = int(found[0]), int(found[1])
         now, before = found[4:6]
@@ -225,7 +225,7 @@ class ProcessModel(Block):
         return LinearSystem(a, b, given, through, sample_time, *offsets)
 
     def continuous(self) -> Polynomials:
-        """Return the lags and the zero.
+        """Return the lags and the zero as a continuous transfer function.
 
         Raises
         ------
@@ -235,7 +235,7 @@ class ProcessModel(Block):
         if self.delay > 0:
             raise ModelError(
                 f"{self.kind!r} has a dead time of {self.delay:g} s, which a continuous "
-                "transfer function has no place for",
+                "transfer function cannot represent",
                 remedy="give a sample time",
             )
         zero = [] if self.zero_time is None else [self.gain * self.zero_time]
@@ -297,7 +297,7 @@ def _state_space(model: ProcessModel) -> tuple[Array, Array, Array, float]:
 
 
 def held(a: Array, b: Array, step: float) -> tuple[Array, Array, Array]:
-    """Return how a state goes on over a step, and how much of the input at its start and end joins it.
+    """Return the transition of the state over a step, and the weights of the input at its ends.
 
     For x' = A x + B v with v going in a straight line: x+ = Phi x + G v_start + H v_end.
     """

@@ -1,4 +1,4 @@
-"""Models in continuous time, integrated in substeps, and their response to inputs that repeat."""
+"""Steady-state responses of continuous models to periodic inputs."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Substeps = Annotated[int, Interval(ge=1, le=10_000)]
 Hold = Literal["first", "zero"]
 
 PERIODS, REPEATS = 100, 1e-9
-"""Periods run until two are the same, at most; and the difference that is none, by the range."""
+"""Maximum number of periods simulated, and the relative difference at which two are equal."""
 
 BETWEEN = 2
-"""Samples put into a substep where the input is band-limited: straight lines join them."""
+"""Interpolated samples per substep of a band-limited input."""
 
 
 def steady_state(block: Any, recording: Recording) -> Recording:
-    """Return the response to a recording that repeats for ever, after all starts have died away.
+    """Return the steady-state response to a periodic recording.
 
     The input is taken to be band-limited between samples, as a multisine measured over whole
     periods is; neither holds of `simulate`, which starts somewhere and joins samples as `hold` says.

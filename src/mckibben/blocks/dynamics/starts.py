@@ -1,4 +1,4 @@
-"""Starts fitted to outputs: the state before the first sample that explains measured ones best.
+"""Fitted start states: the state before the first sample that best explains measured outputs.
 
 What the state of a linear model, or of creep with nothing but a gain behind it, adds to the output is
 linear in it, so the best one is solved for. A block whose `initial` is "fitted" is started so wherever
@@ -22,11 +22,13 @@ from mckibben.recording import Recording
 Mask = NDArray[np.bool_]
 
 KNOWN = 0.5
-"""Least norm, where outputs are known, of a start's response whose norm is 1, to solve for it."""
+"""Smallest norm, over known outputs, of the unit-norm start response for which a start state is
+estimated.
+"""
 
 
 def fitted_places(block: Block, rule: Initial | None = None) -> list[int]:
-    """Return the places of the states that are solved for under a rule, by default the block's own."""
+    """Return the indices of the estimated states under a start rule, by default the block's own."""
     if (getattr(block, "initial", None) if rule is None else rule) == "fitted":
         return [*range(block.n_fitted)]
     places, first = [], 0
@@ -37,7 +39,7 @@ def fitted_places(block: Block, rule: Initial | None = None) -> list[int]:
 
 
 def start_on(block: Block, recording: Recording, initial: Initial | None = None) -> Initial | None:
-    """Return the start to use on a recording: the state solved for, where that is the rule."""
+    """Return the start for a recording: the estimated state, if that is the rule."""
     output = block.outputs[0]
     known = output.name in recording and recording.units[output.name] == output.unit
     if not known or (block.start if initial is None else initial) != "fitted":
@@ -54,7 +56,7 @@ def fitted_state(
     counts: Mask | None = None,
     rule: Initial | None = None,
 ) -> Array:
-    """Return the state before the first sample with the least squared error, shape (n_states,).
+    """Return the least-squares initial state, shape (n_states,).
 
     It is at rest in what the known outputs do not determine: where the first ones are not known, a start
     that has died away before the others would be made up of their noise.
@@ -84,7 +86,7 @@ def fitted_state(
 def fitted_run(
     block: Block, inputs: Array, outputs: Array, sample_time: float | None, counts: Mask
 ) -> Array:
-    """Return the first output of a run from such a state, shape (n,)."""
+    """Return the first output of a run from a fitted start, shape (n,)."""
     state = fitted_state(block, inputs, outputs, sample_time, counts)
     return _run(block, state, inputs, sample_time)
 
@@ -92,7 +94,7 @@ def fitted_run(
 def free_responses(
     block: Block, inputs: Array, sample_time: float | None, places: Sequence[int]
 ) -> Array:
-    """Return what a unit of some states adds to the output, shape (n, k).
+    """Return the output due to a unit of each state, shape (n, k).
 
     Of a linear model at its operating point, where nothing else moves its output.
     """
@@ -120,7 +122,7 @@ def _run(block: Block, state: Array, inputs: Array, sample_time: float | None) -
 
 
 def known_starts(free: Array, counts: Mask, least: float = KNOWN) -> tuple[Array, Array]:
-    """Return the starts that known outputs determine, each with what it adds where they are known.
+    """Return the start responses that known outputs determine, each with its values at these.
 
     Parameters
     ----------
@@ -141,6 +143,6 @@ def known_starts(free: Array, counts: Mask, least: float = KNOWN) -> tuple[Array
     responses, spread, turned = np.linalg.svd(free / size, full_matrices=False)
     moved = spread > 1e-12 * spread[0]
     seen, known, v = np.linalg.svd(responses[np.ix_(counts, moved)], full_matrices=False)
-    told = known > least
-    states = turned[moved].T @ (v[told] / spread[moved]).T / known[told] / size[:, None]
-    return np.asarray(states), np.asarray(seen[:, told])
+    determined = known > least
+    states = turned[moved].T @ (v[determined] / spread[moved]).T / known[determined] / size[:, None]
+    return np.asarray(states), np.asarray(seen[:, determined])

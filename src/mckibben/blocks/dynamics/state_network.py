@@ -1,4 +1,4 @@
-"""Nonlinear state-space model in continuous time: linear, and one layer of sigmoids.
+"""Nonlinear state-space model in continuous time: a linear part and a layer of tanh units.
 
 x' = rate (L [x, u, 1] + R tanh(H [x, u, 1])),
 output = offset + scale x_1,
@@ -29,13 +29,15 @@ from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 HEAD = 9
-"""Numbers before the weights."""
+"""Number of coefficients before the weights."""
 
 SETTLING, SETTLING_STEP = 1000, 0.1
-"""Steps in which a start at rest is reached, and their length in units of 1 / rate."""
+"""Number of steps in which an initial equilibrium is reached, and their length in units of 1 /
+rate.
+"""
 
 FASTEST = 2.5
-"""Units of 1 / rate in a substep, at most."""
+"""Largest substep, in units of 1 / rate."""
 
 
 @kernel
@@ -84,7 +86,7 @@ def advance(
 def state_network_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Run the model; the state is [x, last input].
+    """Advance the model; the state is [x, last input].
 
     Coefficients are [substep by rate, how many, 1 for zero-order hold, states, units, offset and scale
     of the input, of the output, weights].
@@ -105,7 +107,7 @@ def state_network_step(
 def state_network_start(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
 ) -> None:
-    """Start as after the first input has long been held, or with zeros."""
+    """Start in equilibrium with the first input, or with zeros."""
     state[:] = 0.0
     if not virgin:
         n, units = int(coefficients[3]), int(coefficients[4])
@@ -191,11 +193,11 @@ class StateNetwork(Block):
 
     @property
     def n_scratch(self) -> int:
-        """A place, slopes there, and their sum."""
+        """Scratch: a state, its rates, and their sum."""
         return 3 * len(self.linear)
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads, for a sample time."""
+        """Return the coefficients for a sample time."""
         step = self.rate * needs_sample_time(self.kind, sample_time) / self.substeps
         if not step <= FASTEST:
             raise ModelError(
@@ -209,17 +211,17 @@ class StateNetwork(Block):
         return np.array([*head, *scales, *self.pack()])
 
     def cost(self, sample_time: float | None) -> Cost:
-        """Return what a step costs: every weight four times a substep, and sigmoids."""
+        """Return the cost of a step: every weight four times per substep, and activations."""
         operations = self.substeps * 4 * (2 * self.n_parameters + 20 * len(self.hidden))
         return Cost(operations, operations)
 
     def start_numbers(self) -> Array:
-        """Return the coefficients at a sample time that is not too fast."""
+        """Return the coefficients at an admissible sample time."""
         return self.coefficients(1.0 / self.rate)
 
     @classmethod
     def example(cls) -> Self:
-        """Return an oscillator whose spring hardens."""
+        """Return an oscillator with a hardening spring."""
         linear = ((0.0, 1.0, 0.0, 0.0), (-1.5, -0.4, 1.0, 0.0))
         return cls(
             linear=linear,

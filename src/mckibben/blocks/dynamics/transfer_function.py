@@ -1,4 +1,4 @@
-"""Discrete transfer function: what ARX, ARMAX, output-error and Box-Jenkins models come to free-running.
+"""Discrete transfer function, the free-running form of ARX, ARMAX, OE and Box-Jenkins models.
 
 y_t - y_0 = B(q) / F(q) (u_t - u_0),  B = b_0 + b_1 q^-1 + ...,  F = 1 + f_1 q^-1 + ...
 
@@ -29,7 +29,7 @@ from mckibben.recording import Recording
 
 @step
 def filter_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the filter in transposed direct form; coefficients are [u_0, y_0, b, f, gain]."""
+    """Advance the filter in transposed direct form; coefficients are [u_0, y_0, b, f, gain]."""
     n = state.size
     b, f = coefficients[2 : 3 + n], coefficients[3 + n : 4 + 2 * n]
     u = inputs[0] - coefficients[0]
@@ -156,7 +156,7 @@ class TransferFunction(Block):
         return np.array([self.input_offset, self.output_offset, *b, *f, gain])
 
     def predict(self, recording: Recording, horizon: int = 1) -> Recording:
-        """Predict the output some samples ahead from outputs measured until then; no free run.
+        """Predict the output some samples ahead from measured outputs; not free-running.
 
         Parameters
         ----------
@@ -203,7 +203,7 @@ class TransferFunction(Block):
         return kept.with_channels({name: self.output.unit}, **{name: predicted})
 
     def inverse(self) -> TransferFunction:
-        """Return the filter that undoes this one.
+        """Return the inverse filter.
 
         Raises
         ------
@@ -213,7 +213,7 @@ class TransferFunction(Block):
         lead = self.numerator[0]
         if lead == 0:
             raise ModelError(
-                f"{self.kind!r} has no inverse: its output answers a sample late",
+                f"{self.kind!r} has no inverse: its output is delayed by a sample",
                 remedy="identify it with `settings[delay]=0`",
             )
         zeros = np.roots(self.numerator)
@@ -252,7 +252,7 @@ class TransferFunction(Block):
         )
 
     def worked(self) -> tuple[str, ...]:
-        """Return the polynomials with their numbers, where they are short."""
+        """Return the polynomials with numerical values, if short."""
         own = (self.numerator, (1.0, *self.denominator))
         noise = ((1.0, *self.noise_numerator), (1.0, *self.noise_denominator))
         if max(map(len, (*own, *noise))) > FEW:

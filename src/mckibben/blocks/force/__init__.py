@@ -1,1 +1,1 @@
-"""Force of a muscle by length and pressure: static laws, friction, and what pressure gives a force."""
+"""Muscle force by length and pressure: static laws, friction, and the pressure for a force."""

@@ -1,4 +1,4 @@
-"""Activation pressure: what gives a contraction under a force that schedules it.
+"""Activation pressure: the pressure for a contraction under a scheduling force.
 
 Both models add a static pressure and a hysteresis, with the rate of the contraction, measured and
 noisy, through an optional first-order filter. The published one has all its hysteresis in the rate,
@@ -26,7 +26,7 @@ from mckibben.errors import ModelError
 
 PORTS: Ports = ("input",), ("force",), ("output",)
 
-UNDOES_A_MUSCLE = "has no inverse here: it already gives the pressure for a contraction"
+INVERTS_A_MUSCLE = "has no inverse here: it already computes the pressure for a contraction"
 INSTEAD = "use it as the compensator, or fit pressure to contraction by another model"
 
 
@@ -37,7 +37,7 @@ POINTS = 4
 
 @kernel
 def cubic(coefficients: Array, first: int, x: float) -> float:
-    """Return the cubic whose coefficients, highest power first, start at ``first``."""
+    """Return the cubic with coefficients from ``first``, highest power first."""
     return (
         (coefficients[first] * x + coefficients[first + 1]) * x + coefficients[first + 2]
     ) * x + coefficients[first + 3]
@@ -45,13 +45,13 @@ def cubic(coefficients: Array, first: int, x: float) -> float:
 
 @kernel
 def lagrange(e: float, own: float, one: float, two: float, three: float) -> float:
-    """Return the polynomial that is 1 at ``own`` and 0 at three other places."""
+    """Return the polynomial that is 1 at ``own`` and 0 at three other points."""
     return (e - one) / (own - one) * ((e - two) / (own - two)) * ((e - three) / (own - three))
 
 
 @step
 def published_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; the state is [previous contraction, filtered rate].
+    """Advance the model; the state is [previous contraction, filtered rate].
 
     Coefficients are [smoothing, gain of the rate, gamma, phi (4), contractions (16), pressures
     (16)].
@@ -76,7 +76,7 @@ def published_start(coefficients: Array, state: Array, inputs: Array, virgin: bo
 
 @dataclass(frozen=True, config=fields.STRICT)
 class ActivationPressure(Block):
-    """Pressure that gives a contraction under a force, at one frequency of excitation.
+    """Pressure for a contraction under a force, at one frequency of excitation.
 
     Source: "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization and
     Particle Swarm Optimization", Eqs. (2) to (15).
@@ -113,7 +113,7 @@ class ActivationPressure(Block):
     kernel = published_step
     start_kernel = published_start
     rate_dependent = True
-    no_inverse = UNDOES_A_MUSCLE
+    no_inverse = INVERTS_A_MUSCLE
     instead = INSTEAD
     parameters = ("contractions", "pressures", "phi", "gamma")
     typical = (
@@ -176,7 +176,7 @@ class ActivationPressure(Block):
 
 @step
 def remembering_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; the state is [play operators, previous contraction, filtered rate, x_m].
+    """Advance the model; the state is [play operators, previous contraction, filtered rate, x_m].
 
     Coefficients are [smoothing, gain of the rate, contraction's centre and scale, force's centre
     and scale, degree by contraction, degree by force, number of x_m, c row by row, thresholds, a,
@@ -214,7 +214,7 @@ def remembering_step(coefficients: Array, state: Array, inputs: Array, outputs: 
 
 @kernel
 def remembering_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start where the contraction has only risen to the first one, or has never moved."""
+    """Start as if the contraction had only risen to the first one, or never moved."""
     m = int(coefficients[8])
     n = state.size - 2 - m
     thresholds = 9 + (int(coefficients[6]) + 1) * (int(coefficients[7]) + 1)
@@ -227,7 +227,7 @@ def remembering_start(coefficients: Array, state: Array, inputs: Array, virgin: 
 
 @dataclass(frozen=True, config=fields.STRICT)
 class ActivationMemory(Block):
-    """Pressure that gives a contraction under a force, whatever the frequency.
+    """Pressure for a contraction under a force, at any frequency.
 
     Dry friction is carried by stop operators, which keep it while the muscle rests and through minor
     loops; what follows the contraction relaxes as a visco-elastic muscle does.
@@ -264,7 +264,7 @@ class ActivationMemory(Block):
     kernel = remembering_step
     start_kernel = remembering_start
     rate_dependent = True
-    no_inverse = UNDOES_A_MUSCLE
+    no_inverse = INVERTS_A_MUSCLE
     instead = INSTEAD
     parameters = ("surface", "friction", "viscosity", "relaxation")
     typical = (
@@ -325,7 +325,7 @@ class ActivationMemory(Block):
 
     @property
     def n_states(self) -> int:
-        """Operators, previous contraction, filtered rate, and what follows."""
+        """States: play operators, previous contraction, filtered rate, relaxation."""
         return len(self.thresholds) + 2 + len(self.time_constants)
 
     def coefficients(self, sample_time: float | None) -> Array:

@@ -1,4 +1,4 @@
-"""Where a braided muscle comes to rest: pressure against load and elasticity; and its inverse.
+"""Equilibrium of a braided muscle: pressure against load and elasticity; and its inverse.
 
 p A g(e) = load + stiffness e + hardening e^3,  g(e) = a (1 - e)^2 - b,
 displacement = rest_length e + offset,
@@ -27,33 +27,34 @@ from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton
 
 SHARE = 0.995
-"""Of the contraction at which the braid pulls no more: the furthest that the muscle goes."""
+"""Largest contraction of the muscle, relative to the contraction at which the braid's pull is zero.
+"""
 
 LEAST = -0.1
-"""Contraction below which no muscle is modelled."""
+"""Smallest contraction modelled."""
 
 STILL = 1e-16
-"""Change of the contraction below which it has been found."""
+"""Change of the contraction at which the iteration has converged."""
 
 SINGLE = {"STILL": 1e-8}
 
 
 @kernel
 def balance(e: float, c: Array) -> float:
-    """Return the pressure at which the muscle rests at a contraction."""
+    """Return the pressure in equilibrium at a contraction."""
     return (c[0] + e * (c[1] + c[2] * e * e)) / (c[3] * (c[4] * (1.0 - e) ** 2 - c[5]))
 
 
 @kernel
 def balance_slope(e: float, p: float, c: Array) -> float:
-    """Return how that pressure rises with the contraction, given it."""
+    """Return the slope of that pressure by the contraction."""
     pull = c[3] * (c[4] * (1.0 - e) ** 2 - c[5])
     return (c[1] + 3.0 * c[2] * e * e + p * 2.0 * c[3] * c[4] * (1.0 - e)) / pull
 
 
 @step
 def braid_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Find the displacement.
+    """Solve for the displacement.
 
     Coefficients are [load, stiffness, hardening, force per bar, a, b, least and largest
     contraction, rest length, offset].
@@ -75,7 +76,7 @@ def braid_step(coefficients: Array, state: Array, inputs: Array, outputs: Array)
 
 @step
 def braid_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Give the pressure of a displacement; the state is the count of samples clipped."""
+    """Compute the pressure of a displacement; the state is the clip count."""
     c = coefficients
     e = (inputs[0] - c[9]) / c[8]
     inside = min(max(e, c[6]), c[7])
@@ -86,7 +87,7 @@ def braid_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs
 
 @dataclass(frozen=True, config=fields.STRICT)
 class BraidEquilibrium(Invertible):
-    """Displacement at which a loaded, braided muscle rests under a pressure.
+    """Equilibrium displacement of a loaded, braided muscle under a pressure.
 
     Parameters
     ----------
@@ -148,7 +149,7 @@ class BraidEquilibrium(Invertible):
 
     @property
     def input_range(self) -> tuple[float, float]:
-        """Least and greatest pressure that the balance is solved for [bar]."""
+        """Lowest and highest pressure for which the balance is solved [bar]."""
         c = self.coefficients(None)
         return float(balance(c[6], c)), float(balance(c[7], c))
 

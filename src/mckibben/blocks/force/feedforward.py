@@ -1,4 +1,4 @@
-"""The pressure that gives a desired force at a measured length, in closed form.
+"""Pressure for a desired force at a measured length, in closed form.
 
 f = p g(l) + h(l) + s(p) f_h(l, l'), s(p) = 1 + gain (p - reference), is linear in p, so
 p = (f - h - f_h (1 - gain reference)) / (g + gain f_h). This is the feedforward compensation of
@@ -31,14 +31,14 @@ from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
 LEAST_PULL = 1e-9
-"""Force per bar below which no pressure gives a force [N/bar]."""
+"""Smallest force per bar for which a pressure is computed [N/bar]."""
 
 SINGLE = {"LEAST_PULL": 1e-9}
 
 
 @cache
 def law_kernels(law: type[ForceLaw]) -> tuple[Step, Start]:
-    """Return the kernels of a feedforward by a kind of law, its step and its start.
+    """Return step and start kernel of a feedforward for a kind of force law.
 
     Coefficients are [size of the law's, the law's, the friction's if there is some]; the state is the
     friction's.
@@ -49,7 +49,7 @@ def law_kernels(law: type[ForceLaw]) -> tuple[Step, Start]:
     def force_feedforward_step(
         coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
     ) -> None:
-        """Give the pressure that has a force at a length; NaN where none has."""
+        """Compute the pressure for a force at a length; NaN if there is none."""
         n = int(coefficients[0])
         friction = coefficients[1 + n :]
         per_bar, rest = terms(inputs[1], coefficients[1 : 1 + n])
@@ -77,7 +77,7 @@ def law_kernels(law: type[ForceLaw]) -> tuple[Step, Start]:
 
 @dataclass(frozen=True, config=STRICT)
 class ForceFeedforward(Block):
-    """Pressure by desired force and measured length.
+    """Pressure from desired force and measured length.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class ForceFeedforward(Block):
 
     @classmethod
     def of(cls, model: Block) -> Self | None:
-        """Return the feedforward of a model of force, or None if the model is another.
+        """Return the feedforward of a force model; None for other models.
 
         Parameters
         ----------
@@ -130,7 +130,7 @@ class ForceFeedforward(Block):
 
     @property
     def forward_model(self) -> Block:
-        """The force, of the law alone or with friction."""
+        """The force model: the law alone, or with friction."""
         return self.law if self.friction is None else Parallel((self.law, self.friction))
 
     @property
@@ -152,7 +152,7 @@ class ForceFeedforward(Block):
 
     @property
     def n_scratch(self) -> int:
-        """What the friction takes and gives, and computes in."""
+        """Scratch of the friction."""
         return 3 + (0 if self.friction is None else self.friction.n_scratch)
 
     @property
@@ -168,7 +168,7 @@ class ForceFeedforward(Block):
 
 
 def compensator(model: Block) -> Block:
-    """Return what gives a model's commands for a desired output: a feedforward, or the inverse.
+    """Return the compensator of a model: a force feedforward, or the inverse.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Static force laws: force by length, at a pressure that is measured."""
+"""Static force laws: force by length and measured pressure."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def braid(angle: float, diameter: float) -> tuple[float, float, float]:
 
 
 class ForceLaw(Block):
-    """A static force law: driven by length [mm], scheduled by pressure [bar], giving force [N]."""
+    """A static force law: from length [mm], scheduled by pressure [bar], to force [N]."""
 
     ports = ("input",), ("pressure",), ("output",)
-    no_inverse = "has no inverse by length, since more than one may give a force"
+    no_inverse = "has no inverse by length, since several lengths may have the same force"
     instead = "for the pressure that gives a force at a length, use ForceFeedforward(law)"
 
     input: fields.Channel
@@ -46,7 +46,9 @@ class ForceLaw(Block):
     output: fields.Channel
 
     terms_kernel: ClassVar[Callable[[float, Array], tuple[float, float]]]
-    """Force per pressure [N/bar], and force without any [N], from a length and `coefficients`."""
+    """Computes force per pressure [N/bar] and force at zero pressure [N] from a length and
+    `coefficients`.
+    """
 
     def terms(self, length: Array) -> tuple[Array, Array]:
         """Return force per pressure [N/bar], and force without any [N], each of the shape given.
@@ -63,7 +65,7 @@ class ForceLaw(Block):
         return per_bar.reshape(np.shape(length)), rest.reshape(np.shape(length))
 
     def check_linear(self) -> None:
-        """Refuse a law that is not linear in pressure; by default it is."""
+        """Raise an error for a law that is not linear in pressure; by default it is."""
 
 
 # -- polynomials in length -------------------------------------------------------------------
@@ -79,7 +81,7 @@ def polynomial_force_terms(length: float, c: Array) -> tuple[float, float]:
 
 @step
 def polynomial_force_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Give the force at a length and a pressure."""
+    """Compute the force at a length and a pressure."""
     per_bar, rest = polynomial_force_terms(inputs[0], coefficients)
     outputs[0] = inputs[1] * per_bar + rest
 
@@ -130,7 +132,7 @@ class PolynomialForce(ForceLaw):
     output: fields.ChannelField = fields.FORCE
 
     def unscaled(self) -> Self:
-        """Return the same law by polynomials of the length itself, as papers print it."""
+        """Return the same law as polynomials of the unscaled length, as printed in papers."""
         x = Polynomial([-self.centre / self.scale, 1.0 / self.scale])
         g, h = (tuple(Polynomial(each)(x).coef.tolist()) for each in (self.per_bar, self.elastic))
         return replace(self, per_bar=g, elastic=h, centre=0.0, scale=1.0)
@@ -157,7 +159,7 @@ def chou_hannaford_terms(length: float, c: Array) -> tuple[float, float]:
 
 @dataclass(frozen=True, config=fields.STRICT)
 class ChouHannaford(ForceLaw):
-    """Force of an inextensible braid, with friction or elasticity as a constant.
+    """Force of an inextensible braid, with a constant for friction or elasticity.
 
     Source: Chou and Hannaford, "Measurement and modeling of McKibben pneumatic artificial muscles",
     1996.
@@ -204,7 +206,7 @@ class ChouHannaford(ForceLaw):
 # -- a braided cylinder with corrections -----------------------------------------------------
 
 MU_DECAY = 40.0
-"""Per contraction."""
+"""Decay of mu per unit of contraction."""
 
 
 @step

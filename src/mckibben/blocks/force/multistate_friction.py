@@ -1,4 +1,4 @@
-"""Multistate friction: elasto-plastic elements whose numbers differ between lengthening and shortening.
+"""Multistate friction: elasto-plastic elements with different parameters per direction.
 
 With the rate v of the length, every element has a deflection x_i and numbers k, sigma and F_c that
 switch with the sign of v: x_i' = [sat(F_c, k x_i + sigma v) - k x_i] / sigma,  f = sum_i sat(F_c, k
@@ -39,7 +39,7 @@ from mckibben.errors import ModelError
 Direction = Literal["shared", "both", "lengthening", "shortening"]
 WAYS = ("lengthening", "shortening")
 QUANTITIES = ("k [N/mm]", "sigma [N s/mm]", "F_c [N]")
-"""Numbers of an element in one direction; first come those of lengthening, then those of shortening."""
+"""Parameters of an element in one direction; lengthening first, then shortening."""
 
 PLACES: dict[Direction, tuple[int, ...]] = {
     "shared": (0, 1, 2, 4, 5),
@@ -47,8 +47,9 @@ PLACES: dict[Direction, tuple[int, ...]] = {
     "lengthening": (0, 1, 2),
     "shortening": (3, 4, 5),
 }
-"""Which of these six the values of an element are. Without its own, a direction has the k and sigma of
-the other, and no F_c."""
+"""Which of these six parameters an element has. A direction without its own takes k and sigma of
+the other direction, and no F_c.
+"""
 
 SIZES = {element: len(places) for element, places in PLACES.items()}
 ELEVEN: tuple[Direction, ...] = ("shared", "shortening", "shortening")
@@ -58,7 +59,7 @@ EIGHTEEN: tuple[Direction, ...] = ("both", "both", "both")
 
 @kernel
 def deflected(x: float, v: float, time: float, k: float, sigma: float, limit: float) -> float:
-    """Return the deflection after a time at a constant rate; v >= 0, by symmetry."""
+    """Return the deflection after a time at a constant rate v >= 0."""
     if k * x + sigma * v < -limit:
         # slipping backwards: the spring relaxes to where it sticks
         excess = -(k * x + limit)
@@ -82,7 +83,7 @@ def deflected(x: float, v: float, time: float, k: float, sigma: float, limit: fl
 
 @kernel
 def sticking(x: float, v: float, k: float, sigma: float, limit: float) -> float:
-    """Return for how long an element goes on sticking at a constant rate; v >= 0, by symmetry."""
+    """Return the remaining sticking time of an element at a constant rate v >= 0."""
     if not -limit <= k * x + sigma * v <= limit:
         return 0.0
     return ((limit - sigma * v) / k - x) / v if v > 0.0 else math.inf
@@ -127,7 +128,7 @@ def multistate_friction_step(
 def multistate_friction_start(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
 ) -> None:
-    """Start as if the length had only grown, or with nothing deflected."""
+    """Start as if the length had only increased, or with zero deflections."""
     n = state.size - 1
     for i in range(n):
         k, limit = coefficients[3 + 6 * i], coefficients[5 + 6 * i]
@@ -208,12 +209,12 @@ class MultistateFriction(Block):
 
     @property
     def parameters(self) -> tuple[str, ...]:  # type: ignore[override]
-        """The values, and the pressure gain where there is one."""
+        """The values, and the pressure gain if there is one."""
         return ("values", "pressure_gain") if self.pressure_gain != 0 else ("values",)
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """Element, direction and quantity, with its unit, of every value."""
+        """Element, direction, quantity and unit of every value."""
         names = []
         for number, element in enumerate(self.elements, start=1):
             for place in PLACES[element]:
@@ -233,7 +234,7 @@ class MultistateFriction(Block):
         return np.where(np.isnan(table), other, table)
 
     def by_strength(self) -> tuple[Self, list[int]]:
-        """Return the same friction with elements of one kind by falling F_c, and where its values were.
+        """Return the same friction with elements sorted by falling F_c, and the permutation of values.
 
         The order of such elements has no effect; so two fits can be compared value by value.
         """
@@ -250,11 +251,11 @@ class MultistateFriction(Block):
         return np.array([step, self.pressure_gain, self.reference_pressure, *self.table().ravel()])
 
     def worked(self) -> tuple[str, ...]:
-        """Return the numbers of every element in each direction."""
-        told: dict[str, list[str]] = {}
+        """Return the values of every element in each direction."""
+        written: dict[str, list[str]] = {}
         for name, value in zip(self.parameter_names, self.values, strict=False):
             where, _, quantity = name.partition(": ")
             symbol, _, unit = quantity.rstrip("]").partition(" [")
             letter = {"sigma": r"\sigma", "F_c": "F_c"}.get(symbol, symbol)
-            told.setdefault(where, []).append(f"{letter} = {with_unit(tex(value), unit)}")
-        return tuple(rf"\text{{{at}: }}" + r",\quad ".join(lines) for at, lines in told.items())
+            written.setdefault(where, []).append(f"{letter} = {with_unit(tex(value), unit)}")
+        return tuple(rf"\text{{{at}: }}" + r",\quad ".join(lines) for at, lines in written.items())

@@ -1,4 +1,4 @@
-"""Models of a loop with one memory z that moves with the input: Bouc-Wen, generalised, and Duhem.
+"""Models with one hysteretic state z driven by the input: Bouc-Wen, generalised, and Duhem.
 
 All are rate-independent and integrated in closed form, and their inverses are solved for.
 
@@ -49,7 +49,7 @@ from mckibben.errors import ModelError
 def loop_kernels(
     moved: Callable[..., float], output: Callable[..., float], start: Start
 ) -> tuple[Step, Step, Start]:
-    """Return the step of a model, and the step and the start of its inverse; the state is [z, input].
+    """Return the step of a model, and step and start of its inverse; the state is [z, input].
 
     The model gives two compiled functions: ``moved(u, coefficients, state)``, its memory after the input
     has gone on to u, and ``output(u, z, coefficients)``.
@@ -67,7 +67,7 @@ def loop_kernels(
 
     @step
     def loop_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-        """Move the memory with the input; the state is [memory, previous input]."""
+        """Advance the hysteretic state with the input; the state is [z, previous input]."""
         advance(inputs[0], coefficients, state)
         outputs[0] = output(inputs[0], state[0], coefficients)
 
@@ -75,7 +75,7 @@ def loop_kernels(
 
 
 def many_peaks(model: Invertible) -> Array:
-    """Return peaks over the whole range, as a memory that moves all the time has none of its own."""
+    """Return peaks over the whole range, as z has no thresholds."""
     return np.linspace(*model.input_limits, 33)
 
 
@@ -88,7 +88,7 @@ def bouc_wen_start(coefficients: Array, state: Array, inputs: Array, virgin: boo
 
 @kernel
 def flow(v: float, tau: float, unloading: float, loading: float, n: int) -> float:
-    """Return z in the direction of motion, v, after a straight stretch ``tau`` of the input.
+    """Return z along the direction of motion, v, after a monotonic input change ``tau``.
 
     With tau > 0 in units of the model's rate, dv/dtau = 1 - psi |v|^n; psi is ``unloading`` while v < 0,
     then ``loading``. For n = 1 the solutions are exponentials; for n = 2 they are tanh where psi > 0 and
@@ -110,7 +110,7 @@ def flow(v: float, tau: float, unloading: float, loading: float, n: int) -> floa
 
 @kernel
 def _way_to_zero(w: float, psi: float, n: int) -> float:
-    """Return the way after which w = |v| has shrunk to zero."""
+    """Return the input change after which w = |v| has decayed to zero."""
     if psi == 0.0:
         return w
     if n == 1:
@@ -121,7 +121,7 @@ def _way_to_zero(w: float, psi: float, n: int) -> float:
 
 @kernel
 def _shrunk(w: float, tau: float, psi: float, n: int) -> float:
-    """Return what is left of w = |v| after the way ``tau``."""
+    """Return w = |v| after the input change ``tau``."""
     if psi == 0.0:
         return w - tau
     if n == 1:
@@ -137,7 +137,7 @@ def _shrunk(w: float, tau: float, psi: float, n: int) -> float:
 
 @kernel
 def _bouc_wen_moved(u: float, c: Array, state: Array) -> float:
-    """Return z after the input has gone on to ``u``."""
+    """Return z after the input has moved to ``u``."""
     du = u - state[1]
     if du == 0.0:
         return state[0]
@@ -222,7 +222,7 @@ def _psi(going: float, z: float, side: float, c: Array) -> float:
 
 @kernel
 def _stretch(z: float, du: float, side: float, c: Array) -> float:
-    """Return z after the input has moved by ``du`` on one side of the centre."""
+    """Return z after an input change ``du`` on one side of the centre."""
     if du == 0.0:
         return z
     up = 1.0 if du > 0.0 else -1.0
@@ -232,7 +232,7 @@ def _stretch(z: float, du: float, side: float, c: Array) -> float:
 
 @kernel
 def _generalized_moved(u: float, c: Array, state: Array) -> float:
-    """Return z after the input has gone on to ``u``.
+    """Return z after the input has moved to ``u``.
 
     Coefficients are [rate, n, weight, centre, scale, b2 to b6, polynomial].
     """
@@ -321,7 +321,7 @@ class GeneralizedBoucWen(Invertible):
 
     @property
     def bound(self) -> float:
-        """Largest size of z: where it ends with the smallest psi of loading."""
+        """Bound of |z|: its limit at the smallest psi of loading."""
         signs = [(s * g, s * g, g, g, s) for s in (1, -1) for g in (1, -1)]
         smallest = 1.0 + min(float(np.dot(self.shape, sign)) for sign in signs)
         return float(smallest ** (-1.0 / self.exponent))
@@ -340,7 +340,7 @@ class GeneralizedBoucWen(Invertible):
 
 @kernel
 def _duhem_moved(u: float, c: Array, state: Array) -> float:
-    """Return the output after the input has gone on to ``u``.
+    """Return the output after the input has moved to ``u``.
 
     Coefficients are [alpha, centre, scale, P rising, P falling, f].
     """
@@ -356,13 +356,13 @@ def _duhem_moved(u: float, c: Array, state: Array) -> float:
 
 @kernel
 def _duhem_output(u: float, y: float, c: Array) -> float:
-    """Return the memory: it is the output."""
+    """Return the output, which is the hysteretic state."""
     return y
 
 
 @kernel
 def duhem_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start on the curve of inputs that have only risen, or on f."""
+    """Start on the curve of monotonically risen inputs, or on f."""
     x = (inputs[0] - coefficients[1]) / coefficients[2]
     size = (coefficients.size - 3) // 3
     state[0] = polynomial_at(x, coefficients, 3 + 2 * size if virgin else 3, size)
@@ -370,7 +370,7 @@ def duhem_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) 
 
 
 def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: float) -> Array:
-    """Return P for the directions 1 or -1 of the input: all polynomials by ascending coefficients."""
+    """Return P for input directions 1 or -1: polynomials with ascending coefficients."""
     f, g = np.atleast_1d(np.asarray(target, float)), np.atleast_1d(np.asarray(slope, float))
     size = max(f.size, g.size)
     f, g = np.pad(f, (0, size - f.size)), np.pad(g, (0, size - g.size))
@@ -382,7 +382,7 @@ def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: flo
 
 @dataclass(frozen=True, config=fields.STRICT)
 class Duhem(Invertible):
-    """Duhem model with a polynomial to tend to and a polynomial slope.
+    """Duhem model with polynomial limit curve and polynomial slope.
 
     Parameters
     ----------
@@ -433,7 +433,7 @@ class Duhem(Invertible):
     output: fields.ChannelField = fields.DISPLACEMENT
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [alpha, centre, scale, P rising, P falling, f], filled up to as many numbers as P."""
+        """Return [alpha, centre, scale, P rising, P falling, f], padded to the length of P."""
         up, down = (particular(self.alpha, self.target, self.slope, way) for way in (1.0, -1.0))
         filled = [0.0] * (up.size - len(self.target))
         return np.array([self.alpha, self.centre, self.scale, *up, *down, *self.target, *filled])

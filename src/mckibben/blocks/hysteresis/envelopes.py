@@ -1,4 +1,4 @@
-"""Envelopes of generalised play operators: strictly increasing functions of the input.
+"""Envelopes of generalised play operators: strictly increasing functions.
 
 Each has two kernels, ``value`` and ``inverse``, and the frozen class that names their parameters.
 
@@ -29,7 +29,7 @@ from mckibben.errors import ModelError
 
 
 class EnvelopeKernel(Protocol):
-    """A compiled function of one number; ``batch(coefficients, arguments, values)`` is that of many."""
+    """A compiled scalar function; ``batch(coefficients, arguments, values)`` evaluates many."""
 
     batch: Callable[[Array, Array, Array], None]
 
@@ -53,7 +53,7 @@ class Envelope(Parametrised):
     """A strictly increasing function of the input, with its inverse."""
 
     increasing: ClassVar[tuple[str, ...]] = ()
-    """Fields of numbers in increasing order, which single precision must not make one."""
+    """Fields that must be strictly increasing, also after rounding to single precision."""
 
     value: ClassVar[EnvelopeKernel]
     inverse: ClassVar[EnvelopeKernel]
@@ -62,11 +62,11 @@ class Envelope(Parametrised):
     """Arguments of `examples`."""
 
     def coefficients(self) -> Array:
-        """Return the numbers that the kernels read; by default the parameters."""
+        """Return the coefficients of the kernels; by default the parameters."""
         return self.pack()
 
     def shifted(self, offset: float) -> Self:
-        """Return this envelope raised by a constant; by default its field ``offset``."""
+        """Return this envelope shifted up by a constant; by default by its field ``offset``."""
         return replace(self, offset=self.offset + offset)  # type: ignore[type-var,attr-defined]
 
     @classmethod
@@ -76,7 +76,7 @@ class Envelope(Parametrised):
         return cls(*rising), cls(*falling)
 
     def __call__(self, inputs: ArrayLike) -> Array:
-        """Return the envelope at the inputs, any shape."""
+        """Return the inputs at which the envelope has these values, any shape; NaN out of range."""
         return self._evaluate(type(self).value, inputs)
 
     def solve(self, values: ArrayLike) -> Array:
@@ -91,7 +91,7 @@ class Envelope(Parametrised):
 
 
 def nested_envelope(content: Any) -> Any:
-    """Turn the dict of an envelope inside a block into that envelope."""
+    """Convert the dict of an envelope inside a block to that envelope."""
     return part_from_dict(content, "envelopes") if isinstance(content, dict) else content
 
 
@@ -149,7 +149,7 @@ def exponential_inverse(value: float, coefficients: Array) -> float:
 
 @dataclass(frozen=True, config=STRICT)
 class Exponential(Envelope):
-    """Shifted exponential, for loops that bend one way only.
+    """Shifted exponential, for loops that saturate at one end.
 
     gamma(u) = offset + sign(rate) (1 - exp(shift - rate u)): concave and saturating for a positive
     rate, convex for a negative one, and strictly increasing for both.
@@ -203,7 +203,7 @@ def piecewise_linear_inverse(value: float, coefficients: Array) -> float:
 
 @dataclass(frozen=True, config=STRICT)
 class PiecewiseLinear(Envelope):
-    """Straight lines between knots, continued beyond the first and the last; for loops of any shape.
+    """Piecewise-linear envelope with extrapolation, for loops of any shape.
 
     Parameters
     ----------
@@ -240,5 +240,5 @@ class PiecewiseLinear(Envelope):
         return np.array([*self.knots, *self.values])
 
     def shifted(self, offset: float) -> Self:
-        """Return this envelope raised by a constant."""
+        """Return this envelope shifted up by a constant."""
         return replace(self, values=tuple(value + offset for value in self.values))

@@ -31,13 +31,13 @@ from mckibben.errors import ModelError
 
 @inlined
 def unparallel_play(s: float, x: float, r: float, alpha: float, beta: float) -> float:
-    """Move an operator whose edges differ in slope."""
+    """Advance an operator whose edges differ in slope."""
     return max(min(s, alpha * x + beta * r), x - r)
 
 
 @summing_step
 def eupi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; coefficients are [u_0, alpha, beta, offset, a_1..a_3, thresholds, weights]."""
+    """Advance the model; coefficients are [u_0, alpha, beta, offset, a_1..a_3, thresholds, weights]."""
     n = state.size
     alpha, beta, offset = coefficients[1], coefficients[2], coefficients[3]
     a1, a2, a3 = coefficients[4], coefficients[5], coefficients[6]
@@ -157,11 +157,11 @@ class EUPI(Invertible):
         return np.array([*edges, *shape, *self.thresholds, *self.weights])
 
     def peaks(self) -> Array:
-        """Return the peaks from which the operators just come back to the lowest input."""
+        """Return the peaks from which each operator just returns to the lowest input."""
         return self.input_range[0] + (1 + self.falling_threshold) * np.array(self.thresholds)
 
     def check_invertible(self) -> None:
-        """Demand weights that are not negative, and a part without memory that increases."""
+        """Require non-negative weights, and an increasing memoryless part."""
         if min(self.weights) < 0 or self.least_slope() <= 0:
             raise ModelError(
                 "'eupi' has no inverse: a weight is negative, or its part without memory "
@@ -170,7 +170,7 @@ class EUPI(Invertible):
             )
 
     def least_slope(self) -> float:
-        """Return a lower bound of the slope of the part without memory by the input."""
+        """Return a lower bound of the slope of the memoryless part by the input."""
         low, high = self.input_range
         a1, a2, a3 = self.polynomial
         turn = -a2 / (3 * a3) if a3 else 0.0
@@ -180,5 +180,5 @@ class EUPI(Invertible):
         return float(slope + (self.weights[0] if reversible else 0.0))
 
     def remembered(self, state: Array) -> tuple[float, ...]:
-        """Return the lowest input: operators do not determine which one was last."""
+        """Return the lowest input, as operators do not determine the last one."""
         return (self.input_range[0],)

@@ -50,7 +50,7 @@ EnvelopeField = Annotated[InstanceOf[Envelope], BeforeValidator(nested_envelope)
 
 @cache
 def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> tuple[Any, ...]:
-    """Return step and start of models with two kinds of envelopes, of inverses, and of learning ones.
+    """Return step and start kernels for two kinds of envelopes: forward, inverse and adaptive.
 
     Coefficients are [size of the rising envelope, thresholds, weights, rising, falling], and of the
     inverse [lowest, highest input] before. The state is [operators, previous input], and of the inverse
@@ -98,7 +98,7 @@ def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> tuple[Any, ..
 
     @inlined
     def go(way: float, c: Array, state: Array, n: int) -> float:
-        """Move to the input, within its limits, at which the envelope of a direction has the edge."""
+        """Move to the input, within limits, at which the envelope of a direction reaches the edge."""
         first = 2 * n + 3 + int(c[2])
         if way > 0.0:
             state[n] = min(max(rising_from(state[0], c[2 * n + 3 : first]), c[0]), c[1])
@@ -108,7 +108,7 @@ def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> tuple[Any, ..
 
     @step
     def gpi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-        """Invert: find the operators' common edge, and the input from the envelope of the direction."""
+        """Advance the inverse: find the operators' common edge, then the input from the envelope."""
         n, c = state.size - 3, coefficients[2:]
         r, w = c[1 : n + 1], c[n + 1 : 2 * n + 1]
         lowest = falling_edge(coefficients[0], c, n)
@@ -147,7 +147,7 @@ def of_envelopes(place: int) -> Any:
 def smallest_gap(
     rising: Envelope, falling: Envelope, input_range: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return the smallest of gamma_L - gamma_R over the input range, and the input where it is."""
+    """Return the smallest gamma_L - gamma_R over the input range, and its input."""
     low, high = input_range
     for _ in range(4):
         u = np.linspace(low, high, 1025)
@@ -210,26 +210,26 @@ class GPI(Invertible):
         return np.array([up.size, *self.thresholds, *self.weights, *up, *down])
 
     def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Give the thresholds, and the knots of the envelopes that have some."""
+        """Yield the thresholds, and the knots of piecewise-linear envelopes."""
         yield from super().strictly_increasing()
         for envelope in (self.rising, self.falling):
             yield from ((name, getattr(envelope, name)) for name in envelope.increasing)
 
     def peaks(self) -> Array:
-        """Return the peaks from which the operators just come back to the lowest input."""
+        """Return the peaks from which each operator just returns to the lowest input."""
         low, high = self.input_limits
         edges = self.falling(low) + 2 * np.array(self.thresholds)
         return np.asarray(self.rising.solve(edges[edges < self.rising(high)]))
 
     def check_invertible(self) -> None:
-        """Demand a first threshold of 0, an increasing sum, and envelopes in order within the limits."""
+        """Require a first threshold of 0, an increasing sum, and ordered envelopes within the limits."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
         gap, where = smallest_gap(self.rising, self.falling, self.input_range)
         if gap < 0:
             raise ModelError(
                 f"'gpi' has no inverse: at {where:.4g} {self.input.unit} its falling "
                 f"envelope is {-gap:.3g} below the rising one",
-                remedy="identify it with `fit()`, which keeps them in order",
+                remedy="identify it with `fit()`, which constrains their order",
             )
 
     def inverse_numbers(self, own: Array) -> Array:
@@ -240,7 +240,7 @@ class GPI(Invertible):
 
     @property
     def learnable(self) -> Learnable:
-        """Weights, and an offset that the model itself has not."""
+        """Adaptive parameters: weights, and an additional offset."""
         low, high = self.input_range
         limits = float(self.falling(low)), float(self.rising(high))
 

@@ -29,13 +29,13 @@ from mckibben.blocks.solving import solve_input, solved_start
 
 @kernel
 def stretch(du: float, stiffness: float) -> float:
-    """Return by how much springs that do not slip are deflected where the input moves by ``du``."""
+    """Return the deflection of springs that do not slip for an input change ``du``."""
     return du if du >= 0.0 else stiffness * du
 
 
 @kernel
 def slip(s: float, du: float, limit: float, ratio: float) -> float:
-    """Return what is left of a spring's deflection where it slips."""
+    """Return the remaining deflection of a slipping spring."""
     return min(s, limit) if du >= 0.0 else max(s, -ratio * limit)
 
 
@@ -43,7 +43,7 @@ def slip(s: float, du: float, limit: float, ratio: float) -> float:
 def slip_matrix(
     u: Array, limits: Array, stiffness: float, ratio: float, s: Array, deflections: Array
 ) -> None:
-    """Run springs side by side: ``deflections[t, i]`` is that of spring i after sample t.
+    """Run springs in parallel: ``deflections[t, i]`` is that of spring i after sample t.
 
     Shapes: u (n,), limits and s (N,), deflections (n, N). Changes the deflections ``s`` at the start.
     """
@@ -108,7 +108,7 @@ def maxwell_slip_inverse_step(
 
 @kernel
 def maxwell_slip_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start with all springs slipping upwards, or none deflected."""
+    """Start with all springs slipping upwards, or undeflected."""
     n = state.size - 1
     for i in range(n):
         state[i] = 0.0 if virgin else coefficients[4 + i]
@@ -117,7 +117,7 @@ def maxwell_slip_start(coefficients: Array, state: Array, inputs: Array, virgin:
 
 @dataclass(frozen=True, config=fields.STRICT)
 class MaxwellSlip(Invertible):
-    """Springs that slip, beside a reversible polynomial.
+    """Slipping springs in parallel with a reversible polynomial.
 
     Parameters
     ----------
@@ -194,6 +194,6 @@ class MaxwellSlip(Invertible):
         return least_slope(self.polynomial, self.centre, self.scale, self.input_limits) + softening
 
     def peaks(self) -> Array:
-        """Return the peaks at which one spring more slips."""
+        """Return the peaks at which one more spring slips."""
         low, _ = self.input_limits
         return low + 2.0 * np.array(self.breakaways)

@@ -1,4 +1,4 @@
-"""A mass on a spring and a damper beside an element that remembers: hysteresis inside a dynamic loop.
+"""A mass with spring, damper and a hysteretic element inside the dynamic loop.
 
 m y'' + c y' + k y + z = u,
 z' = f(z, y') y'.
@@ -43,24 +43,25 @@ from mckibben.blocks.parameters import gathered
 from mckibben.errors import ModelError
 
 HEAD = 7
-"""Numbers before those of the element."""
+"""Number of coefficients before those of the hysteretic element."""
 
 SETTLING = 64
-"""Steps in which a start at rest is reached."""
+"""Number of steps in which an initial equilibrium is reached."""
 
 STABLE = 2.5
-"""Radians of the fastest oscillation in a substep beyond which Runge-Kutta steps may grow."""
+"""Angle of the fastest oscillation per substep [rad] above which Runge-Kutta steps may be unstable.
+"""
 
 
 def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[Step, Start]:
-    """Return the step and the start of an oscillator whose element has ``slope(z, velocity, numbers)``.
+    """Return step and start of an oscillator with ``slope(z, velocity, numbers)``.
 
     Coefficients are [substep, how many, 1 for zero-order hold, m, c, k, offset, numbers of the
     element]; the state is [y, y', z, last input].
     """
 
     def oscillator_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-        """Run an oscillator in substeps of Runge and Kutta."""
+        """Advance an oscillator in Runge-Kutta substeps."""
         h, n, held = coefficients[0], int(coefficients[1]), coefficients[2] > 0.0
         m, c, k, offset = coefficients[3], coefficients[4], coefficients[5], coefficients[6]
         own = coefficients[HEAD:]
@@ -94,12 +95,12 @@ def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[S
 
     @kernel
     def share(z: float, force: float, k: float, own: Array) -> float:
-        """Return the share of a slow input that the element takes."""
+        """Return the element's share of a slowly applied force."""
         stiffness = slope(z, force, own)
         return stiffness / (k + stiffness)
 
     def oscillator_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-        """Start at rest: where the first input leads slowly from none, or, virgin, without force."""
+        """Start in equilibrium with the first force, or, virgin, without force."""
         force = 0.0 if virgin else inputs[0]
         k, own = coefficients[5], coefficients[HEAD:]
         step = force / SETTLING
@@ -116,7 +117,7 @@ def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[S
 
 
 class Oscillator(Block):
-    """Mass, damper and spring with an element that a class adds, from force to displacement.
+    """Mass, damper and spring with a hysteretic element of a subclass, from force to displacement.
 
     Parameters
     ----------
@@ -143,10 +144,10 @@ class Oscillator(Block):
     steady_state = steady_state
     n_states = 4  # displacement, velocity, force of the element, last input
     slope_by: ClassVar[Any]
-    """Slope of the element's force by y, from [force, velocity, `element`]; compiled."""
+    """Slope of the element's force over y, from [force, velocity, `element`]; compiled."""
 
     elements: ClassVar[tuple[str, ...]]
-    """Fields of the element."""
+    """Fields of the hysteretic element."""
 
     mass: float
     damping: float
@@ -158,12 +159,12 @@ class Oscillator(Block):
 
     @property
     def element(self) -> Array:
-        """Numbers of the element, one-dimensional."""
+        """Parameters of the hysteretic element, one-dimensional."""
         return gathered(self, self.elements)
 
     @property
     def fastest(self) -> float:
-        """Angular frequency of small motion about rest without force [rad/s]."""
+        """Angular frequency of small motions about zero force [rad/s]."""
         slopes = [type(self).slope_by(0.0, way, self.element) for way in (1.0, -1.0)]
         return float(np.sqrt((self.stiffness + max(*slopes, 0.0)) / self.inertia))
 
@@ -179,7 +180,7 @@ class Oscillator(Block):
         return np.array([*head, *springs, *self.element])
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that runs the kernel in place; refuse too few substeps for a sample time."""
+        """Return a function that runs the kernel in place; raise an error for too few substeps."""
         step = needs_sample_time(self.kind, sample_time)
         angle = self.fastest * step
         if not angle <= STABLE * self.substeps:
@@ -191,7 +192,7 @@ class Oscillator(Block):
         return super().bind(sample_time, state, inputs, outputs)
 
     def cost(self, sample_time: float | None) -> Cost:
-        """Return what a step costs: four slopes a substep."""
+        """Return the cost of a step: four slopes per substep."""
         operations = self.substeps * 4 * (18 + self.element.size)
         return Cost(operations, operations)
 
@@ -251,7 +252,7 @@ class BoucWenOscillator(Oscillator):
 
 @kernel
 def knot_before(z: float, numbers: Array, n: int) -> int:
-    """Return the knot, of the n in front of the numbers, at which the piece about z begins."""
+    """Return the knot at which the piece around z starts."""
     j = 0
     while j < n - 2 and z >= numbers[j + 1]:
         j += 1
@@ -260,7 +261,7 @@ def knot_before(z: float, numbers: Array, n: int) -> int:
 
 @kernel
 def duhem_slope(z: float, velocity: float, numbers: Array) -> float:
-    """Return dz/dy; numbers are [knots, slopes rising, slopes falling], as many each."""
+    """Return dz/dy; numbers are [knots, rising slopes, falling slopes], equally many."""
     n = numbers.size // 3
     j = knot_before(z, numbers, n)
     share = (z - numbers[j]) / (numbers[j + 1] - numbers[j])
@@ -271,7 +272,7 @@ def duhem_slope(z: float, velocity: float, numbers: Array) -> float:
 
 @dataclass(frozen=True, config=fields.STRICT)
 class DuhemOscillator(Oscillator):
-    """Mass, damper and spring with an element of any slopes, from force to displacement.
+    """Mass, damper and spring with a piecewise hysteretic element, from force to displacement.
 
     Parameters
     ----------

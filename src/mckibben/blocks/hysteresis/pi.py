@@ -48,7 +48,7 @@ from mckibben.blocks.solving import solved_inverse
 
 @summing_step
 def pi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run a PI model; coefficients are [offset, thresholds, weights]."""
+    """Advance a PI model; coefficients are [offset, thresholds, weights]."""
     n = state.size
     r, w = coefficients[1 : n + 1], coefficients[n + 1 :]
     u = inputs[0]
@@ -68,7 +68,7 @@ def pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> 
 
 @step
 def pi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Invert a PI model; coefficients are [lowest, highest input, offset, thresholds, weights].
+    """Advance the inverse; coefficients are [lowest, highest input, offset, thresholds, weights].
 
     The state is [forward operators, previous reference, samples clipped].
     """
@@ -97,7 +97,7 @@ def pi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: b
 def pi_adaptive_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Invert a PI model, and learn its weights and offset from what is measured."""
+    """Advance the inverse of a PI model, and adapt its weights and offset to measurements."""
     n = int(coefficients[0]) - 1
     r = coefficients[inverse_at(coefficients) + 3 : inverse_at(coefficients) + n + 3]
     s, last, learnt = state[:n], state[n : n + 3], state[n + 3 :]
@@ -107,7 +107,7 @@ def pi_adaptive_step(
 
 @kernel
 def pi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start as the inverse does, with the weights as fitted."""
+    """Start as the inverse does, with the fitted weights."""
     n = int(coefficients[0]) - 1
     pi_inverse_start(coefficients[inverse_at(coefficients) :], state[: n + 2], inputs, virgin)
     state[n + 2] = 0.0
@@ -163,11 +163,11 @@ class PI(Invertible):
         check_thresholds(self.kind, self.thresholds, self.weights)
 
     def peaks(self) -> Array:
-        """Return the peaks from which the operators just come back to the lowest input."""
+        """Return the peaks from which each operator just returns to the lowest input."""
         return self.input_limits[0] + 2 * np.array(self.thresholds)
 
     def check_invertible(self) -> None:
-        """Demand a first threshold of 0, and partial sums of the weights that are positive."""
+        """Require a first threshold of 0, and positive partial sums of the weights."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
 
     def inverse_numbers(self, own: Array) -> Array:
@@ -179,7 +179,7 @@ class PI(Invertible):
 
     @property
     def learnable(self) -> Learnable:
-        """Weights and the offset."""
+        """Adaptive parameters: weights and offset."""
         return learnable_operators(
             self,
             self.input_limits,
@@ -190,7 +190,7 @@ class PI(Invertible):
         )
 
     def worked(self) -> tuple[str, ...]:
-        """Return the sum with its numbers, where it is short."""
+        """Return the sum with numerical values, if short."""
         if len(self.weights) > FEW:
             return ()
         pairs = zip(self.weights, self.thresholds, strict=True)
@@ -200,7 +200,7 @@ class PI(Invertible):
 
 @summing_step
 def rate_pi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; coefficients are [smoothing, gain of the rate, offset, thresholds, k, d].
+    """Advance the model; coefficients are [smoothing, gain of the rate, offset, thresholds, k, d].
 
     The state is [operators, previous input, filtered rate].
     """
@@ -319,7 +319,7 @@ class RateDependentPI(Invertible):
         return np.array([*rate, self.offset, *sums])
 
     def check_invertible(self) -> None:
-        """Demand an input range, a first threshold of 0, and an output that rises at rest."""
+        """Require an input range, a first threshold of 0, and an output that increases at rest."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
         super().check_invertible()
 
@@ -327,6 +327,6 @@ class RateDependentPI(Invertible):
         return (float(state[-2]),)
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the outputs that can be reached at rest whatever happened before."""
+        """Return the outputs that are reachable at rest from every state."""
         at_rest = PI(self.thresholds, self.weights, self.offset, self.input_range)
         return at_rest.reachable()

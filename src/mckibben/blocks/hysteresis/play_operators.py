@@ -1,4 +1,4 @@
-"""The play (backlash) operator, and what sums of it share: thresholds, starts, the walk that inverts.
+"""The play (backlash) operator, and thresholds, starts and inverses of weighted sums of it.
 
 With threshold r and input u: w_t = min(max(w_{t-1}, u_t - r), u_t + r). Its output follows the
 input through a dead zone of width 2 r, and remembers where it was left.
@@ -24,7 +24,7 @@ from mckibben.errors import ModelError
 
 
 def check_thresholds(kind: str, thresholds: Sequence[float], weights: Sequence[float]) -> None:
-    """Refuse thresholds that are negative or not increasing, or not one to a weight."""
+    """Raise an error for thresholds that are negative, not increasing, or not one per weight."""
     if not thresholds or len(thresholds) != len(weights):
         raise ModelError(
             f"{kind!r} has {len(thresholds)} thresholds and {len(weights)} weights",
@@ -34,7 +34,7 @@ def check_thresholds(kind: str, thresholds: Sequence[float], weights: Sequence[f
 
 
 def check_order(kind: str, thresholds: Sequence[float]) -> None:
-    """Refuse thresholds that are negative or not increasing."""
+    """Raise an error for thresholds that are negative or not increasing."""
     if any(r < 0 for r in thresholds[:1]) or np.any(np.diff(thresholds) <= 0):
         raise ModelError(
             f"the thresholds of {kind!r} are not 0 <= r_0 < r_1 < ..",
@@ -43,7 +43,7 @@ def check_order(kind: str, thresholds: Sequence[float]) -> None:
 
 
 def check_invertible_sum(kind: str, thresholds: Sequence[float], weights: Sequence[float]) -> None:
-    """Refuse a weighted sum of play operators that is not strictly increasing.
+    """Raise an error for a weighted sum of play operators that is not strictly increasing.
 
     The slope after every reversal runs through the partial sums of the weights, so each must be
     positive, and the first operator must have no dead zone.
@@ -66,7 +66,7 @@ def check_invertible_sum(kind: str, thresholds: Sequence[float], weights: Sequen
 
 @kernel
 def start_operators(r: Array, rising: float, falling: float, virgin: bool, s: Array) -> None:
-    """Start play operators as if the input had only risen, or as if nothing had ever happened.
+    """Start play operators as if the input had only risen, or from a virgin state.
 
     ``rising`` and ``falling`` are the first input as the two edges see it: the same for classical
     operators, the two envelopes' values for generalised ones.
@@ -88,7 +88,7 @@ def started(r: Array, rising: float, falling: float, rule: str) -> Array:
 def start_sum(
     target: float, lowest: float, highest: float, r: Array, w: Array, virgin: bool, s: Array
 ) -> None:
-    """Start operators so that their weighted sum is ``target``, within the limits of their input."""
+    """Start operators so that their weighted sum is ``target``, within the input limits."""
     if virgin:
         s[:] = 0.0
         if target != 0.0:
@@ -134,7 +134,7 @@ def follow(
 
 @kernel
 def move_to(target: float, way: float, limit: float, r: Array, w: Array, s: Array) -> float:
-    """Move the input of a sum of play operators up or down (``way`` 1 or -1) until it is ``target``.
+    """Move the input of a sum of play operators up or down (``way`` 1 or -1) to ``target``.
 
     Changes the states ``s``, as far as the limit of the input allows, and returns the input that the
     target asks for. While the input z rises, operator i moves once z > s_i + r_i, and operators start
@@ -179,7 +179,7 @@ def play_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -
 def play_matrix(
     u: Array, rising: Array, falling: Array, r: Array, s: Array, operators: Array
 ) -> None:
-    """Run play operators side by side: ``operators[t, i]`` is operator i after sample t.
+    """Run play operators in parallel: ``operators[t, i]`` is operator i after sample t.
 
     Shapes: u and what its edges see of it, rising and falling, (n,), r and s (N,), operators (n, N).
     Changes the states ``s``, which are those after the first sample: nothing moves before the second.

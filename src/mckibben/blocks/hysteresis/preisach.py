@@ -43,7 +43,7 @@ from mckibben.errors import ModelError
 
 @dataclass(frozen=True, config=fields.STRICT)
 class Triangle(Parametrised):
-    """Fields of a model of cells between levels of the input, one for each pair of intervals.
+    """Fields of a model with a cell for each pair of intervals of the input levels.
 
     Parameters
     ----------
@@ -91,25 +91,26 @@ class Triangle(Parametrised):
 
     @staticmethod
     def near_diagonal(most: float) -> tuple[Any, ...]:
-        """Return the numbers of a loop over 0 to 5 with more weight near the diagonal."""
+        """Return weights of a loop over 0 to 5, concentrated near the diagonal."""
         weights = [most / (1 + i - j) ** 2 for i in range(5) for j in range(i + 1)]
         return fields.vector(np.linspace(0.0, 5.0, 6)), tuple(weights), 1.0
 
 
 def on_diagonal(weights: Sequence[float]) -> Array:
-    """Return the weights of the cells on the diagonal, shape (L,), which act where the input turns."""
+    """Return the weights of the diagonal cells, shape (L,), which act at reversals."""
     n = int(np.sqrt(2 * len(weights)))
     return np.array(weights)[np.cumsum(np.arange(1, n + 1)) - 1]
 
 
 DEPTH = 64
-"""Turning points remembered. More are nested only in loops within loops 32 deep; the smallest two
-are then forgotten."""
+"""Number of turning points stored. Only loops nested 32 deep need more; the smallest two are then
+forgotten.
+"""
 
 
 @kernel
 def _place(u: float, levels: Array) -> tuple[int, float]:
-    """Return the interval of the levels that an input lies in, and where in it, 0 to 1."""
+    """Return the interval of an input among the levels, and its position there, 0 to 1."""
     low, high = 0, levels.size - 2
     while low < high:
         middle = (low + high + 1) // 2
@@ -122,7 +123,7 @@ def _place(u: float, levels: Array) -> tuple[int, float]:
 
 @kernel
 def everett(a: float, b: float, levels: Array, table: Array) -> float:
-    """Return the weight of all relays within b and a; ``table`` holds it at the levels, row by row."""
+    """Return the total weight of relays between b and a, from a table at the levels."""
     n = levels.size
     i, x = _place(a, levels)
     j, y = _place(b, levels)
@@ -160,10 +161,10 @@ def _solve(target: float, other: float, rising: bool, levels: Array, table: Arra
 CORNERS, OUTPUTS = 2, 2 + DEPTH
 LAST, LAST_OUTPUT = 2 + 2 * DEPTH, 3 + 2 * DEPTH
 CLIPPED = 4 + 2 * DEPTH
-"""Places in the state, and behind it in that of the inverse."""
+"""Index of the clip counter in the inverse's state, after the block's own state."""
 
 SWINGS = DEPTH // 2 - 2
-"""From end to end, before a virgin start."""
+"""Number of shrinking swings that lead to a virgin start."""
 
 
 @kernel
@@ -180,7 +181,7 @@ def _output(u: float, state: Array, levels: Array, table: Array) -> float:
 
 @kernel
 def _turn(going: float, state: Array) -> None:
-    """Remember the last sample as a turning point, if the input turns there."""
+    """Store the last sample as a turning point if the input reverses there."""
     if going != state[1]:
         depth = int(state[0])
         if depth == DEPTH:
@@ -191,7 +192,7 @@ def _turn(going: float, state: Array) -> None:
 
 @kernel
 def _visit(wanted: float, c: Array, state: Array) -> None:
-    """Move to an input, or to the first or last level if it is beyond."""
+    """Move to an input, clipped to the levels."""
     n = int(c[0])
     levels, table = c[1 : 1 + n], c[1 + n : 1 + n + n * n]
     u = min(max(wanted, levels[0]), levels[n - 1])
@@ -209,14 +210,14 @@ def _visit(wanted: float, c: Array, state: Array) -> None:
 
 @step
 def preisach_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; coefficients are [number of levels, levels, Everett table, offset]."""
+    """Advance the model; coefficients are [number of levels, levels, Everett table, offset]."""
     _visit(inputs[0], coefficients, state)
     outputs[0] = state[LAST_OUTPUT]
 
 
 @step
 def preisach_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Invert in closed form; the state's last number counts samples clipped."""
+    """Advance the inverse in closed form; the last state is the clip count."""
     n = int(coefficients[0])
     levels, table = coefficients[1 : 1 + n], coefficients[1 + n : 1 + n + n * n]
     bottom = state[OUTPUTS]
@@ -239,7 +240,7 @@ def preisach_inverse_step(coefficients: Array, state: Array, inputs: Array, outp
 
 @kernel
 def preisach_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start as if the input had risen from the lowest level to the first one, or swung ever less."""
+    """Start as if the input had risen from the lowest level, or swung with falling amplitude."""
     n = int(coefficients[0])
     low, high, offset = coefficients[1], coefficients[n], coefficients[1 + n + n * n]
     state[:] = 0.0
@@ -257,7 +258,7 @@ def preisach_start(coefficients: Array, state: Array, inputs: Array, virgin: boo
 
 @kernel
 def _first_output(u: float, memory: tuple[Array, Array]) -> float:
-    """Return the output at an input that the memory has been started with."""
+    """Return the first output after a start."""
     _, state = memory
     return state[LAST_OUTPUT]
 
@@ -304,7 +305,7 @@ class Preisach(Triangle, Invertible):
         return np.tril(found, -1)
 
     def initial_state(self, first: Array, initial: fields.Initial | None = None) -> Array:
-        """Return the memory before the first sample; refuse a depth or direction that cannot be."""
+        """Return the initial state; raise an error for an invalid depth or direction."""
         state = super().initial_state(first, initial)
         depth, direction = state[0], state[1]
         if depth not in range(1, DEPTH + 1) or direction not in (1.0, -1.0):
@@ -319,12 +320,12 @@ class Preisach(Triangle, Invertible):
         return np.array([len(self.levels), *self.levels, *self.table().ravel(), self.offset])
 
     def cost(self, sample_time: float | None) -> Cost:
-        """Return what it costs to find the place of an input in the table."""
+        """Return the cost of locating an input in the table."""
         once = self._look_up()
         return Cost(once, once + 64)
 
     def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return what it costs to walk along the levels, half of them usually."""
+        """Return the cost of searching along the levels, typically half of them."""
         once, levels = self._look_up(), len(self.levels)
         return Cost(once * max(1, levels // 2), once * levels + 64)
 
@@ -332,7 +333,7 @@ class Preisach(Triangle, Invertible):
         return 20 + 4 * len(self.levels).bit_length()
 
     def check_invertible(self) -> None:
-        """Demand weights that are not negative, and positive on the diagonal."""
+        """Require non-negative weights, positive on the diagonal."""
         if min(self.weights) < 0 or on_diagonal(self.weights).min() <= 0:
             raise ModelError(
                 "'preisach' has no inverse: its weights must not be negative, and "
@@ -450,5 +451,5 @@ class KrasnoselskiiPokrovskii(Triangle, Invertible):
         return float(np.min(on_diagonal(self.weights) / np.diff(self.levels)))
 
     def remembered(self, state: Array) -> tuple[float, ...]:
-        """Return the input last seen, within the levels."""
+        """Return the last input, within the levels."""
         return (float(np.clip(state[-1], *self.input_range)),)

@@ -25,7 +25,8 @@ def calibrate(
         Option("What a new run is like: runs, or long blocks of runs. auto: runs from 9 on."),
     ] = "auto",
     fitted: Annotated[
-        tuple[Path, ...], Option("What the model was fitted to: refused; repeatable.", "FILE")
+        tuple[Path, ...],
+        Option("Recordings the model was fitted to (refused); repeatable.", "FILE"),
     ] = (),
     force: Force = False,
     as_json: Json = False,

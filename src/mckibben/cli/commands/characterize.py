@@ -16,7 +16,8 @@ def characterize(
     input: Annotated[str | None, Option("Input. Default: by name.", "CHANNEL")] = None,  # noqa: A002
     output: Annotated[str | None, Option("Output. Default: by name.", "CHANNEL")] = None,
     beside: Annotated[
-        tuple[str, ...], Option("Another input: look where it rests; repeatable.", "CHANNEL")
+        tuple[str, ...],
+        Option("Other input: use only samples where it is constant; repeatable.", "CHANNEL"),
     ] = (),
     as_json: Json = False,
 ) -> None:

@@ -2,7 +2,7 @@
 
 The model runs free. Its residual is tested for following a lag, inputs, their branches (hysteresis),
 loads, time (drift), speed, holds (creep) and position. Use recordings that the model was not fitted
-to. A folder stands for all recordings in it.
+to. A folder includes all recordings in it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Fit models, choose by cross-validation, test on data used for neither; all free-running.
 
-A folder stands for all recordings in it. Recordings of several muscles (pressure_1 ...,
+A folder includes all recordings in it. Recordings of several muscles (pressure_1 ...,
 displacement_1 ...) get models that couple them, and with --load force models are given the load.
 Ctrl-C stops at once; with -o, the same command goes on from there.
 """
@@ -17,7 +17,7 @@ from mckibben.cli.stopping import stop_short, stoppable
 from mckibben.options import CompareOptions, Option, ReadOptions
 
 NO_MODEL = 1
-"""Exit code where none of the models could be fitted."""
+"""Exit code if no model could be fitted."""
 
 
 @command

@@ -25,9 +25,7 @@ def link(
     out: Annotated[Path | None, Option("Recording of that to write.", "FILE", "-o")] = None,
     every: Annotated[int, Option("Steps from one row of the recording to the next.")] = 1,
     baud: Annotated[int, Option("Rate of the port [bits/s].")] = 115200,
-    fingerprint: Annotated[
-        str | None, Option("Of the model that must be there (link.json).")
-    ] = None,
+    fingerprint: Annotated[str | None, Option("Of the expected model (link.json).")] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -41,7 +39,7 @@ def link(
     if out is not None:
         if not settings:
             raise DataError(
-                "a device that nobody drives does nothing", remedy="give `settings[NAME]=VALUE` with it",
+                "no input is set to drive the device", remedy="give `settings[NAME]=VALUE` with it",
                 parameter="out",
             )  # fmt: skip
         claim_recording(out, inputs=[], force=force)

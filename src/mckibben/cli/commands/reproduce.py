@@ -20,7 +20,7 @@ def reproduce(
     reading: ReadOptions,
     name: Annotated[str | None, Argument("[PAPER]", "Short name; see --list.")] = None,
     listed: Annotated[bool, Option("List the papers.", flag="--list")] = False,
-    quick: Annotated[bool, Option("Leave out what takes long.")] = False,
+    quick: Annotated[bool, Option("Skip the slow parts.")] = False,
     data: Annotated[
         Path | None, Option("Your own recordings instead of the rig's; see docs/papers.", "FOLDER")
     ] = None,

@@ -76,7 +76,7 @@ def run(
     duration: Annotated[float, Option("Seconds.")] = 60.0,
     rate: Annotated[float | None, Option("Samples per second. Default: the rig's.", "HZ")] = None,
     changes: Changes = {},  # noqa: B006
-    ideal: Annotated[bool, Option("Perfect sensors; adds volume and temperature.")] = False,
+    ideal: Annotated[bool, Option("Ideal sensors; adds volume and temperature.")] = False,
     seed: Seed = 0,
     force: Force = False,
     as_json: Json = False,

@@ -29,11 +29,11 @@ def simulate(
     ] = "model",
     horizon: Annotated[
         int | None,
-        Option("Predict so many samples ahead from measured outputs, instead of free.", "N"),
+        Option("Predict N samples ahead from measured outputs, not free-running.", "N"),
     ] = None,
     interval: Annotated[
         float | None,
-        Option("Of a calibrated model: also ends that hold this share, as 0.9.", "LEVEL"),
+        Option("With a calibrated model: add the band of this coverage, as 0.9.", "LEVEL"),
     ] = None,
     fields: Fields = {},  # noqa: B006
     force: Force = False,

@@ -1,6 +1,6 @@
 """Characterize a muscle, choose a model by cross-validation, test and invert it, and write a report.
 
-A folder stands for all recordings in it. Recordings of several muscles (pressure_1 ...,
+A folder includes all recordings in it. Recordings of several muscles (pressure_1 ...,
 displacement_1 ...) get models that couple them, and a closed loop on a virtual rig. With --load
 force, models that are given the load are ranked against one model for every load.
 
@@ -44,7 +44,7 @@ def study(
 
     def begun(so_far: Study) -> None:
         if not so_far.leaderboard.rows and not as_json:
-            for line in text.lines(results.study_begun(so_far)):
+            for line in text.lines(results.study_started(so_far)):
                 say(line)
             live = unfinished(out) / "report.html"
             say(f"Report so far, updated with every model: {live}\n", flush=True)

@@ -1,1 +1,1 @@
-"""What an estimator is: settings, data, diagnostics, and models linear in most parameters."""
+"""Estimators: settings, data, diagnostics, and models linear in most parameters."""

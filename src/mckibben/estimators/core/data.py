@@ -1,4 +1,4 @@
-"""Recordings as identification sees them: what drives, what is driven, what schedules, what counts."""
+"""Training data: inputs, outputs, scheduling inputs and sample masks of recordings."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ Mask = NDArray[np.bool_]
 Made = TypeVar("Made")
 
 MOVES_AT_ALL = 0.02
-"""Share of its known range below which an output does not move."""
+"""Share of its known range below which an output counts as constant."""
 
 FEWEST_SAMPLES = 10
-"""Fewer samples than this identify nothing."""
+"""Smallest number of samples for identification."""
 
 
 def stretches(mask: Mask) -> list[tuple[int, int]]:
-    """Return where stretches of true values start and stop."""
+    """Return start and stop of segments of true values."""
     return [(start, stop) for start, stop in true_runs(mask).tolist()]
 
 
 @dataclass(frozen=True)
 class Run:
-    """One recording: what drives (n, k), outputs (n, m), what schedules (n, s), which samples count."""
+    """One recording: inputs (n, k), outputs (n, m), scheduling inputs (n, s), and scored samples."""
 
     name: str
     driven: Array
@@ -40,16 +40,19 @@ class Run:
     counts: Mask
     sample_time: float | None
     peak: float | None = None
-    """Input from which the run came before its first sample, where that is not below: its memory."""
+    """Input from which the run started before its first sample, where it is not lower: its initial
+    memory.
+    """
 
     place: int = 0
-    """Among all runs."""
+    """Index among all runs."""
 
     recording: int = 0
-    """Place of its recording among all."""
+    """Index of its recording."""
 
     unmeasured: tuple[str, ...] = ()
-    """Channels that schedule and that it lacks, which are as in others on average."""
+    """Scheduling channels that the recording lacks; their mean over the other recordings is used.
+    """
 
     @property
     def u(self) -> Array:
@@ -62,16 +65,16 @@ class Run:
         return self.outputs[:, 0]
 
     def thinned(self, every: int) -> Run:
-        """Return every so manieth sample."""
+        """Return every n-th sample."""
         step = None if self.sample_time is None else every * self.sample_time
         return replace(self._at(slice(None, None, every)), sample_time=step)
 
     def cut(self, start: int, stop: int | None = None) -> Run:
-        """Return a part of the run, which begins with a memory of its own."""
+        """Return a segment of the run, with its own initial memory."""
         return replace(self._at(slice(start, stop)), peak=None if start else self.peak)
 
     def stretches(self, shortest: int) -> list[Run]:
-        """Return the stretches whose samples all count, longer than so many, each a run of its own."""
+        """Return the segments of scored samples longer than a minimum, each as a run."""
         return [
             self.cut(start, stop)
             for start, stop in stretches(self.counts)
@@ -79,7 +82,7 @@ class Run:
         ]
 
     def condensed(self) -> Run:
-        """Return the run without samples that neither count nor are turning points of the input.
+        """Return the run reduced to scored samples and turning points of the input.
 
         Play operators do not feel how the input went from one turning point to the next. Turns within
         the noise go too, so this is for searching, not for the final word.
@@ -91,7 +94,7 @@ class Run:
         return self._at(kept)
 
     def _at(self, kept: slice | Mask) -> Run:
-        """Return the samples kept."""
+        """Return the remaining samples."""
         return replace(
             self,
             driven=self.driven[kept],
@@ -102,12 +105,12 @@ class Run:
 
     @property
     def history(self) -> Array:
-        """The input with the peak before the first sample in front, if there is one."""
+        """The input preceded by the initial peak, if there is one."""
         return self.u if self.peak is None else np.concatenate([[self.peak], self.u])
 
     @property
     def inputs(self) -> Array:
-        """What a block is given, shape (n, k + s): what drives, what schedules, the peak in front."""
+        """Inputs of a block, shape (n, k + s): driven and scheduling, with the initial peak in front."""
         whole = np.hstack([self.driven, self.scheduled])
         if self.peak is not None:
             whole = np.concatenate([whole[:1], whole])
@@ -115,13 +118,13 @@ class Run:
         return np.ascontiguousarray(whole)
 
     def trim(self, samples: Array) -> Array:
-        """Drop what belongs to the peak from something computed over `history`."""
+        """Drop the part of the initial peak from a result over `history`."""
         return samples if self.peak is None else samples[1:]
 
 
 @dataclass(frozen=True, eq=False)
 class TrainingData:
-    """All runs to identify from, and the channels that they share.
+    """All runs for identification, and their common channels.
 
     ``early`` are runs to stop a search early by, to which nothing is fitted; ``spans`` are ranges of the
     outputs that are known otherwise, for where they do not move.
@@ -137,13 +140,13 @@ class TrainingData:
     _latest: dict[Hashable, tuple[Array, Any]] = field(default_factory=dict, init=False, repr=False)
 
     def once(self, key: Hashable, compute: Callable[[], Array]) -> Array:
-        """Return what ``compute`` gives, computed at the first call with this key only."""
+        """Return the result of ``compute``, cached by key."""
         if key not in self._memo:
             self._memo[key] = compute()
         return self._memo[key]
 
     def latest(self, key: Hashable, theta: Array, compute: Callable[[], Made]) -> Made:
-        """Return what ``compute`` gives, anew only where ``theta`` is not that of the last call.
+        """Return the result of ``compute``, cached for the last ``theta``.
 
         For what all runs share at a point of a search.
         """
@@ -198,20 +201,20 @@ class TrainingData:
 
     @property
     def output_range(self) -> tuple[float, float]:
-        """Lowest and highest output of the samples that count."""
+        """Lowest and highest output of the scored samples."""
         y = self.target
         return float(y.min()), float(y.max())
 
     @property
     def target(self) -> Array:
-        """Outputs that count, of all runs, sample by sample, shape (samples that count × m,)."""
+        """Scored outputs of all runs, sample by sample, shape (samples that count × m,)."""
         return self.once(
             "target", lambda: np.concatenate([run.outputs[run.counts].ravel() for run in self.runs])
         )
 
     @property
     def sample_time(self) -> float | None:
-        """Sample time of all runs, or None where one has none."""
+        """Sample time of all runs, or None if one has none."""
         return self.runs[0].sample_time
 
     def timed(self, why: str = "this model depends on rate", instead: str = "") -> float:
@@ -238,7 +241,7 @@ class TrainingData:
 
     @property
     def falls(self) -> bool:
-        """Whether the output falls while the input rises, as a muscle's length does."""
+        """Whether the output decreases with the input, as a muscle's length does."""
         inputs = np.concatenate([run.u[run.counts] for run in self.runs])
         return float(np.dot(inputs - inputs.mean(), self.target)) < 0
 
@@ -250,30 +253,30 @@ class TrainingData:
         return self._changed(lambda run: replace(run, outputs=-run.outputs))
 
     def with_peaks(self, peaks: Sequence[float | None]) -> TrainingData:
-        """Return the same data with other memories at the start."""
+        """Return the same data with other initial peaks."""
         runs = tuple(replace(run, peak=peak) for run, peak in zip(self.runs, peaks, strict=True))
         return replace(self, runs=runs)
 
     def unstarted(self) -> TrainingData:
-        """Return the same data with no memory fitted to any start."""
+        """Return the same data without fitted start states."""
         return self.with_peaks([None] * len(self.runs))
 
     def condensed(self) -> TrainingData:
-        """Return the same data with every run condensed; see `Run.condensed`."""
+        """Return the same data with reduced runs; see `Run.condensed`."""
         return self._changed(Run.condensed)
 
     def stretches(self, shortest: int) -> TrainingData:
-        """Return the same data as runs whose samples all count; see `Run.stretches`."""
+        """Return the same data as runs of scored samples; see `Run.stretches`."""
         found = [part for run in self.runs for part in run.stretches(shortest)]
         runs = tuple(replace(run, place=place) for place, run in enumerate(found))
         return replace(self, runs=runs)
 
     def stacked(self, what: str) -> Array:
-        """Return a field of all runs, one under another."""
+        """Return a field of all runs, concatenated."""
         return np.concatenate([getattr(run, what) for run in self.runs])
 
     def between(self, start: float, stop: float) -> TrainingData:
-        """Return the same runs of which only what is between two shares of their time counts."""
+        """Return the same runs, scored only between two shares of their time."""
 
         def part(run: Run) -> Run:
             shares = np.arange(run.counts.size)
@@ -283,7 +286,7 @@ class TrainingData:
         return self._changed(part)
 
     def thinned(self, most: int) -> TrainingData:
-        """Return the same runs with fewer samples that count, spread evenly; inputs stay whole."""
+        """Return the same runs with fewer scored samples, evenly spread; inputs are unchanged."""
         total = sum(int(run.counts.sum()) for run in self.runs)
         if total <= most:
             return self
@@ -414,7 +417,7 @@ def _check(recording: Recording, first: Recording, names: Sequence[str], one_rat
         raise DataError(
             "some recordings have time and others have none",
             file=recording.source,
-            remedy="give `rate` for those without, or fit them apart",
+            remedy="give `rate` for those without, or fit them separately",
         )
     if one_rate and ours is not None and theirs is not None and abs(ours - theirs) > 1e-3 * theirs:
         raise DataError(

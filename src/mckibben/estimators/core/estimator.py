@@ -1,4 +1,4 @@
-"""What an estimator is: settings that find a block from recordings."""
+"""Base class of estimators: settings that identify a block from recordings."""
 
 from __future__ import annotations
 
@@ -38,29 +38,31 @@ Operators = Annotated[int, Interval(ge=1, le=1000)]
 """Number of operators."""
 
 Purpose = Literal["memory", "rate", "several", "force"]
-"""What models are for: loops of one muscle, lags and dynamics, several muscles or loads, forces."""
+"""Purpose of a model: hysteresis of one muscle, dynamics, several muscles or loads, force."""
 
 InverseKind = Literal["exact", "exact where stable", "solved", "none"]
-"""How models are inverted: by a formula, by one whose stability depends on the fit, by solving in
-every sample, or not at all."""
+"""Kind of inverse: closed form, closed form whose stability depends on the fit, solved in every
+sample, or none.
+"""
 
 Grid = Mapping[str, tuple[Any, ...]]
-"""Setting -> values to try."""
+"""Setting -> candidate values."""
 
 DefaultFor = Literal["load", "plan of displacement", "plan of force"]
-"""Where one model is used without being named: fitted to each load, beside models that are given the
-load; or fitted before a plan of recordings."""
+"""Where a model is the default: fitted to each load separately, in a comparison of models with a
+load input; or fitted for a plan of recordings.
+"""
 
 Start = Literal["first_sample", "virgin"]
-"""Memory before the first sample of every recording where it is not fitted."""
+"""State before the first sample of every recording, if it is not estimated."""
 
 Initial = Literal[Start, "fitted"]
-"""The same, or fitted with the rest."""
+"""The same, or "fitted": estimated with the parameters."""
 
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """What a fit has to say of itself.
+    """Diagnostics of a fit.
 
     Errors are those of free runs on the samples fitted, in the unit of the output, each run started as
     fitted; of several outputs the mean of theirs.
@@ -69,30 +71,32 @@ class Diagnostics:
     rmse: float
     rmse_by_output: tuple[float, ...]
     rmse_from_rest: float
-    """Each run started as a stream or generated code starts: without knowing an output."""
+    """RMSE with every run started from rest, without known outputs, as in a stream or generated
+    code.
+    """
 
     n_samples: int
     n_free: int
-    """Numbers of the model that the fit was free to choose: its parameters, as tables count them."""
+    """Number of free parameters of the fit; tables count them as parameters."""
 
     n_evaluations: int
-    """Times the model was evaluated in the search."""
+    """Number of evaluations of the model in the search."""
 
     seconds: float
     interrupted: bool
-    """Whether the user stopped the search; the model is then the best found until there."""
+    """Whether the user stopped the search; the model is then the best one found."""
 
     at_bounds: tuple[int, ...]
-    """Parameters, by their place in ``model_.pack()``, that ended at a bound."""
+    """Indices, in ``model_.pack()``, of the parameters at a bound."""
 
     peaks: tuple[float | None, ...]
-    """For every recording, the input from which it was taken to have come before its first sample."""
+    """For every recording, the assumed input from which it started before its first sample."""
 
     notes: tuple[str, ...]
-    """What the user should know."""
+    """Notes for the user."""
 
     uncertainty: Callable[[], tuple[float, Array]] = field(repr=False)
-    """Gives `condition` and `covariance`, which are computed when first asked for."""
+    """Has `condition` and `covariance`, computed on first access."""
 
     @cached_property
     def _uncertainty(self) -> tuple[float, Array]:
@@ -123,7 +127,7 @@ class Diagnostics:
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class Estimator(ABC):
-    """Base of all estimators: of one input and one output, unless a class overrides that.
+    """Base class of all estimators; one input and one output unless a class overrides that.
 
     Settings are the fields of the class, to be read, changed, cloned and searched over by scikit-learn.
 
@@ -140,59 +144,62 @@ class Estimator(ABC):
     output: str | tuple[str, ...] | None = "displacement"
 
     title: ClassVar[str] = ""
-    """Full name of the model; its short name if empty."""
+    """Full name of the model; by default its short name."""
 
     purpose: ClassVar[Purpose | None] = None
-    """What it is for, by which models are listed; None lists it under others."""
+    """Purpose by which models are grouped; None groups it under others."""
 
     can: ClassVar[str] = ""
-    """What it represents, in a sentence; the first line of the docstring if empty."""
+    """What it represents, in one sentence; by default the first line of the docstring."""
 
     cannot: ClassVar[str] = ""
-    """What it does not represent, in a sentence."""
+    """What it does not represent, in one sentence."""
 
     caution: ClassVar[str | None] = None
-    """Why it is good only near the motions that it was trained on; None where it is not."""
+    """Why it is reliable only near its training motions; None if it extrapolates."""
 
     inverse_kind: ClassVar[InverseKind] = "none"
-    """How its models are inverted as a rule; a fitted one may lack its inverse."""
+    """Usual kind of inverse of its models; a fitted model may have none."""
 
     quick: ClassVar[bool] = False
-    """Whether it is tried first: well known, or good, and fitted in seconds."""
+    """Whether it is in the quick selection: established or accurate, and fitted in seconds."""
 
     targets: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
-    """Settings with which a model can be exported to a format that carries less."""
+    """Export format -> settings with which a model can be exported to it."""
 
     param_grid: ClassVar[Grid] = {}
-    """Setting -> values tried where orders are chosen by cross-validation."""
+    """Setting -> values for choosing orders by cross-validation."""
 
     makes: ClassVar[tuple[str, ...]] = ()
-    """Models that it can fit again with as many operators, each by the kinds of its parts in order."""
+    """Models that it can refit with as many operators, each by the kinds of its parts in order."""
 
     default_for: ClassVar[DefaultFor | None] = None
-    """Where it is used without being named."""
+    """Where it is the default model."""
 
     effort: ClassVar[float] = 0.5
-    """About how long a fit to 10 000 samples takes [s]: models are compared cheapest first."""
+    """Approximate time of a fit to 10 000 samples [s]; comparisons start with the fastest models.
+    """
 
     needs_time: ClassVar[bool] = False
-    """Whether it cannot learn from recordings without time."""
+    """Whether recordings must have time."""
 
     made_for: ClassVar[tuple[str, str] | None] = None
-    """Kinds of channel, input and output, that the model is about; None for any."""
+    """Kinds of input and output channels that it models; None for any."""
 
-    told: ClassVar[tuple[str, ...]] = ()
-    """Settings that name channels which the model is given beside the input; of the block, too."""
+    input_settings: ClassVar[tuple[str, ...]] = ()
+    """Settings that name further input channels, of the block as well."""
 
     solves_starts: ClassVar[bool] = False
-    """Whether a fitted `initial` is a state solved for. Where such states alone explain the recordings,
-    the model from rest being further off than the output ever moves, it is found from rest instead."""
+    """Whether `initial="fitted"` estimates start states. If these states alone explain the
+    recordings, and the error from rest exceeds the range of the output, it is fitted from rest
+    instead.
+    """
 
     errors_known: ClassVar[bool] = True
     """Whether standard errors of the parameters are computed."""
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Return the settings by name; ``deep`` changes nothing, as none has settings of its own."""
+        """Return the settings by name; ``deep`` has no effect."""
         return {name: getattr(self, name) for name in self._names()}
 
     def set_params(self, **settings: Any) -> Self:
@@ -235,11 +242,11 @@ class Estimator(ABC):
         outputs: Sequence[str],
         scheduling: Sequence[str] | None = None,
     ) -> str | None:
-        """Return why the model has no place in a comparison on recordings, or None."""
+        """Return why the model does not apply to recordings, or None."""
         if len(inputs) != 1 or len(outputs) != 1:
             return "it is of one input and one output"
         if scheduling is not None:
-            return "it is not told the load"
+            return "the load is not one of its inputs"
         (given,), (wanted,) = inputs, outputs
         kinds = (given.partition("_")[0], wanted.partition("_")[0])
         if cls.made_for is not None and kinds != cls.made_for:
@@ -248,11 +255,11 @@ class Estimator(ABC):
                 f": name that as the input, and state {REST_LENGTH}, which makes it of {kinds[0]}"
             )
             return f"it maps {cls.made_for[0]} to {cls.made_for[1]}{made if nearly else ''}"
-        needed = cls(input=given, output=wanted)._told_channels()
+        needed = cls(input=given, output=wanted)._further_inputs()
         absent = [name for name in needed if any(name not in r for r in recordings)]
         if absent:
             return f"it needs the channel {absent[0]!r} too"
-        return None if cls.told else resting(recordings, inputs)
+        return None if cls.input_settings else resting(recordings, inputs)
 
     @classmethod
     def channel_settings(
@@ -261,34 +268,34 @@ class Estimator(ABC):
         outputs: Sequence[str],
         scheduling: Sequence[str] | None = None,
     ) -> dict[str, Any]:
-        """Return the settings that make it learn from some channels; None for its own choice."""
+        """Return the settings that select channels; None for the default choice."""
         return {"input": inputs[0], "output": outputs[0]}
 
     def channels(self, data: TrainingData) -> dict[str, Channel]:
         """Return the channels of the block to build, as keyword arguments."""
-        beside = zip(self.told, data.scheduled, strict=True)
+        beside = zip(self.input_settings, data.scheduled, strict=True)
         return {"input": data.inputs[0], "output": data.outputs[0], **dict(beside)}
 
     @property
     def starting_rule(self) -> Start:
-        """The rule that blocks start by: that of `initial`, unless it is fitted."""
+        """Start rule of the block: `initial`, unless it is fitted."""
         return "virgin" if self.get_params().get("initial") == "virgin" else "first_sample"
 
     def common_fields(self, data: TrainingData) -> dict[str, Any]:
-        """Return the fields that most blocks with memory share: range of the input, start, channels."""
+        """Return the common fields of blocks with memory: input range, start, channels."""
         own = {"input_range": data.input_range, "initial": self.starting_rule}
         return own | self.channels(data)
 
-    def _told_channels(self) -> tuple[str, ...]:
-        return tuple(getattr(self, name) for name in self.told)
+    def _further_inputs(self) -> tuple[str, ...]:
+        return tuple(getattr(self, name) for name in self.input_settings)
 
     @property
     def fixed_fields(self) -> tuple[str, ...]:
-        """Fields of the model that a rule or the structure fixes, each as kind and field, by a dot."""
+        """Fields of the model that are not fitted, each as kind and field, joined by a dot."""
         return ()
 
     def fixed(self, block: Block) -> tuple[int, ...]:
-        """Return the places in ``block.pack()`` that the fit is not free to choose.
+        """Return the indices in ``block.pack()`` that are not fitted.
 
         They are no parameters of the model fitted. By default those of `fixed_fields`.
         """
@@ -300,31 +307,31 @@ class Estimator(ABC):
         )
 
     @property
-    def n_beside(self) -> int:
-        """How many numbers are found beside ``model_.pack()``, which has them as structure."""
+    def n_further(self) -> int:
+        """Number of fitted values that are not in ``model_.pack()``."""
         return 0
 
     @property
     def stops_early(self) -> bool:
-        """Whether runs that nothing is fitted to can stop the search."""
+        """Whether validation recordings can stop the search."""
         return False
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
-        """Return what is learned from recordings, checked."""
+        """Return the training data from recordings, checked."""
         # models of several muscles begin anew after rows left out, and so are fitted to bridges too
         measured = [~one.bridged for one in listed(recordings)]
         counted = measured if rows is None else map(np.logical_and, rows, measured)
         assert self.input is not None
         assert self.output is not None
         return training_data(
-            recordings, self.input, self.output, list(counted), self._told_channels()
+            recordings, self.input, self.output, list(counted), self._further_inputs()
         )
 
     @abstractmethod
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data with the memories at the start that belong to it."""
+        """Return the identified block, and the data with its initial peaks."""
 
     def fit(
         self,
@@ -336,24 +343,23 @@ class Estimator(ABC):
         validation: Sequence[Recording] = (),
         progress: bool | Progress | None = None,
     ) -> Self:
-        """Find the block that runs free closest to the recordings.
+        """Fit the block to recordings by its free-running error.
 
         Parameters
         ----------
         recordings : Recording, data frame, or sequence of these; or array, shape (n,) or (n, inputs)
-            What to learn from; every one starts with a memory of its own. With ``y``, an array of the
+            Training data; every recording starts with its own memory. With ``y``, an array of the
             inputs, in the package's units.
         y : array, shape (n,) or (n, outputs), optional
             The outputs.
         sample_time : float, optional
             Between samples of arrays [s].
         rows : sequence of bool arrays, optional
-            For every recording, the samples whose outputs count.
+            For every recording, the samples whose outputs are scored.
         validation : sequence of Recording
-            For searches that stop early; nothing is fitted to them, and most estimators have no use for
-            them.
+            For early stopping; not fitted. Most estimators do not use them.
         progress : bool or callable, optional
-            Whether to show a bar; or who is told the share of the work done and the best RMSE so far.
+            Whether to show a bar; or a callback for the share done and the best RMSE so far.
 
         Returns
         -------
@@ -378,7 +384,7 @@ class Estimator(ABC):
             raise
 
     def _recording(self, u: Any, y: Any, sample_time: float | None) -> Recording:
-        """Return arrays as a recording with the channels of this estimator; ``y`` may be None."""
+        """Return arrays as a recording with this estimator's channels; ``y`` may be None."""
         channels: dict[str, Array] = {}
         for given, names in ((u, self.input), (y, self.output)):
             columns = np.asarray(() if given is None else given, dtype=float)
@@ -424,7 +430,7 @@ class Estimator(ABC):
         return self
 
     def check_settings(self) -> None:
-        """Refuse settings that are not as they are declared.
+        """Raise an error for settings that violate their declarations.
 
         Raises
         ------
@@ -439,7 +445,7 @@ class Estimator(ABC):
         *,
         sample_time: float | None = None,
     ) -> Any:
-        """Return the model's free-running output, from the inputs alone.
+        """Return the model's free-running output.
 
         Every run starts as a stream would: no measured output is looked at.
 
@@ -466,7 +472,7 @@ class Estimator(ABC):
         return [outputs[:, 0] for outputs in found] if len(given) == 1 else found
 
     def score(self, recordings: Recording | Sequence[Recording], y: None = None) -> float:
-        """Return R² over all recordings of what `predict` gives; of several outputs the mean."""
+        """Return R² of `predict` over all recordings, averaged over outputs."""
         every = listed(recordings)
         predicted = np.concatenate(self.predict(every))
         given = [channel.name for channel in self.fitted.outputs]
@@ -478,7 +484,7 @@ class Estimator(ABC):
 
     @property
     def fitted(self) -> Block:
-        """The block found.
+        """The fitted block.
 
         Raises
         ------
@@ -507,7 +513,7 @@ class Estimator(ABC):
             rmse_by_output=tuple(by_output.tolist()),
             rmse_from_rest=float(_rms(from_rest.reshape(-1, len(data.outputs))).mean()),
             n_samples=residual.size // len(data.outputs),
-            n_free=block.n_parameters - len(self.fixed(block)) + self.n_beside,
+            n_free=block.n_parameters - len(self.fixed(block)) + self.n_further,
             n_evaluations=tracker.evaluations,
             seconds=time.perf_counter() - started,
             interrupted=tracker.interrupted,
@@ -519,7 +525,7 @@ class Estimator(ABC):
         )
 
     def undetermined(self) -> tuple[int, ...]:
-        """Return the places in ``model_.pack()`` of what the recordings do not determine.
+        """Return the indices in ``model_.pack()`` of undetermined parameters.
 
         By default, the parameters at no bound whose standard errors are not known.
         """
@@ -527,11 +533,11 @@ class Estimator(ABC):
             return ()
         found = self.diagnostics_
         unknown = np.flatnonzero(np.isnan(found.standard_errors)).tolist()
-        told = {*found.at_bounds, *self.fixed(self.fitted)}
-        return tuple(place for place in unknown if place not in told)
+        excluded = {*found.at_bounds, *self.fixed(self.fitted)}
+        return tuple(place for place in unknown if place not in excluded)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the free-running outputs of blocks where samples count, each run started as fitted.
+        """Return free-running outputs of blocks at scored samples, with fitted starts.
 
         Shape (blocks, samples).
         """
@@ -546,13 +552,13 @@ class Estimator(ABC):
         return covariance_of(block, data, residual, at_bounds)
 
     def at_bounds(self, block: Block) -> tuple[int, ...]:
-        """Return the places of parameters that ended at a bound: by default those that are zero."""
+        """Return the indices of parameters at a bound: by default those equal to zero."""
         return tuple(np.flatnonzero(vanishing(block.pack())).tolist())
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class SearchEstimator(Estimator):
-    """An estimator of one input and one output with a search of its own.
+    """An estimator of one input and one output with its own search.
 
     Parameters
     ----------
@@ -576,7 +582,7 @@ def _rms(residual: Array) -> Array:
 
 
 def resting(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:
-    """Return why nothing can be learned of what inputs do, if all rest in every recording; else None."""
+    """Return why inputs cannot be identified, if all rest in every recording; else None."""
     known = [r[name] for r in recordings for name in inputs if name in r]
     if not known or any(np.ptp(values) > 0 for values in known):
         return None

@@ -1,4 +1,4 @@
-"""How far each parameter can go at nearly the same error, all others fitted again.
+"""Parameter ranges by profile: nearly equal error with all other parameters refitted.
 
 A standard error speaks of a smooth model with independent residuals. Where elements stick and slip the
 model is not smooth, and where it is too simple its residuals are anything but independent; the profile
@@ -22,13 +22,13 @@ from mckibben.recording import Recording
 from mckibben.system.threads import one_blas_thread
 
 FARTHEST = np.log(1000.0)
-"""Logarithm of the factor beyond which a parameter has no bound."""
+"""Logarithm of the factor beyond which a parameter counts as unbounded."""
 
 FIRST_STEP, LEAST_STEP = 0.05, 0.003
-"""Of a logarithm, outward, and where the end is known well enough."""
+"""First outward step of a parameter's logarithm, and tolerance of the bound."""
 
 DIFFERENCE = 1e-5
-"""Of a logarithm, for sensitivities."""
+"""Step of a parameter's logarithm, for sensitivities."""
 
 
 def parameter_ranges(
@@ -38,7 +38,7 @@ def parameter_ranges(
     others: Sequence[Block] = (),
     share: float = 0.01,
 ) -> Array:
-    """Return the lowest and highest value of every parameter at which the error stays almost as it is.
+    """Return the lowest and highest value of every parameter at nearly equal error.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def parameter_ranges(
 def _walk(
     residuals: Callable[[Array], Array], best: Array, place: int, way: float, most: float
 ) -> float:
-    """Return how far a logarithm goes one way until the cost is above the most."""
+    """Return the distance of a logarithm in one direction until the cost exceeds a bound."""
     others = np.flatnonzero(np.arange(best.size) != place)
     reached, gone, step = best, 0.0, FIRST_STEP
     while gone < FARTHEST and step > LEAST_STEP:
@@ -111,7 +111,7 @@ def _walk(
 def _refined(
     residuals: Callable[[Array], Array], start: Array, free: NDArray[np.intp], steps: int
 ) -> tuple[Array, float]:
-    """Return logarithms with the free ones improved, none by more than a factor, and the cost."""
+    """Return improved logarithms of the free parameters, within a factor, and the cost."""
 
     def whole(some: Array) -> Array:
         values = start.copy()

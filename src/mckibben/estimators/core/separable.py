@@ -1,4 +1,4 @@
-"""Models that are linear in most of their parameters: those are solved for, the few others searched.
+"""Separable least squares: linear parameters are solved for, nonlinear ones searched.
 
 This is variable projection: for every trial of the non-linear parameters the weights and the offset
 are the exact (non-negative) least-squares solution, so the search runs in a handful of dimensions.
@@ -26,24 +26,26 @@ from mckibben.estimators.optimisers.multi_start import Choice, multi_start
 from mckibben.estimators.optimisers.tracker import Tracker
 
 SEARCH_SAMPLES = 1500
-"""Samples that count while many starts are compared."""
+"""Largest number of samples used to compare starts."""
 
 POLISH_SAMPLES = 20_000
-"""Samples that count while the best is polished; the linear parameters are then solved on all."""
+"""Largest number of samples used to refine the best start; linear parameters are then solved on all
+samples.
+"""
 
 LEAST_REVERSIBLE = 1e-3
-"""Least share of the output's range that the operator without dead zone gives."""
+"""Smallest share of the output's range for the operator without dead zone."""
 
 DIFFERENCE = 1e-7
 """Step of finite differences, relative to the range that a parameter is searched in."""
 
 WORST = 1e150
-"""Cost of parameters whose output overflows; its square is still a number."""
+"""Cost of parameters whose output overflows; its square is finite."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class SeparableEstimator(Estimator):
-    """An estimator of a block that is linear in its weights and offset.
+    """Estimator of a block that is linear in its weights and offset.
 
     Parameters
     ----------
@@ -70,35 +72,35 @@ class SeparableEstimator(Estimator):
 
     search_evaluations: ClassVar[int] = 15
     polish_evaluations: ClassVar[int] = 10
-    """Most evaluations of a refinement, and of the final one on more samples."""
+    """Maximum number of evaluations of a refinement, and of the final one on more samples."""
 
     searches_condensed: ClassVar[bool] = True
-    """Whether the search may skip what lies between turning points of the input."""
+    """Whether the search may use turning points of the input only."""
 
     fits_peaks: ClassVar[bool] = True
-    """Whether a fitted start is the input from which every run came down."""
+    """Whether a fitted start is the input from which every run descended."""
 
     rises: ClassVar[bool] = True
-    """Whether the block's output rises with its input, so that falling data are turned over."""
+    """Whether the block's output increases with its input; decreasing data are then mirrored."""
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return lowest and highest non-linear parameters, each of shape (m,); by default none."""
+        """Return bounds of the nonlinear parameters, each of shape (m,); by default none."""
         return np.empty(0), np.empty(0)
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return sensible non-linear parameters to start from, each of shape (m,)."""
+        """Return initial guesses of the nonlinear parameters, each of shape (m,)."""
         return []
 
     @abstractmethod
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return what the linear parameters multiply, over the run's history, shape (n, k)."""
+        """Return the regressors of the linear parameters over the run's history, shape (n, k)."""
 
     @abstractmethod
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         """Return the block with these parameters."""
 
     def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
-        """Return how the output moves with the non-linear parameters, the linear ones held.
+        """Return the derivative of the output by the nonlinear parameters, at fixed linear ones.
 
         Shape (samples that count, m); by finite differences of the basis.
         """
@@ -115,7 +117,7 @@ class SeparableEstimator(Estimator):
     def jacobian(
         self, theta: Array, matrix: Array, linear: Array | None, data: TrainingData
     ) -> Array:
-        """Return the derivatives of the residuals with the linear parameters solved for.
+        """Return the derivatives of the projected residuals.
 
         Shape (samples that count, m). Kaufman's form: how the output moves, less what the linear
         parameters that are free would take up of it. Zero where nothing could be solved for.
@@ -127,17 +129,17 @@ class SeparableEstimator(Estimator):
         return np.asarray(moves - directions @ (directions.T @ moves))
 
     def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
-        """Return the columns of what is solved for and at no bound, the offset's first if it is."""
+        """Return the regressors of linear parameters away from bounds, the offset's first."""
         free = linear > 1.01 * self.least(matrix, data) if self.solves_nonnegative else linear != 0
         offset = [np.ones(len(matrix))] if self.solves_offset else []
         return np.column_stack([*offset, matrix[:, free]])
 
     def choices(self, data: TrainingData) -> list[Choice]:
-        """Return what groups of the non-linear parameters may be exchanged for; none as a rule."""
+        """Return alternatives for groups of nonlinear parameters; by default none."""
         return []
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found on data that rise, turned over where they fall."""
+        """Return the block for increasing data; mirrored for decreasing data."""
         if not (self.rises and data.falls):
             return self.identify(data, tracker)
         rising, used = self.identify(data.negated(), tracker)
@@ -146,7 +148,7 @@ class SeparableEstimator(Estimator):
         return block, data.with_peaks([run.peak for run in used.runs])
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data with the memories at the start that belong to it.
+        """Return the identified block, and the data with its initial peaks.
 
         Where `rises`, the output of the data rises with the input.
         """
@@ -159,7 +161,7 @@ class SeparableEstimator(Estimator):
         return self.build(theta, linear, offset, data), data
 
     def most_evaluations(self, size: int) -> int:
-        """Return the most evaluations of a refinement of so many non-linear parameters."""
+        """Return the maximum number of evaluations of a refinement."""
         return self.search_evaluations
 
     def _search(self, data: TrainingData, tracker: Tracker) -> Array:
@@ -212,7 +214,7 @@ class SeparableEstimator(Estimator):
         return best
 
     def _fit_peaks(self, theta: Array, data: TrainingData) -> TrainingData:
-        """Choose for every run the peak before its first sample that fits best, others held."""
+        """Choose the best initial peak of every run, at fixed parameters."""
         from scipy.optimize import minimize_scalar
 
         high = data.input_range[1]
@@ -236,11 +238,11 @@ class SeparableEstimator(Estimator):
         return data.with_peaks(peaks)
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:
-        """Return the basis at the samples that count, of all runs, shape (samples, k)."""
+        """Return the regressors at the scored samples of all runs, shape (samples, k)."""
         return counting(data, lambda run: self.basis(theta, run, data))
 
     def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
-        """Return the linear parameters and the offset that suit the basis best."""
+        """Return the least-squares linear parameters and offset."""
         return solve_linear(
             matrix,
             data.target,
@@ -251,16 +253,16 @@ class SeparableEstimator(Estimator):
 
     @property
     def solves_offset(self) -> bool:
-        """Whether an offset is solved for; else it is 0."""
+        """Whether an offset is fitted; otherwise it is 0."""
         return True
 
     @property
     def solves_nonnegative(self) -> bool:
-        """Whether the linear parameters may not be negative."""
+        """Whether the linear parameters must be non-negative."""
         return self.nonnegative
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
-        """Return the least that every linear parameter may be where none may be negative.
+        """Return lower bounds of the linear parameters, if they must be non-negative.
 
         The first is kept off zero: it belongs to the operator without dead zone, and without it there
         is no inverse.
@@ -272,7 +274,7 @@ class SeparableEstimator(Estimator):
         return floor
 
     def _solved(self, theta: Array, data: TrainingData) -> tuple[Array, Array | None, Array]:
-        """Return the basis, the linear parameters solved for if it is finite, and the residuals."""
+        """Return regressors, linear parameters if finite, and residuals."""
         matrix = self.matrix(theta, data)
         if not np.isfinite(matrix).all():
             return matrix, None, np.full(data.target.size, WORST)
@@ -282,7 +284,7 @@ class SeparableEstimator(Estimator):
     def _errors(
         self, data: TrainingData
     ) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
-        """Return the residuals and their derivatives as functions of the non-linear parameters.
+        """Return functions for residuals and derivatives by the nonlinear parameters.
 
         A search asks for both at one place, where the linear parameters are solved for once.
         """
@@ -302,7 +304,7 @@ class SeparableEstimator(Estimator):
     def best_of(
         self, setting: str, values: Sequence[float], data: TrainingData, tracker: Tracker
     ) -> tuple[Block, TrainingData]:
-        """Return what is found with the value of a setting that fits best."""
+        """Return the best result over the values of a setting."""
         found = []
         for place, value in enumerate(values):
             own = tracker.part(place / len(values), (place + 1) / len(values))
@@ -317,12 +319,12 @@ class SeparableEstimator(Estimator):
 
 
 def counting(data: TrainingData, over_history: Callable[[Run], Array]) -> Array:
-    """Return what is computed over the runs' histories, at the samples that count, of all runs."""
+    """Return a quantity over the runs' histories, at the scored samples of all runs."""
     return np.concatenate([run.trim(over_history(run))[run.counts] for run in data.runs])
 
 
 def differences(theta: Array, lower: Array, upper: Array) -> Array:
-    """Return steps for finite differences that stay within the bounds."""
+    """Return steps of finite differences within the bounds."""
     steps = DIFFERENCE * (upper - lower)
     return np.where(theta + steps <= upper, steps, -steps)
 

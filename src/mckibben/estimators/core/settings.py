@@ -1,4 +1,4 @@
-"""Settings of estimators, checked against how they are declared."""
+"""Settings of estimators, validated against their declarations."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ STRICT_SETTINGS = ConfigDict(strict=True, allow_inf_nan=False)
 Kind = Literal["choice", "flag", "whole", "number", "text"]
 
 LARGE = 2**31
-"""Limits beyond which are no help to anyone."""
+"""Limits with a larger magnitude are not shown in messages."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting of an estimator, as a form asks for it.
+    """A setting of an estimator, as shown in a form.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Setting:
 
 
 def settings_with_defaults(estimator: Any) -> list[Setting]:
-    """Return the settings of an estimator, or of a preset of one, that have a default."""
+    """Return the settings with defaults of an estimator, or of a preset."""
     cls = getattr(estimator, "of", estimator)
     hints, said = get_type_hints(cls, include_extras=True), meanings(cls)
     return [
@@ -89,7 +89,7 @@ _PLAIN: dict[Any, Kind] = {int: "whole", float: "number", bool: "flag"}
 
 
 def setting_value(text: str) -> Any:
-    """Return a setting that was written as text: JSON where it is that, else ``none`` or a word."""
+    """Return a setting from text: JSON if it is valid, otherwise ``none`` or a word."""
     try:
         value = json.loads(text)
     except (ValueError, RecursionError):
@@ -98,7 +98,7 @@ def setting_value(text: str) -> Any:
 
 
 def check_settings(estimator: Any) -> None:
-    """Refuse settings that are not as they are declared.
+    """Raise an error for settings that violate their declarations.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What recordings tell of a block's parameters: condition and covariance, from how outputs move.
+"""Parameter uncertainty: condition and covariance from sensitivities of outputs.
 
 Covariances are those of least squares of the free run where residuals remember (the sandwich
 P J' R J P, P the pseudo-inverse of J' J): J holds the free-run sensitivities, and R the covariance of
@@ -24,24 +24,25 @@ from mckibben.estimators.core.data import Run, TrainingData, stretches
 from mckibben.statistics import Autoregression, autoregression
 
 Simulated = Callable[[Sequence[Block], TrainingData], Array]
-"""Gives the free-running outputs of blocks where samples count, shape (blocks, n)."""
+"""Returns the free-running outputs of blocks at the samples used, shape (blocks, n)."""
 
 LARGEST = 1e150
-"""Sensitivity that still is one: its square is a number."""
+"""Largest sensitivity; its square is finite."""
 
 DIFFERENCE = 1e-6
 """Step of finite differences, relative to the size of a parameter."""
 
 LEAST, DETERMINED = 1e-6, 0.99
-"""Share of the largest singular value of sensitivities that tells anything; share of a parameter's own
-direction that must be told."""
+"""Smallest singular value of the sensitivities, relative to the largest, that is used; share of a
+parameter's direction that must be determined.
+"""
 
 NOTHING = 1e-9
-"""Share of its size below which a parameter is 0."""
+"""Relative size below which a parameter counts as 0."""
 
 
 def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
-    """Return the free-running outputs of blocks at the samples that count, as `TrainingData.target`."""
+    """Return free-running outputs of blocks at the scored samples, as `TrainingData.target`."""
     outputs = []
     for run in data.runs:
         many = run_many(blocks, run.inputs, sample_time=run.sample_time)
@@ -51,7 +52,7 @@ def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
 
 
 def simulate_started(blocks: Sequence[Block], data: TrainingData) -> Array:
-    """Return the same with the states that are solved for at a start fitted to every run.
+    """Return the same with start states fitted to every run.
 
     Models of several outputs have no such states.
     """
@@ -67,7 +68,7 @@ def simulate_started(blocks: Sequence[Block], data: TrainingData) -> Array:
 
 
 def unknown(block: Block) -> Array:
-    """Return the covariance of a block's parameters of which nothing is known."""
+    """Return the covariance of undetermined parameters."""
     return np.full((block.n_parameters, block.n_parameters), np.nan)
 
 
@@ -78,7 +79,7 @@ def covariance_of(
     fixed: Sequence[int],
     simulated: Simulated = simulate_all,
 ) -> tuple[float, Array]:
-    """Return the condition of the parameters that are free, and the covariance of all.
+    """Return the condition of the free parameters, and the covariance of all.
 
     From finite differences of the free-running output. Parameters that are fixed, or that the data do
     not determine, have NaN; so have those at which the output overflows, and all of a model whose own
@@ -96,14 +97,14 @@ def covariance_of(
     finite = np.isfinite(slopes).all(axis=0) & (np.abs(slopes).max(axis=0, initial=0.0) < LARGEST)
     if not finite.any() or not np.isfinite(power):
         return np.inf, covariance
-    condition, own = told_by_runs(slopes[:, finite], residual, data.runs)
+    condition, own = covariance_by_runs(slopes[:, finite], residual, data.runs)
     places = np.array(free)[finite]
     covariance[np.ix_(places, places)] = own * np.outer(sizes[places], sizes[places])
     return condition if finite.all() else np.inf, covariance
 
 
-def told_by_runs(slopes: Array, residual: Array, runs: Sequence[Run]) -> tuple[float, Array]:
-    """Return the condition of slopes, (n, k), and the covariance that they and residuals, (n,), make.
+def covariance_by_runs(slopes: Array, residual: Array, runs: Sequence[Run]) -> tuple[float, Array]:
+    """Return the condition of sensitivities, (n, k), and the covariance for residuals, (n,).
 
     Both at the samples that count, as `TrainingData.target`.
     """
@@ -120,12 +121,12 @@ def told_by_runs(slopes: Array, residual: Array, runs: Sequence[Run]) -> tuple[f
         left.append(np.full(shape, np.nan))
         left[-1][run.counts] = own.reshape(-1, shape[1])
     models = autoregressions(left)
-    condition, covariance, told = sandwich(moves, left, models)
-    return condition, blanked(covariance, told)
+    condition, covariance, determined = sandwich(moves, left, models)
+    return condition, blanked(covariance, determined)
 
 
 def autoregressions(left: Sequence[Array]) -> list[Autoregression]:
-    """Return that of every output, of residuals of runs, (n, m); NaN where samples do not count."""
+    """Return the autoregression of every output's residuals, (n, m); NaN at unscored samples."""
     return [
         autoregression([part for e in left for part in _pieces(e[:, j])])
         for j in range(left[0].shape[1])
@@ -135,10 +136,10 @@ def autoregressions(left: Sequence[Array]) -> list[Autoregression]:
 def sandwich(
     moves: Sequence[Array], left: Sequence[Array], models: Sequence[Autoregression]
 ) -> tuple[float, Array, NDArray[np.bool_]]:
-    """Return the condition of slopes, the covariance that they make, and which of them it is told of.
+    """Return condition, covariance, and which parameters are determined.
 
-    The pseudo-inverse leaves out directions that nothing tells, so that a parameter beside two of which
-    only the sum is told is as unsure as it is with their sum free.
+    The pseudo-inverse leaves out undetermined directions, so that a parameter beside two of which
+    only the sum is determined is as unsure as it is with their sum free.
 
     Parameters
     ----------
@@ -151,7 +152,7 @@ def sandwich(
     n_outputs, k = moves[0].shape[1:]
     scale = np.array([np.sqrt(model.variance) or 1.0 for model in models])
     weighed = [slopes / scale[:, np.newaxis] for slopes in moves]
-    condition, own, told = pseudo_inverse(np.concatenate([w.reshape(-1, k) for w in weighed]))
+    condition, own, determined = pseudo_inverse(np.concatenate([w.reshape(-1, k) for w in weighed]))
     innovations = [
         np.concatenate([m.whitened(np.nan_to_num(e[:, j])) for e in left])
         for j, m in enumerate(models)
@@ -165,28 +166,28 @@ def sandwich(
                 middle += together[i, j] * (coloured[i].T @ coloured[j])
     # what the fit has taken out of the residuals, of all that was in them
     taken = float(np.sum(own * middle)) / sum(int(np.isfinite(e).sum()) for e in left)
-    return condition, own @ middle @ own / max(1.0 - taken, 0.1), told
+    return condition, own @ middle @ own / max(1.0 - taken, 0.1), determined
 
 
 def _pieces(series: Array) -> list[Array]:
-    """Return the stretches of a series without NaN."""
+    """Return the segments of a series without NaN."""
     return [series[start:stop] for start, stop in stretches(np.isfinite(series))]
 
 
 def relative_sizes(parameters: Array) -> Array:
-    """Return the sizes by which parameters are scaled; none is counted as very small."""
+    """Return the scales of parameters, with a lower bound."""
     return np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))
 
 
 def vanishing(parameters: Array) -> Array:
-    """Return which parameters are 0 but for rounding, beside the others."""
+    """Return which parameters are 0 to rounding, relative to the others."""
     return np.asarray(np.abs(parameters) <= NOTHING * relative_sizes(parameters))
 
 
 def sensitivities(
     block: Block, places: Sequence[int], sizes: Array, run: Callable[[list[Block]], Array]
 ) -> Array:
-    """Return how outputs move with k parameters, each in units of its size, shape (n, k).
+    """Return sensitivities of outputs by k parameters, in units of their scales, shape (n, k).
 
     ``run`` gives the outputs of blocks, shape (blocks, n).
     """
@@ -201,16 +202,16 @@ def sensitivities(
 
 
 def inverted(slopes: Array) -> tuple[float, Array]:
-    """Return the condition of scaled slopes, shape (n, k), and the inverse of their products, (k, k).
+    """Return the condition of scaled sensitivities, shape (n, k), and the inverse of their products.
 
     Rows and columns of what the slopes do not determine are NaN.
     """
-    condition, inverse, told = pseudo_inverse(slopes)
-    return condition, blanked(inverse, told)
+    condition, inverse, determined = pseudo_inverse(slopes)
+    return condition, blanked(inverse, determined)
 
 
 def pseudo_inverse(slopes: Array) -> tuple[float, Array, NDArray[np.bool_]]:
-    """Return the condition of slopes, (n, k), their products' pseudo-inverse, and what is told."""
+    """Return condition, pseudo-inverse of the products, and which parameters are determined."""
     singular, right = np.linalg.svd(np.linalg.qr(slopes, mode="r"), full_matrices=False)[1:]
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
     kept = singular > LEAST * singular[0]
@@ -218,8 +219,8 @@ def pseudo_inverse(slopes: Array) -> tuple[float, Array, NDArray[np.bool_]]:
     return condition, inverse, 1 - (right[~kept] ** 2).sum(axis=0) > DETERMINED
 
 
-def blanked(covariance: Array, told: NDArray[np.bool_]) -> Array:
-    """Return a covariance with NaN for what is not told."""
+def blanked(covariance: Array, determined: NDArray[np.bool_]) -> Array:
+    """Return a covariance with NaN for undetermined parameters."""
     covariance = covariance.copy()
-    covariance[~told] = covariance[:, ~told] = np.nan
+    covariance[~determined] = covariance[:, ~determined] = np.nan
     return covariance

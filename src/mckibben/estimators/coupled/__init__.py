@@ -1,1 +1,1 @@
-"""Identification of several muscles that move one another."""
+"""Identification of coupled muscles."""

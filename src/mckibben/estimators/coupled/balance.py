@@ -1,4 +1,4 @@
-"""Identification of a balance of forces.
+"""Identification of a force balance.
 
 Forces are made to balance where the muscles were measured, by least squares within what physics asks;
 from there the free run is followed by Gauss-Newton steps. In between terms are chosen that lessen errors
@@ -38,7 +38,13 @@ from mckibben.estimators.coupled.balance_bench import (
     without_held,
     without_load,
 )
-from mckibben.estimators.coupled.balance_prior import Belief, Told, believed, check_alone, told_by
+from mckibben.estimators.coupled.balance_prior import (
+    PriorErrors,
+    PriorLike,
+    as_prior,
+    check_alone,
+    with_prior,
+)
 from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
@@ -49,48 +55,51 @@ from mckibben.muscles.traits import TRAVELS
 from mckibben.recording import Recording, listed
 
 PRESSURES = ("bar", "V", "")
-"""Units of what drives a muscle; where none is said, whoever names it is believed."""
+"""Units of driving channels; a channel without unit is accepted if the user names it."""
 
 LIMITED = ("bar", "V")
-"""Units of what the hardware limits."""
+"""Units of channels with hardware limits."""
 
 FEW, MOST, MOST_SAMPLES = 6_000, 12_000, 60_000
-"""Errors that are looked at to find terms, and in the end; samples that are run through then."""
+"""Number of errors used to select terms, and for the final fit; number of samples simulated there.
+"""
 
 GRIPS = (0.05, 0.3, 1.0, 4.0)
-"""Pressures below zero at which friction holds nothing, relative to the highest, to begin from."""
+"""Initial friction offsets: pressures below zero, relative to the highest, at which friction
+vanishes.
+"""
 
 CONSTANT = 1e6
-"""The same, so far below that friction does not depend on pressure."""
+"""Friction offset so large that friction does not depend on pressure."""
 
 ROUNDS, STEPS_BETWEEN, LAST_STEPS = 6, 8, 8
-"""Times that terms are added, and steps before each; those on all samples in the end."""
+"""Number of rounds of term selection, steps before each, and final steps on all samples."""
 
 LAST = ("asymmetry",)
-"""Terms that are added after all others: friction by direction resembles much that is not friction."""
+"""Terms that are tried last: friction by direction resembles other effects."""
 
 FIRM = 0.7
-"""Of the most that muscles resist with, share at which they go slack at first."""
+"""Initial force of slackening, relative to the largest resistance of the muscles."""
 
 FINEST, LONGEST = 0.003, 0.5
-"""Shortest and longest travels at which stops break away, relative to the stroke."""
+"""Shortest and longest break-away distances of stops, relative to the stroke."""
 
 PLACES = (0.6, 0.8, 0.9, 0.97)
-"""Of obstacles on the way up, along the range of what is moved; on the way down, from its end."""
+"""Candidate positions of obstacles, as shares of the range; for lowering, from its end."""
 
 TERMS = (
     *("elasticity", "areas", "relaxation", "line", "mass", "obstacle", "springs"),
     *("grips", "asymmetry", "walls", "filling", "venting", "dead", "contact", "muscles", "slack"),
 )
-"""Kinds of terms that may be added."""
+"""Kinds of candidate terms."""
 
 PARTS = {"lags": "relaxation", "places": "obstacle", "pushes": "slack"}
-"""Terms that are parts of others."""
+"""Terms that are part of other terms."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class BalanceEstimator(CoupledEstimator):
-    """Balance of forces with friction and relaxation of muscles in parallel, under load, scheduled.
+    """Force balance of muscles in parallel, with friction, relaxation, loads and scheduling inputs.
 
     Parameters
     ----------
@@ -143,12 +152,10 @@ class BalanceEstimator(CoupledEstimator):
 
     title = "Balance of forces"
     can = (
-        "Springs, areas, friction and relaxation of one muscle or several, on coordinates of their own "
+        "Springs, areas, friction and relaxation of one muscle or several, on separate coordinates "
         "or a joint, under loads and torques; terms chosen by cross-validation."
     )
-    cannot = (
-        "One set of lags serves all muscles; areas and springs follow shortening, not temperature."
-    )
+    cannot = "All muscles share one set of lags; areas and springs depend on shortening only."
     inverse_kind = "exact"
     quick = True
     default_for = "plan of displacement"
@@ -188,7 +195,7 @@ class BalanceEstimator(CoupledEstimator):
     unknown_load: bool | None = None
     of_force: bool = False
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
-    prior: Told = None
+    prior: PriorLike = None
 
     @classmethod
     def objection(
@@ -210,7 +217,7 @@ class BalanceEstimator(CoupledEstimator):
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
-        """Return what is learned from recordings, of which some may lack a load that others have."""
+        """Return the training data; recordings may lack a load that others have."""
         every = listed(recordings)
         if self.unknown_load is False:
             return super().data(every, rows)
@@ -223,10 +230,10 @@ class BalanceEstimator(CoupledEstimator):
     @property
     def spans(self) -> tuple[float, ...] | None:
         """The stroke of the data sheet, if there is one."""
-        return None if self.prior is None else (told_by(self.prior).sheet.stroke,)
+        return None if self.prior is None else (as_prior(self.prior).sheet.stroke,)
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data without what tells nothing."""
+        """Return the identified block, and the data without uninformative runs."""
         data, names = without_held(data)
         tracker.notes += [
             f"in {name} nothing moves and no force was measured: it is left out: record the force"
@@ -235,7 +242,7 @@ class BalanceEstimator(CoupledEstimator):
         return super().find(data, tracker)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        """Return the balance, solved for coordinates, behind what acts in front of it."""
+        """Return the balance, solved for coordinates, after the air and dead zone."""
         if unknown := {*(self.terms or ())} - {*TERMS}:
             raise ModelError(
                 f"terms names {', '.join(sorted(unknown))}",
@@ -256,18 +263,18 @@ class BalanceEstimator(CoupledEstimator):
         if not bench.tare:
             lacking = without_load(data, every=bool(self.unknown_load))
             bench = replace(bench, unmeasured=lacking)
-        belief = None
+        prior_errors = None
         if self.prior is not None:
-            bench, belief = believed(bench, self.prior)
+            bench, prior_errors = with_prior(bench, self.prior)
         still = self.prior is None and one_speed(data)
         if still and self.n_lags and self.lags is None:
             tracker.notes.append(
-                "all moves at about one speed: relaxation and friction cannot be distinguished, and "
+                "all motion is at about one speed: relaxation and friction cannot be distinguished, and "
                 "relaxation is left out: record at other speeds too, or give lags"
             )
         structure = self.widest(bench, timed=not still or self.lags is not None)
         with tracker.searching():
-            search, z = self._found(data, structure, belief, tracker)
+            search, z = self._found(data, structure, prior_errors, tracker)
             self._search, self._z = search, z
         search, z = self._search, self._z
         structure = search.structure
@@ -308,7 +315,7 @@ class BalanceEstimator(CoupledEstimator):
         return model(values, balance)
 
     def widest(self, bench: Bench, *, timed: bool) -> Structure:
-        """Return the structure of all that may be."""
+        """Return the structure with all candidate terms."""
         longest = LONGEST if self.prior is None else TRAVELS[-1]
         travels = np.geomspace(FINEST, longest, self.n_stops) * bench.stroke
         limits = travels / bench.highest
@@ -337,15 +344,15 @@ class BalanceEstimator(CoupledEstimator):
         )
 
     def may(self, kind: str) -> bool:
-        """Tell whether terms of a kind may be added."""
+        """Return whether terms of a kind may be added."""
         return self.terms is None or kind in self.terms
 
-    def _first(self, structure: Structure, belief: Belief | None) -> Mask:
-        """Return which terms are free from the beginning."""
+    def _first(self, structure: Structure, prior_errors: PriorErrors | None) -> Mask:
+        """Return which terms are free initially."""
 
         def there(term: Term) -> bool:
             kind, which, _ = term
-            if belief is not None and kind in OF_TRAITS:
+            if prior_errors is not None and kind in OF_TRAITS:
                 return True
             if kind == "springs":
                 return which == 0 or (which - 1) % structure.degree == 0
@@ -361,13 +368,17 @@ class BalanceEstimator(CoupledEstimator):
         return np.array([term.muscle is None and there(term) for term in structure.terms])
 
     def _found(
-        self, data: TrainingData, structure: Structure, belief: Belief | None, tracker: Tracker
+        self,
+        data: TrainingData,
+        structure: Structure,
+        prior_errors: PriorErrors | None,
+        tracker: Tracker,
     ) -> tuple[Search, Array]:
-        """Return the search of the terms chosen, and what they are."""
+        """Return the search with the selected terms, and their values."""
         few = compared(coarser(data, FEW), FEW, of_force=structure.bench.of_force)
-        search = Search(few, structure, self._first(structure, belief), belief)
+        search = Search(few, structure, self._first(structure, prior_errors), prior_errors)
         z = self._balanced(search, tracker)
-        if belief is not None:
+        if prior_errors is not None:
             starts = (search.descend(one, TOWARDS, Tracker()) for one in (z, self._likely(search)))
             z = min(starts, key=search.cost)
         tried = np.array([self._tried(structure, term) for term in structure.terms])
@@ -389,7 +400,7 @@ class BalanceEstimator(CoupledEstimator):
             if (active == search.active).all() or number == ROUNDS - 1:
                 break
             search = replace(search, active=active)
-        added = search.active & ~self._first(structure, belief)
+        added = search.active & ~self._first(structure, prior_errors)
         names = (
             PARTS.get(t.kind, t.kind) if t.muscle is None else "muscles"
             for t in compress(structure.terms, added)
@@ -402,13 +413,13 @@ class BalanceEstimator(CoupledEstimator):
         z = search.descend(z, self.steps, tracker.part(0.5, 0.7))
         whole = compared(coarser(data, MOST_SAMPLES), MOST, of_force=structure.bench.of_force)
         search = replace(search, problem=whole)
-        for _ in range(1 if belief is None else REFINED):
+        for _ in range(1 if prior_errors is None else REFINED):
             search = search.weighed(z)
             z = search.descend(z, min(self.steps, LAST_STEPS), tracker.part(0.7, 0.9))
         return search, z
 
     def _long_held(self, search: Search, z: Array) -> tuple[Search, Array]:
-        """Return the search in which muscles had long been where runs begin, if that explains these.
+        """Return the search with settled starts, if that explains the beginning of runs.
 
         Their first parts count then, which they do not where what came before is unknown.
         """
@@ -419,7 +430,7 @@ class BalanceEstimator(CoupledEstimator):
         return (settled, found) if settled.cost(found) < most else (search, z)
 
     def _balanced(self, search: Search, tracker: Tracker) -> Array:
-        """Return what balances forces best where muscles were measured, of several grips."""
+        """Return the best linear force balance at measured positions, over several friction offsets."""
         structure, problem, starts = search.structure, search.problem, []
         grips = GRIPS[: None if structure.n_stops else 1]
         for grip in grips if self.friction == "pressure" else (CONSTANT,):
@@ -431,21 +442,21 @@ class BalanceEstimator(CoupledEstimator):
         return min(starts, key=lambda start: start[0])[1]
 
     def _likely(self, search: Search) -> Array:
-        """Return what is likely before anything was recorded."""
-        structure, belief, problem = search.structure, search.belief, search.problem
-        assert belief is not None
+        """Return the most probable model of the prior."""
+        structure, prior_errors, problem = search.structure, search.prior_errors, search.problem
+        assert prior_errors is not None
         z = np.zeros(problem.size(structure))
         z[: len(structure.terms)] = structure.begin(FIRST_GRIP * structure.bench.highest)
         for place, term in enumerate(structure.terms):
             if term.kind == "loads":
-                z[place] = 1.0 / belief.prior.sheet.area
+                z[place] = 1.0 / prior_errors.prior.sheet.area
             elif term[:2] == ("areas", 0):
-                z[place] = belief.prior.sheet.area
+                z[place] = prior_errors.prior.sheet.area
         alone = replace(search, problem=replace(problem, data=replace(problem.data, runs=())))
         return alone.descend(z, TOWARDS, Tracker())
 
     def _tried(self, structure: Structure, term: Term) -> bool:
-        """Return whether a term may be added."""
+        """Return whether a term is a candidate."""
         if term.muscle is not None:
             return self.may("muscles")
         if term.kind in ("grip", "grips") and self.friction == "constant":
@@ -455,7 +466,7 @@ class BalanceEstimator(CoupledEstimator):
         return self.may(PARTS.get(term.kind, term.kind)) and term.kind != "pushes"
 
     def _slack(self, search: Search, z: Array) -> tuple[Search, Array]:
-        """Return the search in which muscles go slack, if that lessens errors; else the same."""
+        """Return the search with slackening muscles if that reduces errors; otherwise the same."""
         structure = search.structure
         place = [i for i, term in enumerate(structure.terms) if term.kind == "pushes"]
         active = search.active.copy()
@@ -466,7 +477,7 @@ class BalanceEstimator(CoupledEstimator):
         return (slack, found) if search.improved(z, slack, found) else (search, z)
 
     def _own_loads(self, search: Search, z: Array, data: TrainingData) -> tuple[Search, Array]:
-        """Return the search in which recordings have loads of their own, if that helps much."""
+        """Return the search with constant loads per recording, if that helps considerably."""
         bench, every = search.structure.bench, without_load(data, every=True)
         if bench.loaded or bench.unmeasured or bench.tare or not every:
             return search, z
@@ -478,7 +489,7 @@ class BalanceEstimator(CoupledEstimator):
         return (own, found) if search.improved(z, own, found, by=OWN_HELPS) else (search, z)
 
     def _started(self, search: Search, z: Array) -> tuple[Search, Array]:
-        """Return the search in which runs that do not begin at rest have starts, found by themselves.
+        """Return the search with estimated start states of runs that do not begin at rest.
 
         Where these follow runs no better than the model's own start, that is left.
         """
@@ -493,7 +504,7 @@ class BalanceEstimator(CoupledEstimator):
         return (started, found) if started.cost(found) < whole.cost(z) else (search, z)
 
     def fixed(self, block: Block) -> tuple[int, ...]:
-        """Return the places of sides, of a front's gain, and of what sets the unit of force."""
+        """Return the indices of sides, of a front's gain, and of the unit of force."""
         names = block.parameter_names
         shares = [name for name in names if name.startswith("share of ")]
         unit = shares[0] if len(shares) == 1 else r"area( of muscle 1)? at rest"
@@ -503,36 +514,39 @@ class BalanceEstimator(CoupledEstimator):
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
-        """Return condition and covariance of what is free, in the unit of forces that was set."""
+        """Return condition and covariance of the free parameters, in the unit of force."""
         fixed = sorted({*at_bounds, *self.fixed(block)})
         return covariance_of(block, data, residual, fixed, self.free_runs)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the free-running outputs of blocks, each run under its own load from its own start."""
+        """Return free-running outputs of blocks, each run with its own load and start."""
         return self._search.problem.simulated(blocks, data, self._search.structure, self._z)
 
 
 FIRST_GRIP, TOWARDS, REFINED = 0.1, 60, 3
-"""Where what is likely begins, relative to the highest pressure; most steps from there to it; times
-that a belief is weighed anew."""
+"""First friction offset of the prior, relative to the highest pressure; maximum number of steps
+from there; number of reweightings of the prior.
+"""
 
 OF_TRAITS = ("elasticity", "areas", "friction", "relaxation")
-"""Kinds of terms of which a prior is."""
+"""Kinds of terms that a prior covers."""
 
 OWN_HELPS = 0.1
-"""By how much what recordings have of their own, or how they begin, has to lessen errors."""
+"""Smallest relative reduction of errors by per-run nuisance parameters, or by start states."""
 
 EXPLAINED = 1.5
-"""Times the error of all but first parts up to which that of all explains how runs begin."""
+"""Largest ratio of the error of whole runs to that without their first parts, for start states to
+explain the runs.
+"""
 
 
 def _within(given_range: tuple[float, float] | None, block: Block) -> Block:
-    """Return a block in front, of which the inverse gives pressures within a range."""
+    """Return a front block whose inverse stays within a pressure range."""
     return replace(block, input_range=given_range) if isinstance(block, Air) else block
 
 
 def in_newtons(balance: Balance) -> Balance:
-    """Return a balance of which forces are in the unit of its load, if that is one on one coordinate."""
+    """Return a balance with forces in the load's unit, if it has one load on one coordinate."""
     share = abs(balance.loads[0][0]) if np.shape(balance.loads) == (1, 1) else 0.0
     if not share > 0.0:
         return balance

@@ -1,4 +1,4 @@
-"""What recordings settle before a balance is identified: channels, directions, ranges, loads."""
+"""Set-up of a balance from recordings: channels, directions, ranges, loads."""
 
 from __future__ import annotations
 
@@ -19,34 +19,38 @@ from mckibben.estimators.coupled.base import LOADS
 from mckibben.recording import Recording
 
 ALIKE = 0.02
-"""Share of its largest value by which what schedules or loads has to change to be seen."""
+"""Smallest variation of a scheduling or load channel, relative to its largest value."""
 
 BLOCK, NOISE = 25, 0.4
-"""Samples whose means are compared, and the share of the range over which noise has no means."""
+"""Samples per averaged block, and noise, as a share of the range, above which means are not
+compared.
+"""
 
 LEAST_MOVED = 0.02
-"""Share of the most that any pressure moves below which one moves nothing, of a coordinate too."""
+"""Motion due to a pressure, relative to the largest, below which the pressure has no effect."""
 
 STILL = 0.005
-"""Share of the most that any output moves, below which one does not."""
+"""Motion of an output, relative to the largest, below which it counts as constant."""
 
 LARGEST = 1e12
-"""Number that no muscle has."""
+"""Bound of plausible numbers."""
 
 FAR = 0.5
-"""Outputs that all are further from zero than this share of their range count from elsewhere."""
+"""Distance of outputs from zero, relative to their range, above which they have another origin."""
 
 AT_START = 0.02
-"""Displacement at the start of a run that is none, relative to the range."""
+"""Displacement at the start of a run, relative to the range, that counts as zero."""
 
 ONE_SPEED, SLOW = 2.0, 0.05
-"""Ratio of fast to slow speeds up to which there is one; share of the fastest below which they rest."""
+"""Largest ratio of fast to slow speeds that counts as one speed; share of the fastest below which a
+channel is at rest.
+"""
 
 
 def with_loads(
     recordings: Sequence[Recording], scheduling: Sequence[str]
 ) -> tuple[list[Recording], list[tuple[str, ...]]]:
-    """Return recordings that all have the loads that any has, and for each which it had not.
+    """Return recordings that all have every load, and the loads each one lacked.
 
     These are what they are in others on average.
     """
@@ -67,25 +71,27 @@ def with_loads(
 
 
 def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:
-    """Return data without runs in which nothing moves and no force was measured, and their names."""
+    """Return data without runs that have neither motion nor measured force, and their names."""
     loaded = any(channel.unit in LOADS for channel in data.scheduled)
-    tells = [(loaded and not run.unmeasured) or not held(data, run) for run in data.runs]
-    if all(tells) or not any(tells):
+    informative = [(loaded and not run.unmeasured) or not held(data, run) for run in data.runs]
+    if all(informative) or not any(informative):
         return data, []
-    runs = tuple(run for run, told in zip(data.runs, tells, strict=True) if told)
+    runs = tuple(run for run, useful in zip(data.runs, informative, strict=True) if useful)
     return replace(data, runs=runs), list(
-        dict.fromkeys(run.name for run, told in zip(data.runs, tells, strict=True) if not told)
+        dict.fromkeys(
+            run.name for run, useful in zip(data.runs, informative, strict=True) if not useful
+        )
     )
 
 
 def only_forces(data: TrainingData) -> bool:
-    """Tell whether one coordinate is held in every run, so that its one load is all that is known."""
+    """Return whether the one coordinate is held in every run, so that only the load is informative."""
     loads = sum(channel.unit in LOADS for channel in data.scheduled)
     return loads == len(data.outputs) == 1 and all(held(data, run) for run in data.runs)
 
 
 def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
-    """Return data without loads and schedules that never change, loads last; and what was left out."""
+    """Return data without constant loads and scheduling inputs, loads last; and those left out."""
     kept, constant = list[int](), list[int]()
     for place in range(len(data.scheduled)):
         columns = [run.scheduled[:, place] for run in data.runs]
@@ -107,7 +113,7 @@ def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
 
 
 def check_numbers(data: TrainingData) -> None:
-    """Refuse numbers that no muscle has, outputs that stay, and pressures that never act.
+    """Raise an error for implausible numbers, constant outputs, and pressures without effect.
 
     Raises
     ------
@@ -138,7 +144,7 @@ def check_numbers(data: TrainingData) -> None:
 
 
 def directions(data: TrainingData) -> Array:
-    """Return how much shorter every muscle is by coordinates, shape (muscles, coordinates).
+    """Return the shortening of every muscle per coordinate, shape (muscles, coordinates).
 
     A muscle shortens along the way in which its pressure moves coordinates, by least squares on all
     inputs; each by its own coordinate alone where that is the one that its pressure moves most.
@@ -163,7 +169,7 @@ def directions(data: TrainingData) -> Array:
     sizes = np.sqrt((moved**2).sum(axis=1))
     for k in np.flatnonzero(~(sizes > LEAST_MOVED * sizes.max())).tolist():
         raise DataError(
-            "it moves nothing",
+            "it has no effect",
             channel=data.inputs[k].name,
             remedy="leave it out, or record runs in which it moves the muscles",
         )
@@ -171,13 +177,13 @@ def directions(data: TrainingData) -> Array:
     if np.linalg.svd(ways, compute_uv=False)[-1] < LEAST_MOVED:
         raise DataError(
             "all outputs move together, whatever the pressures",
-            remedy="leave out all but one, or record runs in which pressures move apart",
+            remedy="leave out all but one, or record runs in which pressures move independently",
         )
     return ways
 
 
 def from_zero(data: TrainingData, ways: Array) -> tuple[TrainingData, list[Block], Array]:
-    """Return data whose outputs count from about zero, what gives the measured ones, and directions.
+    """Return data with outputs relative to about zero, the offset block, and directions.
 
     Muscles with a coordinate each shorten by that.
     """
@@ -201,7 +207,7 @@ def from_zero(data: TrainingData, ways: Array) -> tuple[TrainingData, list[Block
 
 
 def one_speed(data: TrainingData) -> bool:
-    """Tell whether all inputs always move at about one speed, which tells nothing of rate."""
+    """Return whether all inputs always move at about one speed, so that rate is not identifiable."""
     if any(run.sample_time is None for run in data.runs):
         return True
     speeds = [
@@ -217,7 +223,7 @@ def one_speed(data: TrainingData) -> bool:
 
 
 def without_load(data: TrainingData, *, every: bool) -> tuple[int, ...]:
-    """Return the recordings without a load that others have; or every one but the first with it."""
+    """Return the recordings without a load that others have; or all but the first with it."""
     lacking = {run.recording for run in data.runs if run.unmeasured}
     found = dict.fromkeys(run.recording for run in data.runs)
     reference = next((one for one in found if one not in lacking), None)
@@ -225,7 +231,7 @@ def without_load(data: TrainingData, *, every: bool) -> tuple[int, ...]:
 
 
 def bench_of(data: TrainingData, ways: Array, *, tare: bool | None) -> Bench:
-    """Return what the recordings settle, of outputs that count from about zero."""
+    """Return the set-up from recordings, for outputs relative to about zero."""
     loads = [channel.unit in LOADS for channel in data.scheduled]
     n_x = loads.index(True) if any(loads) else len(loads)
     x = data.stacked("scheduled")

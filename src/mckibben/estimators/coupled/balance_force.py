@@ -1,4 +1,4 @@
-"""Force by length, or displacement, and pressure: a balance of forces asked for its load.
+"""Force by length, or displacement, and pressure: a force balance solved for its load.
 
 Unlike a static law it remembers: friction and what relaxes come from the balance, at held length
 through the stretch of the wall. Its errors of force are what is made least.
@@ -20,7 +20,7 @@ from mckibben.blocks.memoryless import Affine
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.coupled.balance import BalanceEstimator
-from mckibben.estimators.coupled.balance_prior import Told, told_by
+from mckibben.estimators.coupled.balance_prior import PriorLike, as_prior
 from mckibben.estimators.coupled.base import FEWEST_SAMPLES
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
@@ -28,7 +28,7 @@ from mckibben.recording import Recording
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class BalanceForceEstimator(SearchEstimator):
-    """Force by length or displacement and pressure, from a balance of forces.
+    """Force by length or displacement and pressure, from a force balance.
 
     Parameters
     ----------
@@ -51,12 +51,12 @@ class BalanceForceEstimator(SearchEstimator):
     title = "Force from a balance of forces"
     purpose = "force"
     can = (
-        "Force by length, or displacement, and pressure: a balance of forces asked for its "
+        "Force by length, or displacement, and pressure: a force balance solved for its "
         "load, with friction and relaxation."
     )
     cannot = (
-        "Loops at held length come from friction alone; beyond the lengths recorded its area "
-        "goes on straight."
+        "At constant length only friction makes loops; beyond the recorded lengths its area is "
+        "extrapolated linearly."
     )
     quick = True
 
@@ -68,11 +68,11 @@ class BalanceForceEstimator(SearchEstimator):
     elasticity: Annotated[int, Interval(ge=1, le=9)] = 9
     area: Annotated[int, Interval(ge=0, le=6)] = 4
     terms: tuple[str, ...] | None = None
-    prior: Told = None
+    prior: PriorLike = None
 
     effort: ClassVar[float] = 1.0
     errors_known: ClassVar[bool] = False
-    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
 
     @classmethod
     def objection(
@@ -100,8 +100,8 @@ class BalanceForceEstimator(SearchEstimator):
         )
         rest = None
         if place.name.startswith("length"):
-            told = self.prior is not None
-            rest = told_by(self.prior).sheet.rest_length_mm if told else data.input_range[1]
+            given = self.prior is not None
+            rest = as_prior(self.prior).sheet.rest_length_mm if given else data.input_range[1]
         displacement = place if rest is None else Channel("displacement", place.unit)
         runs = tuple(
             replace(
@@ -119,7 +119,7 @@ class BalanceForceEstimator(SearchEstimator):
             outputs=(displacement,),
             scheduled=data.outputs,
             spans=balance.spans,
-        ).stretches(FEWEST_SAMPLES - 1)  # a force that does not count is not to be told as a load
+        ).stretches(FEWEST_SAMPLES - 1)  # a force that does not count is not to be given as a load
         force = load_of(balance.find(muscle, tracker)[0])
         if rest is None:
             return force, data

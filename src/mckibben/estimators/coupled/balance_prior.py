@@ -1,4 +1,4 @@
-"""What is likely of a muscle, weighed against what its recordings tell."""
+"""Prior of a muscle, combined with its recordings."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import TIMES, traits
 
 STEP = 1e-5
-"""Change of a number, relative to what is much of it, by which traits' slopes are found."""
+"""Relative step of a number for finite differences of traits."""
 
 LEAST_NOISE = 0.01
-"""Error relative to the range, of independent samples, by which any model of a muscle is off."""
+"""Smallest model error of a muscle, relative to the range, for independent samples."""
 
 ZERO_STEPS = 6
-"""To where displacements are likely to count from."""
+"""Steps towards the probable origin of displacements."""
 
 SHORTEST_LAG = 1.0
-"""First time constant that may be [s], whatever the recordings."""
+"""Smallest first time constant [s]."""
 
-Told = str | Path | Sheet | InstanceOf[Prior] | None
-"""What a prior may be given as: a muscle's name, a file, a data sheet (as a mapping, too), or itself."""
+PriorLike = str | Path | Sheet | InstanceOf[Prior] | None
+"""Forms of a prior: a muscle's name, a file, a data sheet (also as a mapping), or a prior."""
 
 
 @dataclass(frozen=True)
-class Belief:
-    """A prior as errors beside those of recordings.
+class PriorErrors:
+    """A prior as additional residuals.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ class Belief:
 
     @cached_property
     def weights(self) -> Array:
-        """Rows that make independent numbers of traits."""
+        """Rows that decorrelate the numbers of traits."""
         return self.prior.weights()
 
     def errors(
         self, structure: Structure, z: Array, wanted: Mask | None = None
     ) -> tuple[Array, Array]:
-        """Return how far terms are from what is likely, and the slopes by those wanted, others 0.
+        """Return prior residuals, and derivatives by the requested terms, others 0.
 
         Where displacements count from is as likely makes them most so (variable projection). Traits are
         values at a few places; between them areas are smooth, no coefficient beyond that at rest.
@@ -93,15 +93,15 @@ class Belief:
         return far, np.concatenate([slopes, np.diag(curved)])
 
 
-def told_by(given: Any) -> Prior:
-    """Return a prior, or that of a muscle's name, a file or a data sheet."""
+def as_prior(given: Any) -> Prior:
+    """Return a prior, or the one of a muscle's name, a file or a data sheet."""
     if isinstance(given, Prior):
         return given
     return prior_of(Sheet(**given) if isinstance(given, Mapping) else given)
 
 
 def check_alone(data: TrainingData) -> None:
-    """Refuse a prior of several muscles, or one that something else than a load schedules.
+    """Raise an error for a prior of several muscles, or with scheduling inputs other than a load.
 
     Raises
     ------
@@ -114,9 +114,9 @@ def check_alone(data: TrainingData) -> None:
         )
 
 
-def believed(bench: Bench, given: Any) -> tuple[Bench, Belief]:
-    """Return a bench that covers all that the muscle can do, recorded or not, and what is likely."""
-    prior = told_by(given)
+def with_prior(bench: Bench, given: Any) -> tuple[Bench, PriorErrors]:
+    """Return the set-up over the muscle's full range, recorded or not, and its prior."""
+    prior = as_prior(given)
     shortest, longest = bench.lag_range
     return replace(
         bench,
@@ -124,4 +124,4 @@ def believed(bench: Bench, given: Any) -> tuple[Bench, Belief]:
         highest=max(bench.highest, prior.sheet.max_pressure_bar),
         heaviest=max(bench.heaviest, prior.sheet.force),
         lag_range=(min(shortest, SHORTEST_LAG), max(longest, TIMES[-1])),
-    ), Belief(prior)
+    ), PriorErrors(prior)

@@ -1,4 +1,4 @@
-"""Runs as a balance of forces sees them: what it lacks along them; and how it follows them, free.
+"""Residuals of a force balance along runs: force residuals, and free-running errors.
 
 Values are those of `mckibben.estimators.coupled.balance_structure`, and behind them what recordings and
 runs have of their own: of every recording under a load that nobody measured, a constant force on every
@@ -39,52 +39,54 @@ EXACT, OF_AIR = (
     ("grip", "grips", "asymmetry", "lags", "places"),
     ("filling", "venting", "dead", "contact"),
 )
-"""Shape of which slopes are exact, in the order that `balance_slopes` has them; and that in front."""
+"""Nonlinear parameters with exact derivatives, in the order of `balance_slopes`; and those of the
+air.
+"""
 
 WARMING = 0.2
-"""Share of a run that does not begin at rest before which its errors do not count."""
+"""Initial share of a run that starts away from rest in which errors are ignored."""
 
 UNLIKELY = 0.03
-"""Error, relative to the range, as bad as a start with all friction loaded, or a range behind."""
+"""Error, relative to the range, that costs as much as start states with all friction loaded."""
 
 STEP, FIRST_STEP = 1e-4, 0.5
-"""Change of shape, relative to what is much of it, by which slopes are found; of shape that is new."""
+"""Relative step for finite differences of nonlinear parameters, and of new ones."""
 
 RESTING = 0.1
-"""Share of the range of pressure up to which a run begins at rest."""
+"""Share of the pressure range up to which a run starts at rest."""
 
 FILLS = 0.02
-"""Share of a pressure that acts within the dead zone: an inverse needs some."""
+"""Share of a pressure that acts inside the dead zone, so that an inverse exists."""
 
 STRAIGHT = 0.01
-"""What inputs may be off a straight line, relative to their ranges."""
+"""Deviation of inputs from straight lines, relative to their ranges, that is ignored."""
 
 RIDGE = 1e-7
-"""Damping of least squares, relative to every coefficient's own effect."""
+"""Ridge of least squares, relative to each coefficient's own effect."""
 
 LEAST_AT_REST, PASSES = 0.1, 3
-"""Least area at rest, relative to that of all samples on average; times that forces are weighed anew."""
+"""Smallest area at rest, relative to the mean over samples; number of reweightings of forces."""
 
 MOST_CUTS = 8
-"""Times that springs are made stiff where they were found soft."""
+"""Maximum number of added stiffness constraints."""
 
 HELD = 0.02
-"""A muscle is held where it moves less than this share of what it moves in all runs."""
+"""Share of its motion in all runs below which a muscle counts as held."""
 
 
 def held(data: TrainingData, run: Run) -> bool:
-    """Tell whether nothing moves in a run, so that its forces are what tells of the muscle."""
+    """Return whether a run has no motion, so that its forces are compared."""
     return bool((np.ptp(run.outputs, axis=0) < HELD * data.travel).all())
 
 
 def at_rest(data: TrainingData, run: Run) -> bool:
-    """Tell whether a run begins about where pressures are lowest, so that nothing came before it."""
+    """Return whether a run begins near the lowest pressures, so that it has no earlier memory."""
     low, high = data.lowest, data.highest
     return bool((run.driven[0] - np.minimum(low, 0.0) <= RESTING * (high - low)).all())
 
 
 def front(structure: Structure, values: Array, channel: Channel) -> list[Block]:
-    """Return what acts between a measured pressure and a muscle: air's lag, then the dead zone."""
+    """Return the front between measured pressure and muscle: air lag, then dead zone."""
     filling, ratio, dead, contact = (
         float(structure.shaped(values, name)[0])
         for name in ("filling", "venting", "dead", "contact")
@@ -103,7 +105,7 @@ def front(structure: Structure, values: Array, channel: Channel) -> list[Block]:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Recordings to follow.
+    """Runs to fit.
 
     Parameters
     ----------
@@ -131,7 +133,7 @@ class Problem:
         return self.data.runs
 
     def still(self, run: Run) -> bool:
-        """Tell whether a run's forces count, not its displacements."""
+        """Return whether a run's forces are compared, not its displacements."""
         return self.of_force or not self._moves(run)
 
     def _moves(self, run: Run) -> bool:
@@ -139,7 +141,7 @@ class Problem:
         return not still.item()
 
     def counting(self, run: Run, structure: Structure) -> Mask:
-        """Return which of the samples compared count.
+        """Return which of the compared samples are scored.
 
         Of a run that begins in an unknown state, that is not found, the first part does not.
         """
@@ -151,12 +153,12 @@ class Problem:
         )
 
     def places(self, run: Run) -> NDArray[np.intp]:
-        """Return the places of the samples that are compared."""
+        """Return the indices of the compared samples."""
         n = len(run.outputs)
         return np.minimum(np.arange(self.every - 1, n + self.every - 1, self.every), n - 1)
 
     def acting(self, run: Run, structure: Structure, values: Array) -> Array:
-        """Return the pressures that act on muscles, shape (n, muscles)."""
+        """Return the pressures acting on muscles, shape (n, muscles)."""
         shape = tuple(values[structure.shape["filling"].start :].tolist())
         if not (shape[0] or shape[2] or shape[3]):
             return run.driven
@@ -179,7 +181,7 @@ class Problem:
     # -- what recordings and runs have of their own ----------------------------------------------
 
     def loads_at(self, structure: Structure, run: Run) -> slice:
-        """Return the places of the load that only a recording has, behind the terms."""
+        """Return the indices of a recording's own load, after the terms."""
         first, unmeasured = len(structure.terms), structure.bench.unmeasured
         if run.recording not in unmeasured:
             return slice(first, first)
@@ -187,7 +189,7 @@ class Problem:
         return slice(first, first + structure.m)
 
     def start_at(self, structure: Structure, run: Run) -> slice:
-        """Return the places of what a run remembers at its start, by muscle its share, then its lags."""
+        """Return the indices of a run's start state: per muscle its share, then its lags."""
         first = len(structure.terms) + len(structure.bench.unmeasured) * structure.m
         if not self.starts:
             return slice(first, first)
@@ -196,12 +198,12 @@ class Problem:
         return slice(first + place * width, first + (place + 1) * width)
 
     def size(self, structure: Structure) -> int:
-        """Return how many numbers are found in all."""
+        """Return the total number of unknowns."""
         own = len(self.runs) * structure.n * (1 + len(structure.lags)) * self.starts
         return len(structure.terms) + len(structure.bench.unmeasured) * structure.m + own
 
     def begun(self, structure: Structure, z: Array, c: Array, run: Run, p: Array) -> Array | None:
-        """Return stops and lags of a run before its first sample [mm]; None of one from rest."""
+        """Return stops and lags of a run before its first sample [mm]; None if it starts at rest."""
         start = z[self.start_at(structure, run)].reshape(-1, 1 + len(structure.lags))
         if not start.size:
             return None
@@ -222,7 +224,7 @@ class Problem:
         sloped: bool = True,
         by_air: Array | None = None,
     ) -> tuple[Array, Array]:
-        """Return coordinates of a run, or forces that are lacking, and their slopes.
+        """Return coordinates of a run, or residual forces, and their derivatives.
 
         Slopes are by linear coefficients and shape as `balance_slopes` has it. ``by_air`` are those of
         acting pressures, shape (t, muscles, f).
@@ -242,7 +244,7 @@ class Problem:
     def errors_of(
         self, structure: Structure, z: Array, run: Run, *, sloped: bool, by_air: Array | None = None
     ) -> tuple[Array, Array]:
-        """Return the errors over a run relative to ranges, (k, m), and their slopes.
+        """Return the errors over a run relative to ranges, (k, m), and their derivatives.
 
         Of a run in which nothing moves, they are the forces that are lacking, over that of the highest
         pressure at rest.
@@ -257,7 +259,7 @@ class Problem:
     def errors(
         self, structure: Structure, z: Array, wanted: Mask | None = None, new: Mask | None = None
     ) -> tuple[list[Array], Array]:
-        """Return the errors of every run, and their slopes by all that is found, shape (errors, found).
+        """Return the errors of every run, and derivatives by all unknowns, shape (errors, unknowns).
 
         None are computed unless some are ``wanted``. Those by what acts on pressures are differences
         before the muscles, by what is ``new`` of it over as much as is much; those by walls, pushes and
@@ -300,7 +302,7 @@ class Problem:
     def _by_air(
         self, structure: Structure, z: Array, run: Run, kinds: list[str], new: Mask | None
     ) -> Array:
-        """Return how acting pressures move with what acts on them, shape (t, muscles, kinds)."""
+        """Return derivatives of acting pressures by front parameters, shape (t, muscles, kinds)."""
         n, found = len(structure.terms), []
         for kind in kinds:
             place = structure.free(kind).start
@@ -315,7 +317,7 @@ class Problem:
         return np.stack(found, axis=2) if found else np.zeros(shape)
 
     def _unlikely(self, structure: Structure, z: Array) -> tuple[Array, Array]:
-        """Return how unlikely the starts of runs are, as errors, and the slopes."""
+        """Return prior residuals of start states, and their derivatives."""
         width = 1 + len(structure.lags)
         first = len(structure.terms) + len(structure.bench.unmeasured) * structure.m
         scale = np.full(((z.size - first) // width, width), UNLIKELY)
@@ -325,7 +327,7 @@ class Problem:
         return scale.ravel() * z[z.size - scale.size :], slopes
 
     def _step(self, structure: Structure, z: Array, place: int, share: float) -> float:
-        """Return a change of a number by which slopes are found, away from where it ends."""
+        """Return the finite-difference step of a parameter, away from its bounds."""
         n = structure.mix.shape[1]
         if place >= len(structure.terms):
             width = 1 + len(structure.lags)
@@ -337,11 +339,11 @@ class Problem:
 
     @property
     def all_at_rest(self) -> bool:
-        """Whether all runs in which something moves begin at rest."""
+        """Whether all runs with motion begin at rest."""
         return all(self.still(run) or at_rest(self.data, run) for run in self.runs)
 
     def most_resisted(self, structure: Structure, z: Array) -> float:
-        """Return the most that any muscle resists shortening with where it was measured."""
+        """Return the largest resistance of any muscle at measured positions."""
         values, most = structure.expanded(z[: len(structure.terms)]), 0.0
         balance = structure.block(values)
         springs = np.array(balance.springs).reshape(structure.m, -1, 1 + structure.m)
@@ -355,7 +357,7 @@ class Problem:
     def simulated(
         self, blocks: Sequence[Block], data: TrainingData, structure: Structure, z: Array
     ) -> Array:
-        """Return free-running outputs of blocks where samples count, shape (blocks, n).
+        """Return free-running outputs of blocks at scored samples, shape (blocks, n).
 
         Every run is under its own load, and begins with what it was found to remember.
         """
@@ -391,7 +393,7 @@ class Problem:
     def _begin(
         self, balance: Balance, state: Array, first: Array, structure: Structure, z: Array, run: Run
     ) -> None:
-        """Bring the end of a state at rest to where the first pressures hold muscles, with its start."""
+        """Move a rest state to equilibrium with the first pressures, with its start."""
         n, m = structure.n, structure.m
         own = state[state.size - balance.n_states :]  # behind it nothing remembers
         c, q = balance.coefficients(1.0), own[:m].copy()
@@ -406,7 +408,7 @@ class Problem:
     # -- the linear stage ------------------------------------------------------------------------
 
     def balanced(self, structure: Structure, z: Array, active: Mask) -> Array:
-        """Return what is found of linear numbers where the muscles were measured, where forces balance.
+        """Return the linear parameters of the force balance at measured positions.
 
         Forces are weighed by stiffness, so that errors are of displacement. They do not tell how large
         areas at rest are: those of muscles with a coordinate each are 1 where samples are on average.
@@ -482,7 +484,7 @@ class Problem:
         return start
 
     def stiffness(self, structure: Structure, z: Array) -> Array:
-        """Return how stiff every coordinate is where stops slide but for a third, shape (k, m)."""
+        """Return the stiffness of every coordinate with stops mostly sliding, shape (k, m)."""
         values, found = structure.expanded(z[: len(structure.terms)]), []
         for run in self.runs:
             places = self.places(run)
@@ -511,7 +513,7 @@ class Problem:
 def bounded_least_squares(
     gram: Array, bounded: Mask, near: Array | None = None, ridge: float = RIDGE
 ) -> Array:
-    """Return the least squares of products of columns and, last, a target; some are not negative.
+    """Return bounded least squares from products of columns and, last, a target.
 
     Damped towards what is ``near``, or 0, by every number's own effect.
     """
@@ -537,13 +539,13 @@ def bounded_least_squares(
 
 
 def compared(data: TrainingData, most: int, *, of_force: bool = False) -> Problem:
-    """Return the problem of following runs, of which about so many numbers are compared."""
+    """Return the problem with about so many compared numbers."""
     total = sum(len(run.outputs) for run in data.runs) * len(data.outputs)
     return Problem(data, max(1, total // most), of_force=of_force)
 
 
 def coarser(data: TrainingData, most: int) -> TrainingData:
-    """Return data of about so many samples at most.
+    """Return data with at most about so many samples.
 
     Runs are thinned where inputs go straight between samples, and then chosen evenly.
     """

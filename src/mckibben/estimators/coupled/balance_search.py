@@ -1,4 +1,4 @@
-"""The search for a balance of forces: which terms it has, and what they are, by its free run.
+"""Search of a force balance: term selection and descent on free-running errors.
 
 Terms are found by a forward search on the free run made straight: its slopes by everything that may be
 free, what is not yet included, give by least squares the errors that any choice of terms would leave. A
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask
-from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, Belief
+from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, PriorErrors
 from mckibben.estimators.coupled.balance_problem import MOST_CUTS, Problem, bounded_least_squares
 from mckibben.estimators.coupled.balance_structure import Structure, Term
 from mckibben.estimators.coupled.constrained import constrained_least_squares
@@ -27,45 +27,45 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.statistics import autoregression
 
 BLOCKS, FOLDS = 20, 5
-"""About how many blocks all runs are cut into, and in how many parts they are left out in turn."""
+"""Approximate number of blocks of all runs, and of cross-validation folds."""
 
 DAMPED = 1e-2
-"""Damping of least squares of which errors are compared, towards what was found, by own effects."""
+"""Damping of the least squares whose errors are compared, relative to own effects."""
 
 AHEAD = 4
-"""Groups of terms that are added in a row before they, together, have to lessen errors."""
+"""Number of term groups that may be added before they, together, must reduce errors."""
 
 MOST_TRIES = 7
-"""Dampings tried for a step, each ten times the last."""
+"""Number of dampings tried per step, each ten times the last."""
 
 FIRST_DAMPING, LIGHTEST = 1e-3, 1e-7
-"""Damping of a first step; its root of one that is hardly damped."""
+"""Damping of the first step, and the smallest."""
 
 UNKNOWN = 1e-10
-"""Effect of a number's size, relative to the largest of any, that is none."""
+"""Effect of a parameter, relative to the largest, that counts as none."""
 
-FAR, APART = 0.5, 0.7
-"""Change of shape in one step, relative to what is much; least difference of the logarithms of lags."""
+FAR, LEAST_SEPARATION = 0.5, 0.7
+"""Largest relative change per step; smallest difference of the logarithms of lags."""
 
 NO_GAIN = 1e-6
-"""Gain by a term, relative to the squared errors, that is rounding."""
+"""Gain of a term, relative to the squared errors, that is rounding."""
 
 SLOW, SLOWEST = 1e-3, 2
-"""Relative gain of a step that is slow, and how many of them end a descent."""
+"""Relative gain of a slow step, and number of slow steps that end a descent."""
 
 DEVIATIONS = (("areas",), ("elasticity", "bladder"), ("friction",), ("relaxation", "damping"))
-"""Kinds by which muscles may differ, together."""
+"""Kinds in which muscles may differ together."""
 
 NEW_SHAPE = ("asymmetry", "grips", "walls", "filling", "dead", "contact", "venting")
-"""Shape that is added by itself."""
+"""Nonlinear parameters that are added alone."""
 
 POSITIVE_SHAPE = ("grip", "grips", "walls", "filling", "dead", "contact")
-"""Shape that is not negative."""
+"""Non-negative nonlinear parameters."""
 
 
 @dataclass
 class Search:
-    """Numbers z of a structure's terms, and of what recordings and runs have of their own.
+    """Unknowns z: of a structure's terms, and per-recording and per-run parameters.
 
     Parameters
     ----------
@@ -73,49 +73,51 @@ class Search:
     structure : Structure
     active : array of bool
         Which terms are free; others are what they begin with.
-    belief : Belief, optional
+    prior_errors : PriorErrors, optional
     """
 
     problem: Problem
     structure: Structure
     active: Mask
-    belief: Belief | None = None
+    prior_errors: PriorErrors | None = None
 
     def errors(self, z: Array, wanted: Mask | None = None) -> tuple[Array, Array]:
-        """Return all errors, and the slopes that are wanted, those of the belief last."""
+        """Return all residuals, and the requested derivatives; those of the prior last."""
         parts, slopes = self.problem.errors(self.structure, z, wanted)
         errors = np.concatenate(parts) if parts else np.zeros(0)
-        if self.belief is None:
+        if self.prior_errors is None:
             return errors, slopes
-        far, by = self.belief.errors(self.structure, z, wanted)
+        far, by = self.prior_errors.errors(self.structure, z, wanted)
         whole = np.zeros((len(by), slopes.shape[1]))
         whole[:, : by.shape[1]] = by
         return np.append(errors, far), np.concatenate([slopes, whole])
 
     def weighed(self, z: Array) -> Search:
-        """Return the search in which the belief is weighed by the noise of independent errors."""
-        if self.belief is None:
+        """Return the search with the prior weighted by the noise of independent errors."""
+        if self.prior_errors is None:
             return self
         parts = self.problem.errors(self.structure, z)[0][: len(self.problem.runs)]
         model, count = autoregression(parts), sum(part.size for part in parts)
         noise = np.sqrt(model.variance * count / model.effective_sample_size(count))
-        return replace(self, belief=replace(self.belief, noise=max(float(noise), LEAST_NOISE)))
+        return replace(
+            self, prior_errors=replace(self.prior_errors, noise=max(float(noise), LEAST_NOISE))
+        )
 
     def cost(self, z: Array) -> float:
-        """Return the root mean square of the errors."""
+        """Return the root mean square error."""
         found = _size(self.errors(z)[0])
         return found if np.isfinite(found) else np.inf
 
     @property
     def free(self) -> NDArray[np.intp]:
-        """Places of what is found."""
+        """Indices of the free unknowns."""
         rest = self.problem.size(self.structure) - self.active.size
         return np.flatnonzero(np.append(self.active, np.ones(rest, dtype=bool)))
 
     # -- descent ---------------------------------------------------------------------------------
 
     def narrowed(self, z: Array) -> tuple[Search, Array]:
-        """Return the search of the terms that are free, without the others, and the same numbers."""
+        """Return the search restricted to free terms, and the unknowns."""
         structure, n = self.structure, len(self.structure.terms)
         free = set(compress(structure.keys, self.active))
         needed = structure.needed(list(compress(structure.terms, self.active)))
@@ -124,13 +126,13 @@ class Search:
         return replace(self, structure=needed, active=active), moved
 
     def descended(self, z: Array, steps: int, tracker: Tracker) -> Array:
-        """Return the numbers to which a descent of the terms that are free leads."""
+        """Return the unknowns after a descent in the free terms."""
         few, narrow = self.narrowed(z)
         found, n = few.descend(narrow, steps, tracker), len(few.structure.terms)
         return np.append(few.structure.moved_to(self.structure, found[:n], z), found[n:])
 
     def descend(self, z: Array, steps: int, tracker: Tracker) -> Array:
-        """Show a tracker ever better numbers, and return the best."""
+        """Descend, report improvements to a tracker, and return the best unknowns."""
         damping, slow = FIRST_DAMPING, 0
         errors, slopes = self.errors(z, self.active)
         cost = _size(errors)
@@ -162,7 +164,7 @@ class Search:
         return z
 
     def _solved(self, triangle: Array, z: Array, damping: float) -> Array:
-        """Return numbers with the least errors, were these straight, that physics allows.
+        """Return the least-squares solution of the linearised problem within physical bounds.
 
         ``triangle`` is that of slopes and target. Damped towards what they are, by every number's own
         effect, so that units do not matter; where it has none it stays. Springs are made stiff where
@@ -197,7 +199,7 @@ class Search:
         return tried
 
     def _conditions(self, z: Array) -> tuple[Array, Array]:
-        """Return what is asked of all numbers: sides @ z >= least."""
+        """Return linear constraints of all unknowns: sides @ z >= least."""
         structure = self.structure
         n, n_terms = structure.mix.shape[1], len(structure.terms)
         sides, least = structure.conditions(structure.expanded(z[:n_terms]))
@@ -218,7 +220,7 @@ class Search:
             starts,
             -starts,
         ]
-        asked = [least - sides @ structure.base, bounds, np.full(len(apart), APART)]
+        asked = [least - sides @ structure.base, bounds, np.full(len(apart), LEAST_SEPARATION)]
         asked.append(np.full(2 * len(starts), -1.0))
         return np.concatenate(every), np.concatenate(asked)
 
@@ -230,7 +232,7 @@ class Search:
     # -- choice ----------------------------------------------------------------------------------
 
     def chosen(self, z: Array, tried: Mask) -> tuple[Mask, Array]:
-        """Return which terms are free after a forward search, of those ``tried``, and where to go on.
+        """Return the selected terms after a forward search over ``tried``, and their unknowns.
 
         New shape begins where least squares have it.
         """
@@ -271,19 +273,19 @@ class Search:
         return active, found
 
     def improved(self, z: Array, other: Search, found: Array, by: float = 0.0) -> bool:
-        """Tell whether another search has less error, by more than its standard error over blocks."""
+        """Return whether another search has significantly smaller errors over blocks."""
         before, after = self._by_block(z), other._by_block(found)
         gain = before - after
         least = max(np.sqrt(gain.size) * gain.std(), (1.0 - (1.0 - by) ** 2) * before.sum())
         return bool(gain.sum() > least)
 
     def _by_block(self, z: Array) -> Array:
-        """Return the squared errors by block of time."""
+        """Return the squared errors per block of time."""
         parts = self.problem.errors(self.structure, z)[0][: len(self.problem.runs)]
         return np.array([float(block @ block) for part in _blocks(parts) for block in part])
 
     def _grams(self, z: Array, wanted: Mask, new: Mask | None = None) -> Array:
-        """Return the products of all slopes and of their target, by block of time."""
+        """Return the products of derivatives and target, per block of time."""
         parts, slopes = self.problem.errors(self.structure, z, wanted, new)
         parts = parts[: len(self.problem.runs)]  # without what is likely of starts
         slopes = slopes[: sum(part.size for part in parts)]
@@ -294,17 +296,17 @@ class Search:
         return np.array([block.T @ block for block in blocks])
 
     def _likely(self, z: Array, wanted: Mask) -> Array:
-        """Return the products of slopes of what is believed, and of their target."""
+        """Return the products of the prior's derivatives and target."""
         table = np.zeros((1, z.size + 1))
-        if self.belief is not None:
-            far, by = self.belief.errors(self.structure, z, wanted)
+        if self.prior_errors is not None:
+            far, by = self.prior_errors.errors(self.structure, z, wanted)
             table = np.zeros((far.size, z.size + 1))
             table[:, : by.shape[1]] = by
             table[:, -1] = by @ z[: by.shape[1]] - far
         return np.asarray(table.T @ table)
 
     def _bounded(self, size: int) -> Mask:
-        """Return which of all numbers are not negative."""
+        """Return which unknowns are non-negative."""
         bounded = np.zeros(size, dtype=bool)
         bounded[: self.structure.mix.shape[1]] = (
             self.structure.not_negative @ self.structure.mix > 0
@@ -315,7 +317,7 @@ class Search:
         return bounded
 
     def without_folds(self, z: Array) -> list[Array]:
-        """Return what a step finds without each part of the runs; nothing if physics allows none."""
+        """Return the steps without each fold; empty if none is feasible."""
         free = np.append(self.active, np.ones(z.size - self.active.size, dtype=bool))
         parts = _reduced(self._grams(z, self.active), free, z)
         likely = _reduced(self._likely(z, self.active)[np.newaxis], free, z)[0]
@@ -330,7 +332,7 @@ class Search:
         return found
 
     def _candidates(self, active: Mask, z: Array) -> Iterator[Mask]:
-        """Yield groups of terms that may be added to those that are active."""
+        """Yield candidate groups of terms beyond the active ones."""
         terms = self.structure.terms
 
         def group(*wanted: Term) -> Mask:
@@ -349,7 +351,9 @@ class Search:
         for kind, which, muscle in terms:
             if kind not in ("relaxation", "line", "mass") or muscle is not None:
                 continue
-            if (kind, which) in on or (kind == "relaxation" and not self._apart(which, active, z)):
+            if (kind, which) in on or (
+                kind == "relaxation" and not self._is_distinct(which, active, z)
+            ):
                 continue
             lag = [Term("lags", which)] * (kind == "relaxation")
             yield group(*lag, *self._with_own(kind, (which,), own))
@@ -378,29 +382,29 @@ class Search:
                 whiches += [("areas", 0)] if "areas" in kinds else []
                 yield group(*(Term(*one, k) for one in whiches for k in range(1, self.structure.n)))
 
-    def _apart(self, which: int, active: Mask, z: Array) -> bool:
-        """Tell whether a time constant is apart from those that are free, and in order with them."""
+    def _is_distinct(self, which: int, active: Mask, z: Array) -> bool:
+        """Return whether a time constant is distinct from the free ones, and in order."""
         terms = self.structure.terms
         places = [place for place, term in enumerate(terms) if term.kind == "lags"]
         apart = (
             (z[i] - z[places[which]]) * np.sign(terms[i].which - which) for i in places if active[i]
         )
-        return all(one > APART for one in apart)
+        return all(one > LEAST_SEPARATION for one in apart)
 
     def _with_own(self, kind: str, whiches: range | tuple[int, ...], own: set[str]) -> list[Term]:
-        """Return terms of a kind, and those by which muscles differ if they do."""
+        """Return terms of a kind, with differences between muscles if they are free."""
         muscles = [None, *(range(1, self.structure.n) if kind in own else ())]
         return [Term(kind, which, muscle) for which in whiches for muscle in muscles]
 
 
 def _blocks(parts: list[Array]) -> list[list[Array]]:
-    """Return the blocks of time of every run."""
+    """Return the time blocks of every run."""
     total = sum(len(part) for part in parts)
     return [np.array_split(part, max(1, round(BLOCKS * len(part) / total))) for part in parts]
 
 
 def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask, likely: Array) -> Array:
-    """Return the squared errors of every block by what least squares of the others find.
+    """Return the squared errors of every block under the least squares of the others.
 
     ``grams`` are products of slopes and target by block, and ``likely`` those of what is believed; what
     is not free is as it is.
@@ -418,7 +422,7 @@ def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask, likely: Array) 
 
 
 def _reduced(grams: Array, free: Mask, z: Array) -> Array:
-    """Return products of the slopes of what is free and of the target less what is fixed."""
+    """Return the products for free unknowns, with the target reduced by fixed ones."""
     fixed = np.flatnonzero(~free)
     keep = np.append(np.flatnonzero(free), grams.shape[1] - 1)
     parts = grams[:, keep][:, :, keep].copy()

@@ -1,4 +1,4 @@
-"""How a balance of forces runs, and how that moves with its coefficients and shape, exactly.
+"""Simulation of a force balance with exact derivatives by its parameters.
 
 Either free, where its coordinates are what matters, or held where they were measured, where the forces
 that it then lacks are: those are linear, and memory does not depend on coefficients. The direct slopes
@@ -40,20 +40,20 @@ from mckibben.blocks.solving import eliminate
 
 @kernel
 def mix(to: Array, kept: float, share: float, row: Array) -> None:
-    """Keep a share of some numbers, and add a share of others: the one loop over all coefficients."""
+    """Form a weighted sum in place, over all coefficients."""
     for i in range(to.size):
         to[i] = kept * to[i] + share * row[i]
 
 
 @kernel
 def n_shape(c: Array) -> int:
-    """Return how many columns of slopes are shape, before those of what acts on pressures."""
+    """Return the number of derivative columns of nonlinear parameters, before the front's."""
     return 2 + int(c[2]) + int(c[6]) + int(c[1]) * int(c[9])
 
 
 @kernel
 def by_coupling(c: Array, j: int, q: Array, x: Array, places: int, slopes: Array) -> None:
-    """Fill how the force on coordinate j moves with its own coefficients, and places of obstacles."""
+    """Fill derivatives of the force on coordinate j by its coefficients and obstacle positions."""
     m, n_x, degree, n_loads = int(c[1]), int(c[2]), int(c[3]), int(c[4])
     place = coordinate_at(c, j) - coordinate_at(c, 0)
     mix(slopes, 0.0, 0.0, slopes)
@@ -85,7 +85,7 @@ def by_coupling(c: Array, j: int, q: Array, x: Array, places: int, slopes: Array
 def by_limit(
     c: Array, i: int, s: float, p: float, x: Array, dp: Array, share: float, to: Array
 ) -> None:
-    """Add a share of how a stop i moves with shape where it slides, from column 0 of it on."""
+    """Add a share of a sliding stop's derivatives by nonlinear parameters, from column 0 on."""
     n_x = int(c[2])
     upper = c[HEAD + i]
     if s < 0.0:
@@ -115,7 +115,7 @@ def by_shape(
     late: Array,
     to: Array,
 ) -> None:
-    """Add how the force of a taut muscle moves with shape where its past stays, and fill that of lags.
+    """Add a taut muscle's derivatives by nonlinear parameters at fixed past, and fill those of lags.
 
     ``terms`` and ``slopes`` are its own; ``to`` begins with the shape; ``late`` has a number a lag.
     """
@@ -147,7 +147,7 @@ def by_shape(
 
 @kernel
 def through_past(c: Array, k: int, slopes: Array, past: Array, moved: Array, to: Array) -> None:
-    """Add how the force of muscle k moves through its past, of which ``past`` has the slopes.
+    """Add derivatives of the force of muscle k through its past, given in ``past``.
 
     ``slopes`` are those of its terms by its shortening, and ``moved`` those of its last shortening.
     """
@@ -184,7 +184,7 @@ def carry(
     moved: Array,
     now: Array,
 ) -> None:
-    """Bring the slopes of the past of muscle k to where ``state`` is already."""
+    """Update the derivatives of the past of muscle k to the current state."""
     n, m, n_s, n_l = int(c[0]), int(c[1]), int(c[5]), int(c[6])
     grown = friction_pressure(c, p, x) if way != AT_REST else 0.0
     for i in range(n_s):
@@ -227,7 +227,7 @@ def move(
     slopes: Array,
     work: Array,
 ) -> None:
-    """Make one move, free or held, with all slopes; found are coordinates, or what forces lack.
+    """Advance one step, free or held, with all derivatives.
 
     Slopes of no columns are not computed. ``past`` begins with the slopes of coordinates; ``rows`` has
     two rows a muscle to compute in.
@@ -311,7 +311,7 @@ def follow(
     found: Array,
     slopes: Array,
 ) -> None:
-    """Run to every sample; keep every so manieth.
+    """Simulate all samples; store every n-th.
 
     Parameters
     ----------
@@ -385,7 +385,7 @@ def run(
     sloped: bool = True,
     begun: Array | None = None,
 ) -> tuple[Array, Array]:
-    """Return what `follow` finds, of whose every so many samples the last is kept, and the slopes."""
+    """Return the results of `follow` at every n-th sample, and the derivatives."""
     n, m, n_s, n_l = (int(c[i]) for i in (0, 1, 5, 6))
     moves = 2 if c[18] else 0
     n_states = n * (1 + n_s + n_l + moves) + 2 * m + 2

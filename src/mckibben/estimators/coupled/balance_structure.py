@@ -1,4 +1,4 @@
-"""The terms that a balance of forces may have, as numbers to find, and what physics asks of them.
+"""Structure of a force balance: candidate terms, their parameters, and physical constraints.
 
 Values are the linear coefficients of the block, in the order of `mckibben.blocks.coupled.balance_law`
 from those of the first coordinate on, then its shape: what is not linear. What is free is fewer numbers,
@@ -28,22 +28,23 @@ Places = NDArray[np.intp]
 Item = TypeVar("Item")
 
 LEAST_AREA = 1e-9
-"""Area at rest that is next to none, relative to what is about that of a muscle."""
+"""Smallest area at rest, relative to a muscle's typical area."""
 
 LEAST_STIFF = 1e-3
-"""Stiffness that has to be left, relative to the force of the highest pressure over the stroke."""
+"""Smallest stiffness, relative to the force at the highest pressure over the stroke."""
 
 MOST_ASYMMETRIC, MOST_GRIP, MOST_WALL = 5.0, 4.0, 0.1
-"""Bounds of the ratio of limits; of the grip, over the highest pressure; of the wall's stretch by that
-pressure, over the stroke."""
+"""Bounds of the ratio of friction limits; of the friction offset, over the highest pressure; of the
+wall's stretch at that pressure, over the stroke.
+"""
 
 LONGEST_AIR = 2.0
-"""Time constant of air in front [s]."""
+"""Largest time constant of the air in front [s]."""
 
 
 @dataclass(frozen=True)
 class Bench:
-    """What the recordings settle before anything is found.
+    """Set-up from the recordings.
 
     Parameters
     ----------
@@ -96,39 +97,39 @@ class Bench:
 
     @property
     def directed(self) -> bool:
-        """Whether muscles shorten along directions, not each by a coordinate of its own."""
+        """Whether muscles act along directions, not each on a separate coordinate."""
         n, m = self.directions.shape
         return n != m or not bool((self.directions == np.eye(n)).all())
 
     @property
     def unit(self) -> float:
-        """Area that is about that of a muscle."""
+        """Typical area of a muscle."""
         return self.heaviest / self.highest if self.of_force else 1.0
 
     @property
     def scale(self) -> float:
-        """Largest shortening known [mm]."""
+        """Largest known shortening [mm]."""
         return float(np.abs(self.hull).max())
 
     @property
     def stroke(self) -> float:
-        """Largest range of a shortening known [mm]."""
+        """Largest known range of a shortening [mm]."""
         return float(np.ptp(self.hull, axis=1).max())
 
     @property
     def largest(self) -> Array:
-        """Largest of what schedules, 1 where that is 0."""
+        """Largest magnitude of scheduling inputs, 1 if that is 0."""
         most = np.abs(self.levels).max(axis=1)
         return np.where(most > 0, most, 1.0)
 
     def corners(self) -> list[Array]:
-        """Return what schedules, at all its ends and between."""
+        """Return the scheduling inputs at all combinations of their ends."""
         low, high = self.levels.T
         return [low + np.array(s) * (high - low) for s in product((0.0, 0.5, 1.0), repeat=len(low))]
 
 
 class Term(NamedTuple):
-    """A number that is free: its kind, which of that kind, and of which muscle alone, if of one."""
+    """A free parameter: its kind, its index, and its muscle, if of one."""
 
     kind: str
     which: int = 0
@@ -137,7 +138,7 @@ class Term(NamedTuple):
 
 @dataclass(frozen=True)
 class Structure:
-    """Sizes of a balance, and what of it is free.
+    """Sizes of a balance, and its free terms.
 
     Parameters
     ----------
@@ -167,22 +168,22 @@ class Structure:
 
     @property
     def n(self) -> int:
-        """Muscles."""
+        """Number of muscles."""
         return len(self.bench.given)
 
     @property
     def m(self) -> int:
-        """Coordinates."""
+        """Number of coordinates."""
         return len(self.bench.driven)
 
     @property
     def n_stops(self) -> int:
-        """Stops of every muscle."""
+        """Number of stops per muscle."""
         return len(self.limits)
 
     @property
     def n_lags(self) -> int:
-        """Time constants."""
+        """Number of time constants."""
         return len(self.lags)
 
     @cached_property
@@ -199,27 +200,27 @@ class Structure:
         return _slices(widths | {"friction": len(self.limits), "relaxation": len(self.lags)})
 
     def on(self, name: str, j: int) -> Places:
-        """Return the places of coefficients of a coordinate among all."""
+        """Return the indices of a coordinate's coefficients."""
         part, width = self._coordinate[name], self._coordinate["met"].stop
         return np.arange(part.start, part.stop) + j * width
 
     def of(self, name: str, k: int) -> Places:
-        """Return the places of coefficients of a muscle among all."""
+        """Return the indices of a muscle's coefficients."""
         part, width = self._muscle[name], self._muscle["relaxation"].stop
         return np.arange(part.start, part.stop) + k * width + self.m * self._coordinate["met"].stop
 
     @cached_property
     def n_linear(self) -> int:
-        """How many linear coefficients there are, with what stands between them."""
+        """Number of linear coefficients, including unused ones between."""
         return self.n * self._muscle["relaxation"].stop + self.m * self._coordinate["met"].stop
 
     def spring(self, q: int, j: int, i: int) -> int:
-        """Return the place of a spring of coordinate j to i, or, of i = -1, of its constant."""
+        """Return the index of the spring from coordinate j to i, or of its constant for i = -1."""
         return int(self.on("springs", j)[q * (1 + self.m) + 1 + i])
 
     @cached_property
     def shape(self) -> dict[str, slice]:
-        """Where the shape is, behind the linear coefficients.
+        """Index of the nonlinear parameters, after the linear coefficients.
 
         The grip [bar]; what friction grows with by schedules; the logarithms of the ratio of limits and
         of the lags; stretch of walls [mm/bar], forces at which muscles go slack, places of obstacles;
@@ -234,11 +235,11 @@ class Structure:
 
     @property
     def size(self) -> int:
-        """How many values there are."""
+        """Number of values."""
         return self.shape["contact"].stop
 
     def shaped(self, values: Array, name: str) -> Array:
-        """Return the numbers of a kind of shape."""
+        """Return the nonlinear parameters of a kind."""
         found = values[self.shape[name]]
         return np.exp(found) if name in LOGARITHMIC else found
 
@@ -246,7 +247,7 @@ class Structure:
 
     @cached_property
     def _columns(self) -> list[tuple[Term, list[int]]]:
-        """Every linear number that may be free, and the places of the coefficients that are it."""
+        """All linear parameters that may be free, and the indices of their coefficients."""
         found: list[tuple[Term, list[int]]] = []
         for q, j in product(range(1 + len(self.bench.scheduled) * self.degree), range(self.m)):
             if q or not self.bench.tare:  # coordinates from rest make a constant of their own
@@ -271,7 +272,7 @@ class Structure:
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
-        """What may be free, linear numbers first, then the shape."""
+        """Candidate terms, linear first, then nonlinear."""
         shape = [
             Term(name, which) for name, p in self.shape.items() for which in range(p.stop - p.start)
         ]
@@ -279,7 +280,7 @@ class Structure:
 
     @cached_property
     def mix(self) -> Array:
-        """How linear coefficients follow from what is free of them, shape (linear, free)."""
+        """Matrix from free parameters to linear coefficients, shape (linear, free)."""
         mix = np.zeros((self.n_linear, len(self._columns)))
         for number, (_, places) in enumerate(self._columns):
             mix[places, number] = 1.0
@@ -287,7 +288,7 @@ class Structure:
 
     @cached_property
     def base(self) -> Array:
-        """Linear coefficients where nothing is free: areas at rest or the load 1, all others 0."""
+        """Linear coefficients with nothing free: areas at rest or the load 1, all others 0."""
         values = np.zeros(self.n_linear)
         if self.bench.of_force:
             values[self.on("loads", 0)] = 1.0
@@ -296,13 +297,13 @@ class Structure:
         return values
 
     def free(self, name: str) -> slice:
-        """Return where a kind of shape is among what is free."""
+        """Return the indices of a kind of nonlinear parameter among the free ones."""
         part, shift = self.shape[name], self.mix.shape[1] - self.n_linear
         return slice(part.start + shift, part.stop + shift)
 
     @cached_property
     def not_negative(self) -> NDArray[np.bool_]:
-        """Which linear coefficients are not negative."""
+        """Which linear coefficients are non-negative."""
         found = np.zeros(self.n_linear, dtype=bool)
         for kind, k in product(NOT_NEGATIVE, range(self.n)):
             found[self.of(kind, k)] = True
@@ -311,12 +312,12 @@ class Structure:
         return found
 
     def expanded(self, free: Array) -> Array:
-        """Return values of what is free."""
+        """Return all values from the free ones."""
         n = self.mix.shape[1]
         return np.concatenate([self.base + self.mix @ free[:n], free[n:]])
 
     def begin(self, grip: float) -> Array:
-        """Return what is free where nothing was found yet: the shape that does nothing, but the grip."""
+        """Return initial free parameters: without effect, except the friction offset."""
         free = np.zeros(len(self.terms))
         put: dict[str, ArrayLike] = {"grip": grip, "lags": np.log(self.lags), "pushes": NEVER}
         low = self.bench.lowest[:, np.newaxis]
@@ -326,7 +327,7 @@ class Structure:
         return free
 
     def moved_to(self, other: Structure, free: Array, behind: Array | None = None) -> Array:
-        """Return what is free in another structure, where this has it not what is ``behind``."""
+        """Return the free parameters in another structure, with ``behind`` where it has others."""
         found = other.begin(0.0) if behind is None else behind[: len(other.terms)].copy()
         named: dict[tuple[object, ...], list[float]] = {}
         for key, number in zip(self.keys, free.tolist(), strict=True):
@@ -338,7 +339,7 @@ class Structure:
 
     @cached_property
     def keys(self) -> list[tuple[object, ...]]:
-        """Names by which structures share what may be free: limits, lags and obstacles by theirs."""
+        """Names by which structures share parameters: limits, lags and obstacles by their own."""
         by: dict[str, Sequence[object]] = {"friction": self.limits, "relaxation": self.lags}
         by |= {"lags": self.lags, "obstacle": self.obstacles, "places": self.m * self.obstacles}
         return [
@@ -347,7 +348,7 @@ class Structure:
         ]
 
     def scales(self) -> Array:
-        """Return how much is much of everything that may be free, beside an area at rest of 1."""
+        """Return the scales of all free parameters, relative to an area at rest of 1."""
         bench = self.bench
         force = bench.highest * bench.unit
         stiff = force / bench.scale
@@ -362,7 +363,7 @@ class Structure:
         return np.append(self.mix.T @ linear / self.mix.sum(axis=0), self.ends()[2])
 
     def ends(self) -> tuple[Array, Array, Array]:
-        """Return lowest and highest values of the shape, and how much of it is much."""
+        """Return bounds of the nonlinear parameters, and their scales."""
         bench = self.bench
         much = bench.scale / bench.highest
         per_x = bench.highest / bench.largest
@@ -389,7 +390,7 @@ class Structure:
     # -- block -----------------------------------------------------------------------------------
 
     def block(self, values: Array, *, final: bool = False) -> Balance:
-        """Return the balance of some values, without what acts in front of it.
+        """Return the balance of given values, without its front.
 
         In the ``final`` one springs of muscles' own are among those of coordinates, unless they can go
         slack with them, and what does nothing is left out.
@@ -440,13 +441,13 @@ class Structure:
         )
 
     def met(self, values: Array, j: int) -> Array:
-        """Return place and stiffnesses of what a coordinate meets, shape (obstacles, 2 + schedules)."""
+        """Return position and stiffnesses of obstacles, shape (obstacles, 2 + schedules)."""
         table = values[self.on("met", j)].reshape(-1, 3 + len(self.bench.scheduled))
         places = self.shaped(values, "places").reshape(self.m, len(table))[j]
         return np.column_stack([places, np.maximum(table[:, 2:], 0.0)])
 
     def coefficients(self, values: Array, sample_time: float) -> Array:
-        """Return the coefficients of the block, whose lines have terms even where they are nothing."""
+        """Return the coefficients of the block, including zero terms."""
         c = self.block(values).coefficients(sample_time)
         linear = c[c.size - self.n_linear :]
         least = 1e-12 * self.bench.unit * self.bench.highest / self.bench.scale
@@ -455,7 +456,7 @@ class Structure:
         return c
 
     def needed(self, active: Collection[Term]) -> Structure:
-        """Return the structure without stops, lags, obstacles and powers of which none is active."""
+        """Return the structure without inactive stops, lags, obstacles and powers."""
         kept = {(term.kind, term.which) for term in active}
 
         def chosen(kind: str, items: tuple[Item, ...]) -> tuple[Item, ...]:
@@ -479,11 +480,11 @@ class Structure:
 
     @property
     def least_stiffness(self) -> float:
-        """Least stiffness that has to be left."""
+        """Smallest admissible stiffness."""
         return LEAST_STIFF * self.bench.unit * self.bench.highest / self.bench.scale
 
     def conditions(self, values: Array) -> tuple[Array, Array]:
-        """Return what physics asks of linear coefficients: sides @ coefficients >= least.
+        """Return the physical constraints of linear coefficients: sides @ coefficients >= least.
 
         Shapes (c, linear) and (c,). What friction takes of an area is taken with the shape as it is.
         """
@@ -521,12 +522,12 @@ class Structure:
         return np.array(sides), np.array(least)
 
     def powers(self, x: Array) -> Array:
-        """Return the powers of what schedules, shape (1 + powers, ...), that springs multiply."""
+        """Return the powers of scheduling inputs, shape (1 + powers, ...), that multiply springs."""
         powers = [v**d for v in x for d in range(1, self.degree + 1)]
         return np.array([np.ones(x.shape[1:]), *powers])
 
     def spring_side(self, x: Array, direction: Array) -> Array:
-        """Return the side that asks of springs to be stiff along a direction."""
+        """Return the constraint that springs are stiff along a direction."""
         row = np.zeros(self.n_linear)
         for q, power in enumerate(self.powers(x)):
             for j, i in product(range(self.m), repeat=2):
@@ -534,7 +535,7 @@ class Structure:
         return row
 
     def softest(self, values: Array) -> tuple[Array, float]:
-        """Return where springs are softest: what asks them to be stiff there, and how stiff they are."""
+        """Return where springs are softest: the constraint there, and the stiffness."""
         found: list[tuple[float, Array, Array]] = []
         springs = np.array([values[self.on("springs", j)] for j in range(self.m)])
         springs = springs.reshape(self.m, -1, 1 + self.m)[:, :, 1:]
@@ -547,13 +548,13 @@ class Structure:
 
 
 LOGARITHMIC = ("lags", "asymmetry", "venting")
-"""Shape that is found by its logarithm."""
+"""Nonlinear parameters searched by their logarithm."""
 
 OF_MUSCLES = ("damping", "line", "mass", "bladder", "elasticity", "areas", "friction", "relaxation")
-"""Kinds of linear numbers of muscles."""
+"""Kinds of linear parameters of muscles."""
 
 NOT_NEGATIVE = ("damping", "line", "mass", "bladder", "friction", "relaxation")
-"""Those that are not negative."""
+"""Those that are non-negative."""
 
 
 def _slices(widths: dict[str, int], first: int = 0) -> dict[str, slice]:

@@ -1,4 +1,4 @@
-"""What a balance of forces says of muscles: only what its own response shows, and recordings determine.
+"""Notes on a fitted balance: responses that the recordings determine, and doubtful data.
 
 A number varies as a step without each fifth of recordings finds it (jackknife), and as two displacements
 do that the model misses. One that is not known within a factor of two is not said.
@@ -24,20 +24,20 @@ from mckibben.numerals import numeral
 from mckibben.statistics import NORMAL_95
 
 POOR = 0.1
-"""Error relative to the range from which a model is said not to explain the recordings."""
+"""Relative error above which a note states that the model does not explain the recordings."""
 
 WORSE = 3.0
-"""Times the error of the others from which a recording's is said."""
+"""Error of a recording, relative to the others, above which a note states it."""
 
 AMPLITUDE, QUARTER = 0.25, 100
-"""Of loops, relative to the range of a pressure; samples of a quarter of one."""
+"""Amplitude of test loops, relative to the pressure range; samples in a quarter of one."""
 
 DETERMINED = 0.25
-"""Standard error, relative to a number, up to which it is said: twice that is a factor of two."""
+"""Largest relative standard error of a number that is stated: a factor of two at 95 %."""
 
 
 class Measured(NamedTuple):
-    """A number of muscles: one of `KINDS`, of an input and an output, its standard error and unit."""
+    """A response of muscles: one of `KINDS`, of an input and an output, its standard error and unit."""
 
     kind: str
     place: int
@@ -48,7 +48,7 @@ class Measured(NamedTuple):
 
 
 def trial_of(data: TrainingData) -> Trial:
-    """Return loops and steps like those of recordings: within their ranges, of half their length."""
+    """Return test loops and steps like those of the recordings: within their ranges, half as long."""
     low, high, x = np.minimum(data.lowest, 0.0), data.highest, data.stacked("scheduled")
     loads = np.array([channel.unit in LOADS for channel in data.scheduled], dtype=bool)
     middles = np.where(loads, 0.5 * (x.min(axis=0) + x.max(axis=0)), np.median(x, axis=0))
@@ -65,7 +65,7 @@ def trial_of(data: TrainingData) -> Trial:
 def measured(
     search: Search, z: Array, others: list[Array], model: Callable[[Array], Block]
 ) -> tuple[Trial, list[Measured]]:
-    """Return how the model of numbers z is asked, and what of its response recordings determine."""
+    """Return the test responses, and those that the recordings determine."""
     trial = trial_of(search.problem.data)
     if _faster(trial, search.problem.data):
         return trial, []
@@ -101,7 +101,7 @@ def measured(
 
 
 def _faster(trial: Trial, data: TrainingData) -> bool:
-    """Tell whether loops are faster than pressures ever were, so that nothing is known of them."""
+    """Return whether test loops are faster than the recordings."""
     steps = [
         np.abs(np.diff(run.driven, axis=0)).max(axis=0) / run.sample_time
         for run in data.runs
@@ -112,7 +112,7 @@ def _faster(trial: Trial, data: TrainingData) -> bool:
 
 
 def _missed(search: Search, z: Array) -> Array:
-    """Return the root mean square error of every output where muscles move, shape (m,)."""
+    """Return the root mean square error of every output in motion, shape (m,)."""
     problem, structure = search.problem, search.structure
     errors = zip(problem.runs, problem.errors(structure, z)[0], strict=False)
     moved = [one for run, one in errors if not problem.still(run)] or [np.full(structure.m, np.nan)]
@@ -121,7 +121,7 @@ def _missed(search: Search, z: Array) -> Array:
 
 
 def said_of(trial: Trial, one: Measured) -> str:
-    """Return a number as a sentence."""
+    """Return a response as a sentence."""
     channel, output = (*trial.pressures, *trial.others)[one.place], trial.outputs[one.output]
     middle, swing = (numeral(v[one.place], 3) for v in (trial.middle, trial.swing))
     within = f" in {numeral(trial.seconds, 2)} s" if trial.seconds else ""
@@ -141,17 +141,17 @@ def said_of(trial: Trial, one: Measured) -> str:
 
 
 def sentences(search: Search, z: Array, others: list[Array], balance: Balance) -> list[str]:
-    """Return what is said of recordings and loads."""
+    """Return notes on recordings and loads."""
     return [*_of_runs(search, z), *_of_loads(search, z, others, balance)]
 
 
 def _of_runs(search: Search, z: Array) -> list[str]:
-    """Return what is said of recordings that are followed badly, or begin elsewhere."""
+    """Return notes on recordings with large errors, or another start."""
     problem, structure = search.problem, search.structure
     parts = problem.errors(structure, z)[0][: len(problem.runs)]
     sizes = np.array([float(np.sqrt(np.mean(part**2))) for part in parts])
     found = [
-        f"{run.name} is followed {size / np.median(np.delete(sizes, place)):.2g} times worse than others"
+        f"the error of {run.name} is {size / np.median(np.delete(sizes, place)):.2g} times the median"
         for place, (run, size) in enumerate(zip(problem.runs, sizes.tolist(), strict=True))
         if len(sizes) > 1 and size > WORSE * np.median(np.delete(sizes, place))
     ]
@@ -171,13 +171,13 @@ def _of_runs(search: Search, z: Array) -> list[str]:
 
 
 def _of_loads(search: Search, z: Array, others: list[Array], balance: Balance) -> list[str]:
-    """Return what is said of loads: those that were found, and those that seem to push."""
+    """Return notes on estimated loads, and on loads that seem to push."""
     found: list[str] = []
     for j, channel in enumerate(balance.scheduled[balance.n_schedules :]):
         share = np.array(balance.loads)[:, j]
         if (share < 0.0).all():
             found.append(
-                f"{channel.name} acts as if it helped the muscles: the more it is, the further they "
+                f"{channel.name} acts as if it helped the muscles: the larger it is, the further they "
                 "move at equal pressures. If it pulls against them, its sign is wrong: give "
                 "loads that pull muscles longer as positive"
             )

@@ -1,4 +1,4 @@
-"""Estimators of several muscles that move one another, or of a muscle and its load."""
+"""Estimators of coupled muscles, or of a muscle and its load."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed
 
 SCHEDULES = ("pressure_extensor", "force", "torque")
-"""Channels that schedule a model by default, where there are any."""
+"""Default scheduling channels."""
 
 LOADS = ("N", "N*m")
-"""Units of what loads muscles, or a joint that they move, instead of scheduling springs."""
+"""Units of loads on muscles or a joint, which are not scheduling inputs."""
 
 MOVES = 0.1
-"""An input moves in a run where it covers this share of the range it has over all runs."""
+"""Share of its range over all runs that an input must cover to move in a run."""
 
 RESTS = 0.03
-"""An input rests where it stays below this share of that range above its lowest value."""
+"""Share of that range above the lowest value below which an input is at rest."""
 
 FEWEST_SAMPLES = 50
-"""Fewer samples than this in a row identify nothing of several muscles."""
+"""Smallest number of successive samples for several muscles."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -56,27 +56,28 @@ class CoupledEstimator(Estimator):
     scheduling: tuple[str, ...] | None = None
 
     paired: ClassVar[bool] = True
-    """Whether there must be an output to every input."""
+    """Whether every input must have an output."""
 
     fewer_outputs: ClassVar[bool] = False
-    """Whether there may be fewer of them, nevertheless."""
+    """Whether there may still be fewer outputs than inputs."""
 
     alone: ClassVar[bool] = False
-    """Whether it is a model of one muscle under no measured load, too."""
+    """Whether it also models one muscle without a measured load."""
 
     unmeasured: ClassVar[bool] = False
-    """Whether recordings may lack a channel that schedules and that others have."""
+    """Whether recordings may lack a scheduling channel that others have."""
 
     through: ClassVar[bool] = False
-    """Whether it runs through what does not count, so that memory there is right; else stretches of
-    what counts each begin with a memory of their own."""
+    """Whether ignored samples are simulated too, so that the memory after them is right; otherwise
+    each segment starts with its own memory.
+    """
 
     each_alone: ClassVar[bool] = False
     """Whether every muscle must move alone in some run."""
 
     fewest_inputs: ClassVar[int] = 1
     most_inputs: ClassVar[float] = np.inf
-    """How many muscles there may be."""
+    """Maximum number of muscles."""
 
     @classmethod
     def objection(
@@ -96,9 +97,7 @@ class CoupledEstimator(Estimator):
         for name in scheduled:
             lacking = [recording.name for recording in recordings if name not in recording]
             if lacking and not cls.unmeasured:
-                return (
-                    f"it is told {name}, which {lacking[0]} lacks: give it there, or leave it out"
-                )
+                return f"it takes {name} as an input, which {lacking[0]} lacks: add it, or leave it out"
         if (
             not cls.alone
             and len(inputs) == len(outputs) == 1
@@ -116,7 +115,7 @@ class CoupledEstimator(Estimator):
 
     @classmethod
     def fits(cls, n_inputs: int, n_outputs: int) -> bool:
-        """Tell whether there may be so many of both."""
+        """Return whether the numbers of inputs and outputs are allowed."""
         fewer = cls.fewer_outputs and n_outputs < n_inputs
         return fewer or not cls.paired or n_inputs == n_outputs
 
@@ -127,13 +126,13 @@ class CoupledEstimator(Estimator):
         outputs: Sequence[str],
         scheduling: Sequence[str] | None = None,
     ) -> dict[str, Any]:
-        told = None if scheduling is None else tuple(scheduling)
-        return {"input": tuple(inputs), "output": tuple(outputs), "scheduling": told}
+        named = None if scheduling is None else tuple(scheduling)
+        return {"input": tuple(inputs), "output": tuple(outputs), "scheduling": named}
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
-        """Return what is learned from recordings, their channels found by name where not given."""
+        """Return the training data, with channels found by name if not given."""
         every = listed(recordings)
         if not every:
             raise DataError("there are no recordings", remedy="give at least one")
@@ -190,26 +189,26 @@ class CoupledEstimator(Estimator):
 
     @property
     def pairs(self) -> bool:
-        """Whether these settings need an output to every input."""
+        """Whether these settings need one output per input."""
         return self.paired
 
     @property
     def spans(self) -> tuple[float, ...] | None:
-        """Ranges of the outputs, if they are known before."""
+        """Ranges of the outputs, if known in advance."""
         return None
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data without channels that it does not use."""
+        """Return the identified block, and the data without unused channels."""
         block = self.identify(data, tracker)
         return block, of_channels(data, block.scheduling)
 
     @abstractmethod
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        """Return the block found."""
+        """Return the identified block."""
 
 
 def of_channels(data: TrainingData, names: Sequence[str]) -> TrainingData:
-    """Return data with some of the channels that schedule, in that order."""
+    """Return data with some of the scheduling channels, in that order."""
     known = [channel.name for channel in data.scheduled]
     places = [known.index(name) for name in names]
     runs = tuple(replace(run, scheduled=run.scheduled[:, places]) for run in data.runs)
@@ -217,7 +216,7 @@ def of_channels(data: TrainingData, names: Sequence[str]) -> TrainingData:
 
 
 def bridged(data: TrainingData) -> TrainingData:
-    """Return the runs up to their last outputs that count, with likely ones for those that do not.
+    """Return the runs up to their last scored output, with unscored outputs interpolated.
 
     These go straight with the inputs, as those that count do, and meet them on either side.
     """
@@ -244,7 +243,7 @@ def alone(data: TrainingData, place: int) -> list[Run]:
 
 
 def moves_alone(driven: Array, place: int, lowest: Array, highest: Array) -> bool:
-    """Tell whether one input moves and all others rest.
+    """Return whether one input moves and all others rest.
 
     Parameters
     ----------
@@ -260,21 +259,21 @@ def moves_alone(driven: Array, place: int, lowest: Array, highest: Array) -> boo
 
 
 def _never_alone(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:
-    """Return which muscle moves alone in no run, or None."""
+    """Return a muscle that never moves alone, or None."""
     driven = [recording.matrix(inputs) for recording in recordings]
     lowest = np.min([run.min(axis=0) for run in driven], axis=0)
     highest = np.max([run.max(axis=0) for run in driven], axis=0)
     for place, name in enumerate(inputs):
         if not any(moves_alone(run, place, lowest, highest) for run in driven):
             return (
-                f"{name} moves alone in no run, so hysteresis cannot be told from coupling: add a run "
-                "in which the other inputs rest"
+                f"{name} moves alone in no run, so hysteresis and coupling cannot be distinguished: add "
+                "a run in which the other inputs rest"
             )
     return None
 
 
 def driving(recording: Recording) -> tuple[str, ...]:
-    """Return the channels that drive the muscles of a recording, by name, the pressure first."""
+    """Return the driving channels of a recording, by name, pressure first."""
     several = numbered(recording, "pressure") or numbered(recording, "voltage")
     return several or one(recording, "pressure", "voltage")
 
@@ -288,12 +287,12 @@ def moved(recording: Recording) -> tuple[str, ...]:
 def in_any(
     recordings: Sequence[Recording], named: Callable[[Recording], tuple[str, ...]]
 ) -> tuple[str, ...]:
-    """Return the channels of so many muscles as any recording has, whichever comes first."""
+    """Return the channels of so many muscles that any recording has."""
     return max((named(recording) for recording in recordings), key=len)
 
 
 def schedules(recordings: Sequence[Recording], others: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the channels of any recording that schedule a model by default, others excepted.
+    """Return the default scheduling channels of any recording, with exceptions.
 
     Of forces and torques there may be several, with numbers.
     """
@@ -307,7 +306,7 @@ def schedules(recordings: Sequence[Recording], others: Sequence[str] = ()) -> tu
 
 
 def loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tuple[str, ...]:
-    """Return the forces beside other inputs: loads, which are given, and nobody commands."""
+    """Return forces that are loads: given, and not commanded."""
     found = tuple(
         name
         for name in inputs

@@ -1,4 +1,4 @@
-"""Identification of fuzzy networks: antecedents searched on some samples, consequents solved for on all.
+"""Identification of fuzzy networks: antecedents by search, consequents by least squares.
 
 Consequents are linear and solved for by least squares, whatever the antecedents; only the centres and
 widths of the sets are searched: by variable projection (Kaufman's form, with Levenberg-Marquardt steps
@@ -21,28 +21,28 @@ from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
 LIGHTEST = 1e-11
-"""Damping of every consequent, relative to the size of what it multiplies."""
+"""Smallest ridge of a consequent, relative to its regressor."""
 
 NARROWEST, WIDEST = 0.15, 1.5
 """Widths of sets, relative to the range of their input."""
 
 STAYING = 1e-3
-"""How strongly sets stay where they start, relative to the error there, if errors hardly change."""
+"""Weight that holds sets near their start, relative to the error there."""
 
 MOST_STEPS = 15
-"""Of variable projection."""
+"""Maximum number of steps of variable projection."""
 
 LEAST_GAIN = 2e-4
-"""Share of the squared error that a step has to gain for another to follow."""
+"""Smallest relative reduction of the squared error for another step."""
 
 ATTRACTION, INERTIA = 0.5, 0.7
-"""Of the swarm: c_1 and c_2 as printed, and the inertia."""
+"""Particle swarm: c_1 and c_2 as printed, and the inertia."""
 
 LEAST_WIDTH = 1e-3
-"""Of a set in the swarm; the sign of a width means nothing, since only its square is used."""
+"""Smallest width of a set in the swarm; its sign has no meaning, as only its square is used."""
 
 PART = 8192
-"""Samples whose regressors are in memory at once."""
+"""Number of samples whose regressors are in memory at once."""
 
 Method = Literal["ls", "pso"]
 
@@ -56,7 +56,7 @@ class Sets:
 
     @classmethod
     def even(cls, low: Array, high: Array, n: int) -> Sets:
-        """Return sets spread evenly over the range of every input."""
+        """Return sets evenly spaced over the range of every input."""
         span = high - low
         places = np.linspace(0.0, 1.0, n) if n > 1 else np.array([0.5])
         widths = np.repeat(span[:, np.newaxis] * 0.6 / max(n - 1, 1), n, axis=1)
@@ -81,7 +81,7 @@ def memberships(x: Array, sets: Sets) -> Array:
 
 
 def firing(phi: Array) -> Array:
-    """Return the normalised firing of every rule, the last input's set running fastest."""
+    """Return the normalised firing strength of every rule, the last input's set running fastest."""
     fired = phi[:, 0]
     for i in range(1, phi.shape[1]):
         fired = (fired[:, :, np.newaxis] * phi[:, i, np.newaxis, :]).reshape(len(phi), -1)
@@ -89,19 +89,19 @@ def firing(phi: Array) -> Array:
 
 
 def linear_terms(x: Array, constants: bool) -> Array:
-    """Return what a consequent multiplies: the inputs, and one where there are constants."""
+    """Return the regressors of a consequent: the inputs, and 1 if there are constants."""
     return np.column_stack([x, np.ones(len(x))]) if constants else x
 
 
 def regressors(x: Array, fired: Array, constants: bool) -> Array:
-    """Return what all consequents multiply, shape (n, rules * terms)."""
+    """Return the regressors of all consequents, shape (n, rules * terms)."""
     terms = linear_terms(x, constants)
     return (fired[:, :, np.newaxis] * terms[:, np.newaxis, :]).reshape(len(x), -1)
 
 
 @dataclass(frozen=True)
 class Consequents:
-    """How consequents are solved for.
+    """Least squares of consequents.
 
     A rule's consequent is what all rules have in common plus a deviation of its own, and deviations are
     damped: where the data say nothing, the network is then nearly linear rather than anything at all,
@@ -139,18 +139,18 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Problem:
-    """Inputs x (n, inputs) and outputs y (n, outputs) to which antecedents are searched."""
+    """Inputs x (n, inputs) and outputs y (n, outputs) for the antecedents."""
 
     x: Array
     y: Array
     solver: Consequents
 
     def columns(self, sets: Sets) -> Array:
-        """Return what the consequents multiply, shape (n, rules * terms)."""
+        """Return the regressors of the consequents, shape (n, rules * terms)."""
         return regressors(self.x, firing(memberships(self.x, sets)), self.solver.constants)
 
     def errors(self, sets: Sets, held: Problem | None = None) -> Array:
-        """Return the errors, consequents solved for, here or on held-out data, shape (n, outputs)."""
+        """Return the errors with optimal consequents, here or on held-out data, shape (n, outputs)."""
         columns = self.columns(sets)
         consequents = self.solver.fit(self.x, columns, self.y)
         if held is None:
@@ -158,17 +158,17 @@ class Problem:
         return np.asarray(held.columns(sets) @ consequents - held.y)
 
     def cost(self, sets: Sets, held: Problem | None = None) -> float:
-        """Return the root of the mean square over all outputs: the order of the paper's Eq. (26)."""
+        """Return the root mean square over all outputs, ordered as the paper's Eq. (26)."""
         return float(np.sqrt(np.mean(self.errors(sets, held) ** 2)))
 
 
 @dataclass(frozen=True)
 class Search:
-    """How antecedents are searched: by variable projection, or by the paper's particle swarm."""
+    """Search of antecedents: variable projection, or the paper's particle swarm."""
 
     method: Method
     samples: int
-    """On how many samples, spread evenly."""
+    """Number of samples, evenly spaced, that are used."""
 
     swarm: Swarm
     seed: int
@@ -216,7 +216,7 @@ def fit_network(
 def project(
     problem: Problem, n_sets: int, low: Array, high: Array, held: Problem | None, tracker: Tracker
 ) -> Sets:
-    """Return antecedents by variable projection from sets spread evenly between low and high.
+    """Return antecedents by variable projection from evenly spaced sets.
 
     Among the steps taken, the one that does best on held-out data, if there are any, is returned.
     """
@@ -257,7 +257,7 @@ def project(
 
 
 def sensitivities(problem: Problem, sets: Sets) -> tuple[Array, Array]:
-    """Return the derivatives of the errors by centres and widths, projected, and the errors."""
+    """Return the projected derivatives by centres and widths, and the errors."""
     x, y, solver = problem.x, problem.y, problem.solver
     n, n_in = x.shape
     n_sets, n_out = sets.centres.shape[1], y.shape[1]
@@ -283,7 +283,7 @@ def sensitivities(problem: Problem, sets: Sets) -> tuple[Array, Array]:
 
 
 def swarmed(problem: Problem, n_sets: int, swarm: Swarm, seed: int, tracker: Tracker) -> Sets:
-    """Return the best antecedents that a swarm without bounds finds."""
+    """Return the best antecedents of a swarm without bounds."""
     rng = np.random.default_rng(seed)
     shape = (problem.x.shape[1], n_sets)
     start = rng.standard_normal((swarm.particles, 2 * shape[0] * shape[1]))

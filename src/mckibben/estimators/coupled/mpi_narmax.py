@@ -1,4 +1,4 @@
-"""Identification of MPI-NARMAX: rate-dependent hysteresis, then a recurrent network with the load.
+"""Identification of MPI-NARMAX: rate-dependent hysteresis, then a recurrent network with load.
 
 Two steps: the hysteresis on the runs without load; then the network, which takes in the hysteresis, the
 measured force, and its own past output, running free. Its consequents are solved for by least squares,
@@ -36,19 +36,19 @@ from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
 from mckibben.recording import Recording
 
 UNLOADED = 0.05
-"""A run is without load where its largest stays below this share of the largest of all runs."""
+"""Largest force of a run without load, relative to the largest of all runs."""
 
 SWARM = Swarm(20, 30, (0.9, 0.4), 2.0, 2.0, fastest=0.5)
-"""Both attractions and the inertia are the paper's, which does not print the size."""
+"""Attractions and inertia of the paper, which does not print the size."""
 
 ROUNDS = 8
-"""Times that consequents are solved for with the network's own free-running past."""
+"""Number of times that consequents are solved for on the network's free-running outputs."""
 
 SETTLING = 3000
-"""Samples for which inputs are held to see whether the network settles."""
+"""Number of samples with constant inputs in the stability check."""
 
 SEARCH_SAMPLES = 6000
-"""Samples of all runs on which the swarm compares free runs, from the start of each."""
+"""Number of samples per run, from its start, on which the swarm compares free runs."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -78,7 +78,7 @@ class MPINarmaxEstimator(CoupledEstimator):
 
     title = "MPI in a recurrent fuzzy network (MPI–NARMAX)"
     can = "Hysteresis under a load that varies, by a recurrent fuzzy network behind a modified PI."
-    cannot = "No inverse; nothing keeps the network sensible under other pulls."
+    cannot = "No inverse; the network is arbitrary under other loads."
     caution = "its network is arbitrary under loads and motions of another kind"
     effort: ClassVar[float] = 6.0
 
@@ -95,7 +95,7 @@ class MPINarmaxEstimator(CoupledEstimator):
     ridge: Annotated[float, Gt(0)] = 1e-4
 
     def fixed(self, block: Block) -> tuple[int, ...]:
-        """Return the places of what the hysteresis's fit fixes, and of sets that are even."""
+        """Return the indices of parameters fixed by the hysteresis fit, and of even sets."""
         hysteresis, network = block.parts  # type: ignore[attr-defined]
         places = registry.load("estimators", self.memory)().fixed(hysteresis)
         if self.method == "pso":
@@ -125,7 +125,7 @@ class MPINarmaxEstimator(CoupledEstimator):
         return Series((hysteresis, problem.best(*chosen)))
 
     def hysteresis(self, data: TrainingData) -> Block:
-        """Return the hysteresis from runs without load."""
+        """Return the hysteresis fitted to runs without load."""
         u, y = data.inputs[0], data.outputs[0]
         free = f"{y.name}_free"
         units = {u.name: u.unit, free: y.unit}
@@ -142,7 +142,7 @@ class MPINarmaxEstimator(CoupledEstimator):
 
 
 def _parted(data: TrainingData) -> tuple[TrainingData, TrainingData]:
-    """Return the runs without load, at least the one under the least, and all others."""
+    """Return the runs without load, at least the one of smallest load, and all others."""
     largest = np.array([np.abs(run.scheduled).max(axis=0) for run in data.runs])
     shares = (largest / np.maximum(largest.max(axis=0), 1e-300)).max(axis=1)
     free = shares <= max(UNLOADED, float(shares.min()))
@@ -158,7 +158,7 @@ def _parted(data: TrainingData) -> tuple[TrainingData, TrainingData]:
 def remembered(
     x: Array, centres: Array, widths: Array, feedbacks: Array, memberships: Array
 ) -> None:
-    """Fill memberships (n, inputs, sets) of given inputs; each set remembers its last one."""
+    """Fill memberships (n, inputs, sets) of given inputs, with recurrent feedback of each set."""
     for t in range(x.shape[0]):
         for i in range(x.shape[1]):
             for s in range(centres.shape[1]):
@@ -169,7 +169,7 @@ def remembered(
 
 @dataclass(frozen=True)
 class RecurrentProblem:
-    """Runs as the network sees them: what drives and schedules it, (n, 1 + s), and the target."""
+    """Runs for the network: driven and scheduling inputs, (n, 1 + s), and the target."""
 
     settings: MPINarmaxEstimator
     inputs: tuple[Array, ...]
@@ -182,7 +182,7 @@ class RecurrentProblem:
     def of(
         cls, settings: MPINarmaxEstimator, data: TrainingData, hysteresis: Block
     ) -> RecurrentProblem:
-        """Return the problem on runs, behind a hysteresis that is known."""
+        """Return the problem on runs, after a known hysteresis."""
         inputs = []
         for run in data.runs:
             f = hysteresis.simulate(run.driven[:, 0], sample_time=run.sample_time)
@@ -192,7 +192,7 @@ class RecurrentProblem:
         return cls(settings, tuple(inputs), targets, step, hysteresis.outputs[0], data)
 
     def regress(self, inputs: Array, past: Array) -> Array:
-        """Return all x over a run, with given outputs for past ones."""
+        """Return all regressors over a run, with given past outputs."""
         e = self.settings
 
         def back(values: Array, lag: int) -> Array:
@@ -206,7 +206,7 @@ class RecurrentProblem:
 
     @property
     def ranges(self) -> tuple[Array, Array]:
-        """Lowest and highest of every x."""
+        """Lowest and highest of every regressor."""
         x = np.concatenate(list(map(self.regress, self.inputs, self.targets)))
         low, high = x.min(axis=0), x.max(axis=0)
         return low, np.where(high > low, high, low + 1.0)
@@ -214,7 +214,7 @@ class RecurrentProblem:
     def solved(
         self, sets: Sets, feedbacks: Array, pasts: tuple[Array, ...]
     ) -> RecurrentFuzzyNetwork:
-        """Return the network whose consequents are solved for with given past outputs."""
+        """Return the network with least-squares consequents for given past outputs."""
         e, constants = self.settings, self.settings.constants
         solver = Consequents(constants, e.ridge)
         gram, right, n_terms = np.zeros(()), np.zeros(()), 0
@@ -245,20 +245,20 @@ class RecurrentProblem:
         )
 
     def free_run(self, network: RecurrentFuzzyNetwork, inputs: Array) -> Array:
-        """Return the network's own output over inputs."""
+        """Return the network's free-running output."""
         output = np.empty((len(inputs), 1))
         network.bind(self.step, network.initial_state(inputs[0]), inputs, output)()
         return output[:, 0]
 
     def cost(self, outputs: list[Array]) -> float:
-        """Return the RMSE of free runs; infinite where they leave all bounds."""
+        """Return the free-running RMSE; infinite for diverging runs."""
         errors = np.concatenate([z - y for z, y in zip(outputs, self.targets, strict=True)])
         with np.errstate(over="ignore", invalid="ignore"):
             value = float(np.sqrt(np.mean(errors**2)))
         return value if np.isfinite(value) else np.inf
 
     def best(self, sets: Sets, feedbacks: Array) -> RecurrentFuzzyNetwork:
-        """Return the network that runs free best, of those that learn from their own past.
+        """Return the network of lowest free-running error, trained on its own past outputs.
 
         Raises
         ------
@@ -284,14 +284,14 @@ class RecurrentProblem:
             )
         if not self.settles(found):
             warnings.warn(
-                "the network does not settle while its inputs are held: do not run it free for long",
+                "the network does not settle while its inputs are constant: do not simulate it for long",
                 ModelWarning,
                 stacklevel=4,
             )
         return found
 
     def settles(self, network: RecurrentFuzzyNetwork) -> bool:
-        """Tell whether outputs stay near the data's while inputs are held anywhere in their range."""
+        """Return whether outputs stay near the data's while inputs are constant in their range."""
         every = np.concatenate(self.inputs)
         low, high = every.min(axis=0), every.max(axis=0)
         y = np.concatenate(self.targets)

@@ -29,13 +29,13 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
 
 PENALTIES = np.geomspace(1e-8, 10.0, 28)
-"""Tried, relative to the size of what is read out."""
+"""Candidate penalties, relative to the size of the regressors."""
 
 N_BLOCKS = 10
-"""Left out in turn, at least; as many of every run."""
+"""Smallest number of cross-validation blocks; the same in every run."""
 
 LEAST = 1e-12
-"""Penalty that is always there, relative to the same, so that equations can be solved."""
+"""Smallest penalty, on the same scale, which makes the equations solvable."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -68,7 +68,7 @@ class PlayRidgeEstimator(CoupledEstimator):
         "and products of all inputs, in closed form; always stable."
     )
     cannot = (
-        "No inverse; beyond the inputs recorded its products go on as polynomials; no dynamics "
+        "No inverse; beyond the recorded inputs its products extrapolate as polynomials; no dynamics "
         "that oscillate."
     )
     quick = True
@@ -131,7 +131,7 @@ def solved(blocks: Array, width: int, ridge: float | None) -> tuple[Array, tuple
         )
 
     def missed(block: Array, penalty: float) -> Array:
-        """Return the squared error of every output on a block left out, relative to its own."""
+        """Return the squared error of every output on a held-out block, relative to its own."""
         w = np.vstack([fit(total - block, penalty), -np.eye(m)])
         return np.asarray(np.einsum("ij,ik,kj->j", w, block, w))
 
@@ -149,7 +149,7 @@ def solved(blocks: Array, width: int, ridge: float | None) -> tuple[Array, tuple
 
 
 def features(block: CoupledMemory, run: Run) -> Array:
-    """Return what the readout multiplies over a run, shape (n, width)."""
+    """Return the features over a run, shape (n, width)."""
     inputs = run.inputs
     n, width = inputs.shape[1], len(block.readout[0])
     many = CoupledMemory(
@@ -176,13 +176,13 @@ def features(block: CoupledMemory, run: Run) -> Array:
 
 COUPLED_MEMORY = preset(
     PlayRidgeEstimator,
-    "Lags and play operators of several muscles, with one penalty that is given.",
+    "Lags and play operators of several muscles, with one fixed penalty.",
     title="Coupled lags and play operators",
     can=(
         "Any number of outputs from lags, play operators and products of all inputs; in "
         "closed form."
     ),
-    cannot="No inverse; products know nothing of inputs larger than those recorded.",
+    cannot="No inverse; products extrapolate badly beyond the recorded inputs.",
     makes=("coupled-memory",),
     alone=False,
     needs_time=True,

@@ -44,15 +44,15 @@ from mckibben.presets import preset
 from mckibben.recording import Recording
 
 BEYOND = 0.1
-"""How far beyond the data the inverse may go, relative to their range."""
+"""Range of the inverse beyond the data, relative to their range."""
 
 FRICTION = (0.002, 0.1)
-"""Smallest and largest threshold of a muscle's own friction, relative to its travel."""
+"""Smallest and largest threshold of a muscle's friction, relative to its travel."""
 
 ARBITRARY = "its network is arbitrary where muscles move in other combinations"
 
 LEAST_SLOPE = 0.05
-"""Smallest slope of a displacement by itself, right after a reversal."""
+"""Smallest slope of a displacement alone, just after a reversal."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -99,11 +99,11 @@ class SDCHMEstimator(CoupledEstimator):
     title = "Stiffness-dependent coupled hysteresis model (SDCHM)"
     can = (
         "Hysteresis, coupling and stiffness of muscles round a backbone; its damped network "
-        "holds where pressures move in other combinations."
+        "extrapolates to other combinations of pressures."
     )
     cannot = (
-        "Strong rate dependence; with next to no damping (ridge) its network is arbitrary off"
-        " the runs recorded."
+        "Strong rate dependence; with little damping (ridge) its network is arbitrary away from"
+        " the recorded runs."
     )
     inverse_kind = "solved"
     effort: ClassVar[float] = 20.0
@@ -124,16 +124,16 @@ class SDCHMEstimator(CoupledEstimator):
 
     @property
     def stops_early(self) -> bool:
-        """Where there is a network."""
+        """Whether there is a network."""
         return self.n_sets > 0
 
     @property
     def pairs(self) -> bool:
-        """Whether these settings need an output to every input: every muscle's hysteresis does."""
+        """Whether these settings need one output per input, for the hysteresis of every muscle."""
         return self.memory is not None
 
     def fixed(self, block: Block) -> tuple[int, ...]:
-        """Return the places of a muscle's gain to itself, 1, and of what its hysteresis's fit fixes."""
+        """Return the indices of the unit gains, and of parameters fixed by the hysteresis fits."""
         places = [
             place
             for place, (part, _, index) in enumerate(block.numbers())
@@ -223,7 +223,7 @@ class SDCHMEstimator(CoupledEstimator):
         return as_block(found, driven, data.outputs, data.scheduled, limits, self.constants)
 
     def friction(self, given: list[Array], wanted: list[Array], channel: Channel) -> PI:
-        """Return the memory of a muscle's own motion: play operators, all partial sums positive."""
+        """Return the friction memory of a muscle: play operators with positive partial sums."""
         low = min(float(part.min()) for part in given)
         high = max(float(part.max()) for part in given)
         span = high - low
@@ -293,7 +293,7 @@ def as_block(
 
 
 def network_inputs(front: Sequence[Block], runs: Sequence[Run]) -> Array:
-    """Return what the network is given over all runs: driven through blocks, and what schedules."""
+    """Return the network's inputs over all runs: driven through blocks, and scheduling."""
 
     def of(run: Run) -> Array:
         driven = np.ascontiguousarray(run.driven)
@@ -305,7 +305,7 @@ def network_inputs(front: Sequence[Block], runs: Sequence[Run]) -> Array:
 
 
 def softest(data: TrainingData, muscle: int) -> Run:
-    """Return the run to identify a muscle's hysteresis from.
+    """Return the run for a muscle's hysteresis.
 
     It moves alone; what schedules is lowest; and the run is the longest of those.
 
@@ -317,7 +317,7 @@ def softest(data: TrainingData, muscle: int) -> Run:
     runs = alone(data, muscle)
     if not runs:
         raise DataError(
-            "no run moves this muscle alone, so its hysteresis cannot be told from the coupling",
+            "no run moves this muscle alone, so its hysteresis and the coupling cannot be distinguished",
             channel=data.inputs[muscle].name,
             remedy="add a run in which the other pressures rest, or fit balance",
         )
@@ -330,7 +330,7 @@ def softest(data: TrainingData, muscle: int) -> Run:
 
 
 def coupled(memories: list[Block], runs: list[Run], data: TrainingData) -> Coupling:
-    """Return the coupling: what moves with muscle i alone, by least squares on its hysteresis."""
+    """Return the coupling by least squares on the hysteresis of muscle i moving alone."""
     n = len(memories)
     gains = np.eye(n)
     for i, (block, run) in enumerate(zip(memories, runs, strict=True)):
@@ -347,7 +347,7 @@ def trained_inverse(
     seed: int = 0,
     progress: Callable[[float, float], None] | None = None,
 ) -> tuple[Series, dict[str, float]]:
-    """Return `learned_inverse` by the paper's swarm, and its RMSE on the recordings by output."""
+    """Return `learned_inverse` by the paper's swarm, and its RMSE on the recordings per output."""
     search = Search("pso", SDCHMEstimator.search_samples, printed_swarm(), seed)
     tracker = Tracker(progress=progress)
     inverse = learned_inverse(model, recordings, search=search, tracker=tracker)
@@ -367,7 +367,7 @@ def learned_inverse(
     ridge: float = 1e-9,
     tracker: Tracker | None = None,
 ) -> Series:
-    """Return the inverse whose network is learned: SDIHC, as its paper has it (Section 4).
+    """Return the inverse with a trained network: SDIHC, as in its paper (Section 4).
 
     A network of the model's shape is trained on recordings with inputs and outputs swapped, from
     displacements to the coupled hysteresis; friction, coupling and hysteresis have their exact inverses.
@@ -441,9 +441,9 @@ COUPLED_PI = preset(
 
 SDCHM_PUBLISHED = preset(
     SDCHMEstimator,
-    "SDCHM as its paper identifies it: GPI, coupling, and a network trained by particle swarm.",
-    title="SDCHM as its paper identifies it",
-    can="As sdchm, identified as its paper has it.",
+    "SDCHM identified as in its paper: GPI, coupling, and a network trained by particle swarm.",
+    title="SDCHM identified as in its paper",
+    can="As sdchm, identified as in its paper.",
     cannot="Combinations of pressures unlike those recorded: its network is arbitrary there.",
     caution=ARBITRARY,
     effort=25.0,

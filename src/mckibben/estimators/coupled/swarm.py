@@ -11,7 +11,7 @@ from mckibben.arrays import Array
 from mckibben.estimators.optimisers.tracker import Tracker
 
 WORST = float(np.finfo(np.float64).max)
-"""Cost of points whose own is no number."""
+"""Cost of points whose cost is not finite."""
 
 
 @dataclass(frozen=True)
@@ -21,18 +21,18 @@ class Swarm:
     particles: int = 20
     iterations: int = 50
     inertia: tuple[float, float] = (0.9, 0.4)
-    """At the first and last move, linear between."""
+    """Inertia at the first and the last iteration, linear between."""
 
     c1: float = 2.0
     c2: float = 2.0
-    """Pull towards a particle's own best and the swarm's best."""
+    """Attraction to a particle's best and to the swarm's best point."""
 
     fastest: float = 0.2
-    """How far a particle moves at a time, at most, relative to the bounds."""
+    """Largest velocity of a particle, relative to the bounds."""
 
     @property
     def budget(self) -> int:
-        """Evaluations: of all particles before the first move, and after every one."""
+        """Number of evaluations: of all particles initially, and after every iteration."""
         return self.particles * (self.iterations + 1)
 
 

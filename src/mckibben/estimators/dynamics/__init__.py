@@ -1,1 +1,1 @@
-"""Estimators of what lies before the muscle, or follows it: blocks with times of their own."""
+"""Estimators of dynamics before or after the muscle."""

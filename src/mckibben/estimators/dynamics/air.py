@@ -23,27 +23,27 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
 MOVED = ("contraction", "displacement", "force", "length")
-"""Channels of muscles, which are no commands."""
+"""Channels of muscles, which are not commands."""
 
 WIDEST = 0.2
-"""Most hysteresis, relative to the range of the command."""
+"""Largest hysteresis, relative to the range of the command."""
 
 GUESSES = 8
-"""Lags with which a first dead time is looked for."""
+"""Lags for the initial search of the dead time."""
 
 LIMIT_GAIN = 0.02
-"""Least fall of the error, relative, for which a limit of the pressure is taken to be one."""
+"""Smallest relative reduction of the error for a pressure limit to be added."""
 
 NO_WORSE = 1e-6
-"""Relative rise of the error at which no hysteresis is as good as some."""
+"""Relative increase of the error up to which hysteresis is left out."""
 
 POLISHED = 40
-"""Evaluations of all parameters together, at most."""
+"""Maximum number of evaluations of the joint refinement."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class AirEstimator(SeparableEstimator):
-    """Valve or regulator and its air: gain and offset solved for, lags and dead time searched.
+    """Valve or regulator with air: gain and offset solved for, lags and dead time searched.
 
     Dead times are tried sample by sample from where the correlation of command and pressure is best, as
     long as the error falls; with each, gain and offset are solved for while lags and hysteresis are
@@ -62,12 +62,12 @@ class AirEstimator(SeparableEstimator):
     title = "Valve and air"
     purpose = "rate"
     can = (
-        "What lies between a valve's command and the pressure: gain, hysteresis, lags that "
+        "From a valve's command to the pressure: gain, hysteresis, lags that "
         "differ in filling and venting, dead time."
     )
     cannot = (
-        "Knows nothing of how the flow depends on pressure and room: a muscle that moves, or "
-        "a large step, fills at another speed."
+        "Flow does not depend on pressure or volume: a muscle that moves, or "
+        "a large step, fills at a different speed."
     )
     inverse_kind = "exact"
     needs_time: ClassVar[bool] = True
@@ -102,7 +102,7 @@ class AirEstimator(SeparableEstimator):
         return "it maps a command to a pressure" if given in MOVED or wanted != "pressure" else None
 
     @property
-    def n_beside(self) -> int:
+    def n_further(self) -> int:
         """The dead time."""
         return 1
 
@@ -138,7 +138,7 @@ class AirEstimator(SeparableEstimator):
         return block, data
 
     def _correlated(self, data: TrainingData, most: int) -> int:
-        """Return the dead time at which the pressure follows the command best, with some lag."""
+        """Return the dead time with the best correlation of pressure and lagged command."""
         thin = data.thinned(SEARCH_SAMPLES)
         wanted = thin.target - thin.target.mean()
         lower, upper = self.bounds(data)
@@ -162,7 +162,7 @@ class AirEstimator(SeparableEstimator):
         return best
 
     def _at(self, late: int, data: TrainingData, tracker: Tracker) -> tuple[float, Air]:
-        """Return the error and the block found with a dead time in samples."""
+        """Return the error and the block for a dead time in samples."""
         moved = delayed(data, late)
         found, _ = super().identify(moved, tracker)
         limits: tuple[str, ...] = ()
@@ -220,13 +220,13 @@ class AirEstimator(SeparableEstimator):
         return np.array([quick, quick, 0.0]), np.array([slow, slow, widest])
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return lags of a few speeds, without hysteresis and with some."""
+        """Return initial lags, with and without hysteresis."""
         lower, upper = self.bounds(data)
         shares = [(s, s, h) for s in (0.2, 0.35, 0.5, 0.65) for h in (0.01, 0.2)]
         return [lower + np.array(share) * (upper - lower) for share in shares]
 
     def unit(self, theta: Array, data: TrainingData) -> Air:
-        """Return the block with a gain of 1, and neither offset nor limits nor dead time."""
+        """Return the block with unit gain, without offset, limits or dead time."""
         filling, venting = np.exp(theta[:2]).tolist()
         rest: dict[str, Any] = {
             "input_range": data.input_range,
@@ -245,7 +245,7 @@ class AirEstimator(SeparableEstimator):
 
 
 def delayed(data: TrainingData, late: int) -> TrainingData:
-    """Return the same data with inputs late by so many samples, the first held until then."""
+    """Return the same data with delayed inputs, the first value extended."""
     runs = []
     for run in data.runs:
         places = np.maximum(np.arange(len(run.driven)) - late, 0)

@@ -18,7 +18,7 @@ from mckibben.blocks.parameters import Parametrised
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Grid, Initial, resting
-from mckibben.estimators.core.uncertainty import inverted, told_by_runs, unknown
+from mckibben.estimators.core.uncertainty import covariance_by_runs, inverted, unknown
 from mckibben.estimators.coupled.base import schedules
 from mckibben.estimators.dynamics.prediction_error import (
     Orders,
@@ -49,13 +49,13 @@ class Noise:
 
     @property
     def standard_errors(self) -> tuple[float, ...]:
-        """Of the same."""
+        """Standard errors of the coefficients."""
         return vector(np.sqrt(np.diag(self.covariance)))
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class PredictionErrorEstimator(Estimator):
-    """An estimator of a linear model by one-step prediction errors, run free ever after.
+    """Estimator of a linear model by one-step prediction errors; the model runs free.
 
     After `fit`, ``noise_`` holds the noise model, the one-step error, and the covariance of all
     coefficients. Covariances are those of Ljung, chapter 9, and take the noise to be what the model says
@@ -119,7 +119,7 @@ class PredictionErrorEstimator(Estimator):
 
     @property
     def orders(self) -> Orders:
-        """How many coefficients each polynomial has."""
+        """Number of coefficients of each polynomial."""
         lags = None if self.lags is None else tuple(sorted(set(self.lags)))
         poles = {"a" if self.shared_poles else "f": self.n_poles}
         return Orders(
@@ -132,7 +132,7 @@ class PredictionErrorEstimator(Estimator):
         )
 
     def check_settings(self) -> None:
-        """Refuse settings that are not as they are declared, and poles of the noise in two places."""
+        """Raise an error for invalid settings, or noise poles specified twice."""
         super().check_settings()
         if self.shared_poles and self.n_noise_poles:
             raise ModelError(
@@ -142,7 +142,7 @@ class PredictionErrorEstimator(Estimator):
 
     @property
     def single(self) -> bool:
-        """Whether it is of one input and one output."""
+        """Whether there are one input and one output."""
         return isinstance(self.input, str) and isinstance(self.output, str) and not self.beside
 
     @classmethod
@@ -178,7 +178,7 @@ class PredictionErrorEstimator(Estimator):
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
-        """Return what is learned from recordings; of several inputs, from all that drive."""
+        """Return the training data; with several inputs, of all driving channels."""
         if self.single:
             return super().data(recordings, rows)
         driving, given = ((of,) if isinstance(of, str) else of for of in (self.input, self.output))
@@ -191,7 +191,7 @@ class PredictionErrorEstimator(Estimator):
         return super(PredictionErrorEstimator, whole).data(recordings, rows)
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found: of several channels, the sum of one for every input, by output."""
+        """Return the identified block: for several channels, the sum over inputs, per output."""
         parts: list[Block] = []
         share = 1.0 / len(data.outputs)
         for place, output in enumerate(data.outputs):
@@ -202,7 +202,7 @@ class PredictionErrorEstimator(Estimator):
         return (parts[0] if self.single else Parallel(tuple(parts))), data
 
     def _of_output(self, data: TrainingData, tracker: Tracker) -> tuple[TransferFunction, ...]:
-        """Return the transfer function from every input to the output."""
+        """Return the transfer functions from every input to the output."""
         step = data.timed(instead=", or use gpi")
         orders = replace(self.orders, inputs=len(data.inputs))
         start = self.starting
@@ -247,7 +247,7 @@ class PredictionErrorEstimator(Estimator):
         freedom = max(e.size - orders.size - orders.poles * len(runs), 1)
         self._covariance = float(e @ e) / freedom * inverse / np.outer(size, size)
         if orders.f and not orders.c + orders.d:
-            coloured = told_by_runs(slopes / size, e, runs)[1]
+            coloured = covariance_by_runs(slopes / size, e, runs)[1]
             self._covariance = coloured / np.outer(size, size)
         noise = (vector(p.c), vector(p.poles[0] if orders.a else p.d), deviation)
         self.noise_ = Noise(
@@ -274,18 +274,18 @@ class PredictionErrorEstimator(Estimator):
                 radius = float(np.abs(block.poles).max())
                 raise ModelError(
                     f"the model found is unstable (a pole at |z| = {radius:.4g})",
-                    remedy="use other orders, or output-error (oe), which is kept stable",
+                    remedy="use other orders, or output-error (oe), which is constrained to be stable",
                 )
             found.append(block)
         return tuple(found)
 
     @property
     def starting(self) -> Start:
-        """The state before the first sample; of several inputs none is fitted."""
+        """The start state; not fitted for several inputs."""
         return "first_sample" if self.initial == "fitted" and not self.single else self.initial
 
     def fixed(self, block: Block) -> tuple[int, ...]:
-        """Return the places of input offsets, of lags left out, and of what inputs have in common."""
+        """Return the indices of input offsets, skipped lags, and parameters shared by inputs."""
         first: dict[str, Parametrised] = {}
         fixed = []
         for place, (part, name, index) in enumerate(block.numbers()):
@@ -300,7 +300,7 @@ class PredictionErrorEstimator(Estimator):
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
-        """Return the condition and covariance from the prediction errors; the input's offset is set.
+        """Return condition and covariance from the prediction errors; the input's offset is fixed.
 
         Of several inputs or outputs neither is known.
         """
@@ -341,8 +341,8 @@ ARX = preset(
     title="ARX model, linear",
     can="Linear dynamics, in closed form.",
     cannot=(
-        "No hysteresis; biased by noise in the output, so its free run drifts from what one "
-        "step ahead promises."
+        "No hysteresis; biased by noise in the output, so its free run is worse than its one-"
+        "step prediction."
     ),
     quick=True,
     param_grid={"n_poles": (1, 2, 3, 4), "n_zeros": (1, 2, 3)},
@@ -352,7 +352,7 @@ BJ = preset(
     PredictionErrorEstimator,
     "Box-Jenkins model, y = B / F u + C / D e; second order each by default.",
     title="Box–Jenkins model (BJ), linear",
-    can="Linear dynamics with noise described apart from them.",
+    can="Linear dynamics with a separate noise model.",
     cannot="No hysteresis.",
     shared_poles=False,
     n_noise=2,

@@ -1,4 +1,4 @@
-"""What searches of oscillating models share: a linear start, and inputs in steps finer than samples."""
+"""Shared parts of oscillator searches: a linear start, and inputs in fine steps."""
 
 from __future__ import annotations
 
@@ -17,15 +17,14 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.signals.periodic import band_limited
 
 FORGOTTEN = 3 * np.log(1e8)
-"""Times the decay after which a start counts as forgotten.
-
-Thrice what a hundred-millionth takes, for with hysteresis smaller motion decays slower.
+"""Number of decay times after which a start is forgotten: three times those of a decay to 1e-8, as
+small motions decay more slowly with hysteresis.
 """
 
 MOST_SUBSTEPS = 1000
 
 MOST_PERIODS = 20
-"""Of the longest run, after which it does in any case."""
+"""Limit of that number, in periods of the longest run."""
 
 
 @dataclass(frozen=True)
@@ -43,22 +42,22 @@ class Linear:
 
     @property
     def decay(self) -> float:
-        """How fast its free motion dies away [1/s]: the slower of two lags, where overdamped."""
+        """Decay rate of its free motion [1/s]: of the slower lag, if overdamped."""
         half = 500.0 * self.damping / self.mass
         return half - float(np.sqrt(max(half**2 - self.frequency**2, 0.0)))
 
     def forgets(self, data: TrainingData) -> int:
-        """Return after how many samples starts no longer count."""
+        """Return the number of samples after which the start state has no effect."""
         longest = MOST_PERIODS * max(run.u.size for run in data.runs)
         return int(min(np.ceil(FORGOTTEN / max(self.decay * data.timed(), 1e-9)), longest))
 
     def substeps(self, step: float, angle: float) -> int:
-        """Return steps from sample to sample in each of which it turns by at most an angle [rad]."""
+        """Return substeps per sample for a largest angle per substep [rad]."""
         return int(np.clip(np.ceil(self.frequency * step / angle), 1, MOST_SUBSTEPS))
 
 
 def linear_oscillator(data: TrainingData, channels: dict[str, Any]) -> Linear:
-    """Return the linear oscillator with the least free-run error, each run from a start of its own.
+    """Return the linear oscillator of least free-running error, with a start state per run.
 
     Raises
     ------
@@ -83,7 +82,7 @@ def linear_oscillator(data: TrainingData, channels: dict[str, Any]) -> Linear:
 
 @dataclass(frozen=True)
 class Path:
-    """The input of a run in steps; steps from sample to sample; samples before the first that counts."""
+    """The input of a run in substeps; substeps per sample; samples before the first scored one."""
 
     run: Run
     inputs: Array
@@ -92,7 +91,7 @@ class Path:
 
 
 def paths(data: TrainingData, substeps: int, warm: int | None, at_rest: bool) -> list[Path]:
-    """Return the inputs of all runs in steps.
+    """Return the inputs of all runs in substeps.
 
     Parameters
     ----------
@@ -121,7 +120,7 @@ def paths(data: TrainingData, substeps: int, warm: int | None, at_rest: bool) ->
 
 
 def averaged(data: TrainingData) -> TrainingData:
-    """Return periodic runs of one input as one, with their mean output; others as they are.
+    """Return periodic runs of one input as one, with the mean output; other runs unchanged.
 
     What runs free is the same in all, so their squared errors are that of the mean, but for a constant.
     """

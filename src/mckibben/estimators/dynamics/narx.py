@@ -1,4 +1,4 @@
-"""Identification of NARX models: on one-step errors first, then on those of free runs.
+"""Identification of NARX models: on one-step errors, then on free-running errors.
 
 Terms of a polynomial are chosen by forward orthogonal least squares, one by one by how much of the
 output they explain; the hidden layer of a network is searched by variable projection. Both are then
@@ -44,34 +44,35 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
 
 BOUND = 1.0
-"""How far beyond the data's range a stable model's output may go, relative to the range."""
+"""Largest distance of a stable model's output from the data's range, relative to the range."""
 
 HORIZONS = (20, 200)
-"""Samples over which errors are minimised before whole runs are."""
+"""Prediction horizons whose errors are minimised before free runs [samples]."""
 
 MOST_REFINED = 2
-"""Models refined over whole runs."""
+"""Number of models refined on free runs."""
 
 LEAST_GAIN = 1e-6
-"""Share of the squared error that a step of a descent has to gain."""
+"""Smallest relative reduction of the squared error for another step."""
 
 HORIZON_SAMPLES, SELECTION_SAMPLES, LAYER_SAMPLES = 4000, 5000, 3000
-"""Samples looked at, at most: over short horizons, to choose terms, and to find a hidden layer."""
+"""Largest number of samples used over short horizons, to select terms, and to fit a hidden layer.
+"""
 
 LAYER_EVALUATIONS, DAMPING = 15, 1e-4
-"""Most evaluations of a search for a hidden layer, and damping of the weights behind it."""
+"""Maximum number of evaluations for a hidden layer, and ridge of its output weights."""
 
 FAR, STEEPEST = 10.0, 1e6
-"""Errors, and their derivatives, are not counted as larger, relative to half the output's range."""
+"""Bounds to which errors and their derivatives are clipped, relative to half the output's range."""
 
 HOLD = 1000
-"""Samples for which inputs are held in the check of stability."""
+"""Number of samples with constant inputs in the stability check."""
 
 MOST_CANDIDATES = 2000
-"""Products of regressors that terms are chosen from."""
+"""Maximum number of candidate products of regressors."""
 
 DEPENDENT = 1e-10
-"""Share of a term left after taking the chosen ones out of it, below which it explains nothing new."""
+"""Share of a term that must remain after projection on the chosen ones."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -112,8 +113,8 @@ class NarxEstimator(SearchEstimator):
         "Nonlinear dynamics by a polynomial of past inputs and outputs; terms chosen by "
         "orthogonal least squares."
     )
-    cannot = "Remembers only as far as its lags; no inverse."
-    caution = "a polynomial of past values leaves all bounds beyond them"
+    cannot = "Memory limited to its lags; no inverse."
+    caution = "a polynomial of past values is unbounded beyond them"
     param_grid: ClassVar[Grid] = {
         "output_lags": (1, 2),
         "input_lags": (1, 2),
@@ -137,7 +138,7 @@ class NarxEstimator(SearchEstimator):
     n_starts: Annotated[int, Interval(ge=1, le=100)] = 3
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the best model that stays within bounds, and the data."""
+        """Return the best bounded model, and the data."""
         data.timed(instead=", or use gpi")
         found = self._polynomials if self.mapping == "polynomial" else self._networks
         paths: list[list[Narx]] = []
@@ -171,19 +172,19 @@ class NarxEstimator(SearchEstimator):
             raise ModelError(
                 "every NARX model found diverges in a free run",
                 remedy="use fewer terms or units, `settings[n_play]=3`, or "
-                "`settings[allow_unstable]=true` to get it all the same",
+                "`settings[allow_unstable]=true` to return it anyway",
             )
         tracker.best_cost, chosen = min(tried, key=lambda item: item[0])
         if not stable(chosen, data):
             warnings.warn(
-                "the NARX model diverges when its input is held or goes on: do not run it free",
+                "the NARX model diverges for constant or continued input: do not simulate it",
                 ModelWarning,
                 stacklevel=4,
             )
         return chosen, data
 
     def _fields(self, data: TrainingData) -> dict[str, Any]:
-        """Return the fields of all models tried; the scales bring the data to -1 to 1."""
+        """Return the common fields of all candidate models; the scales map the data to -1 to 1."""
         (ul, uh), (yl, yh) = data.input_range, data.output_range
         return {
             "output_lags": self.output_lags,
@@ -200,7 +201,7 @@ class NarxEstimator(SearchEstimator):
     def _polynomials(
         self, fields: Mapping[str, Any], data: TrainingData, tracker: Tracker
     ) -> list[Narx]:
-        """Return polynomials of the most telling terms: all that are allowed, half, and a quarter."""
+        """Return polynomials of the most significant terms: the maximum number, half, and a quarter."""
         del tracker
         x, y = one_step_pairs(fields, data, SELECTION_SAMPLES)
         terms = tuple(
@@ -225,7 +226,7 @@ class NarxEstimator(SearchEstimator):
     def _networks(
         self, fields: Mapping[str, Any], data: TrainingData, tracker: Tracker
     ) -> list[Narx]:
-        """Return networks fitted to one-step errors by variable projection, one a start."""
+        """Return networks fitted to one-step errors by variable projection, one per start."""
         x, y = one_step_pairs(fields, data, LAYER_SAMPLES)
         layers = HiddenLayers(
             x, y, {"activation": self.activation, **fields}, self.n_units, tracker
@@ -248,7 +249,7 @@ class NarxEstimator(SearchEstimator):
     def _refined(
         self, model: Narx, horizon: int | None, data: TrainingData, tracker: Tracker
     ) -> list[Narx]:
-        """Return models of ever smaller errors over a horizon, or over whole runs.
+        """Return models refined over a horizon, or over whole runs.
 
         A model that is unstable when it runs free has no slope to follow there; over short horizons,
         each started from what was measured, it has.
@@ -274,7 +275,7 @@ NARX_NETWORK = preset(
     "NARX model with one hidden layer: linear part first, units on top, then free-run refinement.",
     title="NARX network",
     can="Nonlinear dynamics by one hidden layer.",
-    cannot="Slow to fit; no inverse; nothing keeps it sensible beyond the data.",
+    cannot="Slow to fit; no inverse; arbitrary beyond the data.",
     caution="a network without physics is arbitrary beyond them",
     param_grid={"output_lags": (1, 2), "n_units": (3, 5)},
     mapping="network",
@@ -283,10 +284,7 @@ NARX_NETWORK = preset(
 
 NARX_PLAY = preset(
     NarxEstimator,
-    (
-        "Polynomial NARX model with play operators among its regressors, so that it keeps its"
-        " branch."
-    ),
+    ("Polynomial NARX model with play operators among its regressors."),
     title="Polynomial NARX model with play operators",
     can=(
         "Polynomial dynamics with play operators among the regressors: hysteresis and rate in one."
@@ -301,12 +299,12 @@ NARX_PLAY = preset(
 
 
 def scaled(values: Array, scale: tuple[float, float]) -> Array:
-    """Return values less a centre, over half a range."""
+    """Return values relative to a centre, in half ranges."""
     return np.asarray((values - scale[0]) / scale[1])
 
 
 def driven(model: Narx, run: Run) -> Array:
-    """Return the regressors over a run that depend on inputs alone: past ones, and operators."""
+    """Return the regressors over a run that depend on inputs alone: past inputs, and operators."""
     x = scaled(run.u, model.input_scale)
     ago = np.arange(model.delay, model.delay + model.input_lags)
     past = x[np.maximum(np.arange(x.size)[:, np.newaxis] - ago, 0)]
@@ -320,7 +318,7 @@ def operators(model: Narx, x: Array) -> Array:
 
 
 def one_step_pairs(fields: Mapping[str, Any], data: TrainingData, most: int) -> tuple[Array, Array]:
-    """Return regressors and next outputs at so many samples, spread evenly, where all involved count."""
+    """Return regressors and next outputs at evenly spaced samples where all values are scored."""
     model = NarxPolynomial(terms=(), weights=(), **fields)
     lags = 1 + np.arange(model.output_lags)
     tables, targets = [], []
@@ -339,7 +337,7 @@ def one_step_pairs(fields: Mapping[str, Any], data: TrainingData, most: int) -> 
 
 
 def select(columns: Array, target: Array, most: int) -> list[int]:
-    """Return columns, (n, k), in the order in which they explain the target, (n,), at most so many."""
+    """Return columns, (n, k), ordered by their contribution to the target, (n,)."""
     left, rest = columns.copy(), target.copy()
     power = np.maximum((columns**2).sum(axis=0), 1e-300)
     chosen: list[int] = []
@@ -360,18 +358,18 @@ def select(columns: Array, target: Array, most: int) -> list[int]:
 
 @dataclass(frozen=True)
 class HiddenLayers:
-    """One-step errors of networks by their hidden layers; all behind these is solved for."""
+    """One-step errors of networks by hidden weights, with optimal output weights."""
 
     x: Array
     y: Array
-    """Regressors, shape (n, k), and the outputs to give, shape (n,)."""
+    """Regressors, shape (n, k), and target outputs, shape (n,)."""
 
     fields: Mapping[str, Any]
     units: int
     tracker: Tracker
 
     def solved(self, layer: Array) -> tuple[NarxNetwork, Array]:
-        """Return the best network of a hidden layer, shape (units * (k + 1),), and its errors.
+        """Return the best network for hidden weights, shape (units * (k + 1),), and its errors.
 
         Behind the errors is the damping of the weights solved for: neighbouring samples make the
         regressors nearly dependent.
@@ -393,7 +391,7 @@ class HiddenLayers:
         return self.solved(layer)[1]
 
     def slopes(self, layer: Array) -> Array:
-        """Return the derivatives of the errors, less what the weights would take up (Kaufman)."""
+        """Return the projected derivatives of the errors (Kaufman)."""
         n, k = self.x.shape
         columns = self._columns(layer.reshape(self.units, -1))
         by_all, _ = self.solved(layer)[0].slopes(self.x)
@@ -403,7 +401,7 @@ class HiddenLayers:
         return np.asarray(moved - taken @ (taken.T @ moved))
 
     def _columns(self, rows: Array) -> Array:
-        """Return what the weights multiply: a constant, the regressors and the units; then damping."""
+        """Return the regressors of the output weights: constant, regressors, units; then damping."""
         a, _ = activated(self.fields["activation"], self.x @ rows[:, :-1].T + rows[:, -1])
         columns = np.column_stack([np.ones(len(a)), self.x, a])
         return np.vstack([columns, DAMPING * np.eye(columns.shape[1])])
@@ -411,7 +409,7 @@ class HiddenLayers:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch of a run: the state before it, and inputs, outputs, which count, and regressors over it.
+    """A segment of a run: initial state, and its inputs, outputs, mask and regressors.
 
     ``regressors`` are those that depend on inputs alone.
     """
@@ -424,7 +422,7 @@ class Stretch:
 
 
 def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stretch]:
-    """Return stretches of so many samples, each started from measured outputs; or whole runs.
+    """Return segments of so many samples, each started from measured outputs; or whole runs.
 
     Of short ones no more than `HORIZON_SAMPLES` take, spread evenly. A whole run whose first sample does
     not count starts at rest, since its output may not be looked at.
@@ -459,7 +457,7 @@ def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stre
 
 @kernel
 def feed_back(slopes: Array, by_past: Array) -> None:
-    """Turn derivatives of f by its parameters into those of its free run, in place.
+    """Convert derivatives of f by its parameters to those of its free run, in place.
 
     Shapes: slopes (n, p); by_past (n, lags), the derivatives by past outputs, newest first, 0 where
     these are given.
@@ -473,7 +471,7 @@ def feed_back(slopes: Array, by_past: Array) -> None:
 
 
 class FreeRuns:
-    """Free runs over stretches of data, one after another, of models that differ in parameters alone."""
+    """Free runs over segments of data, for models of one structure."""
 
     def __init__(self, model: Narx, stretches: Sequence[Stretch], tracker: Tracker) -> None:
         self.model, self.stretches, self.tracker = model, stretches, tracker
@@ -491,7 +489,7 @@ class FreeRuns:
         )
 
     def outputs(self, model: Narx) -> Array:
-        """Return the outputs over all stretches, whether they count or not, shape (n,)."""
+        """Return the outputs over all segments, shape (n,)."""
         coefficients = model.coefficients(model.sample_time)
         outputs = np.empty((self.counts.size, 1))
         stop = 0
@@ -501,7 +499,7 @@ class FreeRuns:
         return outputs[:, 0]
 
     def errors(self, theta: Array) -> Array:
-        """Return the errors at samples that count, relative to half the output's range."""
+        """Return the errors at scored samples, relative to half the output's range."""
         half = self.model.output_scale[1]
         errors = (self.outputs(self.model.unpack(theta))[self.counts] - self.target) / half
         errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
@@ -528,7 +526,7 @@ class FreeRuns:
 
 
 def free_run_rmse(model: Narx, data: TrainingData) -> float:
-    """Return the RMSE of free runs, each started where it was measured; infinite where it overflows."""
+    """Return the RMSE of free runs from measured starts; infinite on overflow."""
     runs = FreeRuns(model, stretches(model, data, None), Tracker())
     with np.errstate(over="ignore", invalid="ignore"):
         value = float(np.sqrt(np.mean((runs.outputs(model)[runs.counts] - runs.target) ** 2)))
@@ -536,7 +534,7 @@ def free_run_rmse(model: Narx, data: TrainingData) -> float:
 
 
 def stable(model: Narx, data: TrainingData) -> bool:
-    """Tell whether the output stays within bounds on the data, and while inputs are held long."""
+    """Return whether the output is bounded on the data, and for long constant inputs."""
     low, high = data.input_range
     centre, half = model.output_scale
     most = (1.0 + 2.0 * BOUND) * half

@@ -1,4 +1,4 @@
-"""Prediction-error minimisation of linear models: Gauss-Newton from many starts, stable at every step.
+"""Prediction-error minimisation of linear models: stable Gauss-Newton from many starts.
 
 A(q) y = B(q) / F(q) u + C(q) / D(q) e; of several inputs, the sum of B_i / F_i u_i. Residuals are
 one-step prediction errors e = D / C (A y - B / F u - start), where the start is what the state before
@@ -33,35 +33,35 @@ from mckibben.estimators.optimisers.multi_start import follow_best, trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
 STABLE = 1.0 - 1e-7
-"""Largest pole."""
+"""Largest magnitude of a pole."""
 
 INVERTIBLE = 1.0 - 1e-7
-"""Largest root of C."""
+"""Largest magnitude of a root of C."""
 
 FIRST_STEPS, FOLLOWED, STEPS = 8, 3, 60
-"""Steps taken from every start; how many of the best, at different places, are followed; how far."""
+"""Steps from every start; number of distinct best starts that are continued; their steps."""
 
 ALTERNATIONS = 2
-"""Times that noise model and B are solved for in turn, for a start."""
+"""Number of alternations between the noise model and B, for a start."""
 
 NOISE_SAMPLES = 2000
-"""Of every run, of which the noise model of a start is made."""
+"""Samples of every run used for the noise model of a start."""
 
 REPLANTED = 4
-"""Starts, the best, whose noise model is used to find the plant anew."""
+"""Number of best starts whose noise model is used to re-estimate the plant."""
 
 SAME = 1e-6
-"""Relative difference of errors that is none."""
+"""Relative difference of equal errors."""
 
 FELT = 1e-13
-"""Share of a start's response that is left where samples count, for it to be solved for."""
+"""Smallest share of a start's response at the samples used for which it is estimated."""
 
 LEAST_GAIN = 2e-9
-"""Share of the squared error that a step gains, or the descent has arrived."""
+"""Smallest relative reduction of the squared error for another step."""
 
 
 LARGEST = 1.0 - 1e-7
-"""Reflection coefficient."""
+"""Largest magnitude of a reflection coefficient."""
 
 Start = Literal["fitted", "first_sample", "virgin"]
 """State before the first sample: estimated; at rest at the first input; at rest at an input of zero.
@@ -73,7 +73,7 @@ samples, which have none before them, are left out of account by a start that is
 
 @dataclass(frozen=True)
 class Orders:
-    """How many coefficients each polynomial has, beside the leading ones."""
+    """Number of coefficients of each polynomial, without leading ones."""
 
     b: int
     a: int = 0
@@ -81,43 +81,43 @@ class Orders:
     c: int = 0
     d: int = 0
     delay: int = 0
-    """Samples before B's first coefficient."""
+    """Delay of the first coefficient of B [samples]."""
 
     lags: tuple[int, ...] | None = None
-    """Of B's coefficients, in samples, instead of the next ones after the delay."""
+    """Lags of B's coefficients [samples], instead of successive ones after the delay."""
 
     inputs: int = 1
-    """Of which each has a B and, where there is one, an F."""
+    """Number of inputs, each with its own B and, in some models, F."""
 
     @property
     def input_lags(self) -> tuple[int, ...]:
-        """By how many samples the input of each coefficient of B lies back."""
+        """Lags of the coefficients of B in samples."""
         return self.lags or tuple(range(self.delay, self.delay + self.b))
 
     @property
     def zeros(self) -> int:
-        """Coefficients of the B of all inputs."""
+        """Number of coefficients of B over all inputs."""
         return self.inputs * self.b
 
     @property
     def recursions(self) -> int:
-        """Recursions from inputs to output: the one of A, or the F of every input."""
+        """Number of recursions from inputs to output: the one of A, or the F of every input."""
         return 1 if self.a else self.inputs
 
     @property
     def poles(self) -> int:
-        """Coefficients of all recursions."""
+        """Number of coefficients of all recursions."""
         return self.a + self.inputs * self.f
 
     @property
     def size(self) -> int:
-        """Parameters: B, poles, C, D and a constant."""
+        """Number of parameters: B, poles, C, D and a constant."""
         return self.zeros + self.poles + self.c + self.d + 1
 
 
 @dataclass(frozen=True)
 class Polynomials:
-    """The coefficients, those after the leading 1 where there is one, and the constant.
+    """The coefficients after a leading 1, and the constant.
 
     ``b`` has a row for every input, ``poles`` for every recursion.
     """
@@ -138,7 +138,7 @@ class Polynomials:
 
     @property
     def monic(self) -> tuple[Array, ...]:
-        """All that have a leading 1, without it: every recursion, C and D."""
+        """All monic polynomials, without their leading 1: recursions, C and D."""
         return (*self.poles, self.c, self.d)
 
 
@@ -151,7 +151,7 @@ def errors(
     *,
     only_starts: bool = False,
 ) -> tuple[Array, Array]:
-    """Return the prediction errors of a run, and their derivatives by theta and by its start.
+    """Return the prediction errors of a run, and derivatives by theta and by its start.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def errors(
 
 
 def spectral_radius(tail: Array) -> float:
-    """Return the largest size of the roots of a polynomial with a leading 1."""
+    """Return the largest magnitude of the roots of a monic polynomial."""
     if tail.size == 0 or not np.isfinite(tail).all():
         return 0.0 if tail.size == 0 else np.inf
     if tail.size > 2:
@@ -250,7 +250,7 @@ def spectral_radius(tail: Array) -> float:
 
 
 def inside(tail: Array, radius: float) -> Array:
-    """Return a polynomial, leading 1 left out, with roots outside reflected to within a radius.
+    """Return a monic polynomial with outer roots reflected to within a radius.
 
     Reflection at the unit circle leaves the spectrum of a noise as it is, but for a factor.
     """
@@ -266,7 +266,7 @@ def inside(tail: Array, radius: float) -> Array:
 
 
 def free_coordinates(tail: Array) -> Array:
-    """Return the coordinates of a stable polynomial, leading 1 left out; those of the next within."""
+    """Return the coordinates of a stable monic polynomial; of the nearest one if unstable."""
     a, found = tail, np.empty(tail.size)
     for m in range(tail.size, 0, -1):
         k = found[m - 1] = float(np.clip(a[-1], -LARGEST, LARGEST))
@@ -275,7 +275,7 @@ def free_coordinates(tail: Array) -> Array:
 
 
 def polynomial(coordinates: Array) -> tuple[Array, Array]:
-    """Return the polynomial of coordinates, leading 1 left out, and its derivatives by them, (n, n)."""
+    """Return the monic polynomial of coordinates, and its derivatives, (n, n)."""
     n = coordinates.size
     reflection = np.clip(np.tanh(coordinates), -LARGEST, LARGEST)
     a, slopes = np.empty(0), np.empty((0, n))
@@ -287,7 +287,7 @@ def polynomial(coordinates: Array) -> tuple[Array, Array]:
 
 
 def admissible(theta: Array, orders: Orders) -> bool:
-    """Tell whether poles, and the roots of C and D, lie where they may."""
+    """Return whether poles, and the roots of C and D, are admissible."""
     p = Polynomials.of(theta, orders)
     return (
         bool(np.isfinite(theta).all())
@@ -298,14 +298,14 @@ def admissible(theta: Array, orders: Orders) -> bool:
 
 
 def loosened(theta: Array, orders: Orders) -> Array:
-    """Return the coordinates of parameters in which no step leaves what is stable."""
+    """Return the coordinates of parameters in which every step is stable."""
     p = Polynomials.of(theta, orders)
     free = [free_coordinates(tail) for tail in p.monic]
     return np.concatenate([p.b.ravel(), *free, [p.constant]])
 
 
 def tightened(coordinates: Array, orders: Orders) -> tuple[Array, Array]:
-    """Return the parameters of such coordinates, and their derivatives by them."""
+    """Return the parameters of coordinates, and their derivatives."""
     p = Polynomials.of(coordinates, orders)
     theta, slopes, place = coordinates.copy(), np.eye(coordinates.size), orders.zeros
     for tail in p.monic:
@@ -318,7 +318,7 @@ def tightened(coordinates: Array, orders: Orders) -> tuple[Array, Array]:
 def evaluate(
     theta: Array, orders: Orders, runs: Sequence[Run], start: Start = "fitted"
 ) -> tuple[Array, Array, float]:
-    """Return errors, derivatives with every start solved for, and the RMSE, where samples count."""
+    """Return errors, derivatives with optimal starts, and the RMSE at scored samples."""
     found, slopes = [], []
     for run in runs:
         # how the start's own response moves with theta counts too: slopes are taken at the start found
@@ -374,7 +374,7 @@ def minimise(
 
 
 class At:
-    """Errors at parameters, and their derivatives, which are computed with them."""
+    """Errors at parameters, with derivatives computed together."""
 
     def __init__(self, orders: Orders, runs: Sequence[Run], start: Start, tracker: Tracker) -> None:
         self.orders, self.runs, self.start, self.tracker = orders, runs, start, tracker
@@ -388,7 +388,7 @@ class At:
         return e
 
     def slopes(self, theta: Array) -> Array:
-        """Return the derivatives where errors were last asked for."""
+        """Return the derivatives of the last evaluation of errors."""
         return self._slopes
 
 
@@ -400,7 +400,7 @@ def arx(runs: Sequence[Run], orders: Orders) -> Array:
 
 
 def filtered(run: Run, numerator: Sequence[float], denominator: Sequence[float]) -> Run:
-    """Return a run whose inputs and outputs have passed a filter."""
+    """Return a run with filtered inputs and outputs."""
     from scipy.signal import lfilter
 
     driven, outputs = (
@@ -412,7 +412,7 @@ def filtered(run: Run, numerator: Sequence[float], denominator: Sequence[float])
 def starting_points(
     runs: Sequence[Run], known: Sequence[Run], orders: Orders, n_starts: int, seed: int
 ) -> list[Array]:
-    """Return parameters to start from: reduced ARX, lags and oscillations of a few speeds, random lags.
+    """Return initial parameters: reduced ARX, typical lags and oscillations, random lags.
 
     ARX looks at past outputs, so it is found on what is known: stretches whose samples all count.
 
@@ -446,7 +446,7 @@ def starting_points(
 
 
 def _with_plant(theta: Array, runs: Sequence[Run], orders: Orders) -> Array:
-    """Return parameters whose plant is found on data whitened by the noise model given."""
+    """Return parameters with the plant re-estimated on data whitened by the noise model."""
     p = Polynomials.of(theta, orders)
     top, below = ([1.0, *p.d], [1.0, *p.c]) if not orders.a else ([1.0], [1.0, *p.c])
     moved = (
@@ -459,7 +459,7 @@ def _with_plant(theta: Array, runs: Sequence[Run], orders: Orders) -> Array:
 
 
 def _complete(poles: Array, white: Sequence[Run], runs: Sequence[Run], orders: Orders) -> Array:
-    """Return parameters with these poles for every input, and the B, constant, C and D that suit them.
+    """Return parameters with given poles, and optimal B, constant, C and D.
 
     B is solved for on data in which the noise is white, or taken to be; its residuals on the data as
     they are give C and D; under these B and the constant are solved for again, and so on.
@@ -479,7 +479,7 @@ def _complete(poles: Array, white: Sequence[Run], runs: Sequence[Run], orders: O
 
 
 def _noise(theta: Array, orders: Orders, run: Run) -> Array:
-    """Return what plant, constant and start leave, which are the best under the noise model."""
+    """Return the residual of plant, constant and start under the noise model."""
     from scipy.signal import lfilter
 
     p = Polynomials.of(theta, orders)
@@ -490,7 +490,7 @@ def _noise(theta: Array, orders: Orders, run: Run) -> Array:
 
 
 def _linear_solved(theta: Array, orders: Orders, runs: Sequence[Run]) -> Array:
-    """Return the parameters with the best B and constant, the others held."""
+    """Return the parameters with the best B and constant, others fixed."""
     places = [*range(orders.zeros), orders.size - 1]
     e, jacobian, _ = evaluate(theta, orders, runs)
     solved = theta.copy()
@@ -499,7 +499,7 @@ def _linear_solved(theta: Array, orders: Orders, runs: Sequence[Run]) -> Array:
 
 
 def arma(series: Sequence[Array], n_c: int, n_d: int) -> Array:
-    """Return C and D, without leading ones, of noise C / D e: the best of many C, each with its D.
+    """Return C and D, without leading ones, of noise C / D e: the best of several C.
 
     One is Hannan and Rissanen's, by regression on the residuals of a long autoregression; it misses
     roots near the unit circle, whose memory is longer than any regression's, so roots are tried too.
@@ -523,7 +523,7 @@ def arma(series: Sequence[Array], n_c: int, n_d: int) -> Array:
 
 
 def _tried(order: int) -> list[Array]:
-    """Return polynomials with one or two roots other than zero, spread over the unit disc."""
+    """Return polynomials with one or two non-zero roots, spread over the unit disc."""
     radii = (-0.999, -0.97, -0.8, -0.4, 0.4, 0.8, 0.97, 0.999)
     roots: list[list[complex]] = [[]]
     if order >= 1:
@@ -537,7 +537,7 @@ def _tried(order: int) -> list[Array]:
 
 
 def _hannan_rissanen(series: Sequence[Array], n_c: int, n_d: int) -> Array:
-    """Return C by regression of the noise on its past and the past of what drives it."""
+    """Return C by regression of the noise on its past and past innovations."""
     from scipy.signal import lfilter
 
     total = sum(v.size for v in series)
@@ -558,14 +558,14 @@ def _hannan_rissanen(series: Sequence[Array], n_c: int, n_d: int) -> Array:
 
 
 def lagged(x: Array, lags: int, first: int) -> Array:
-    """Return x one to so many samples before, from a first sample on, shape (n - first, lags)."""
+    """Return lags 1 to n of x from a first sample on, shape (n - first, lags)."""
     padded = np.concatenate([np.zeros(lags), x])
     columns = [padded[lags - k : padded.size - k] for k in range(1, lags + 1)]
     return np.column_stack([np.empty((x.size, 0)), *columns])[first:]
 
 
 def _whitened(runs: Sequence[Run], orders: Orders) -> list[list[Run]]:
-    """Return the data filtered by the A of ARX models of a few high orders, under which noise is white.
+    """Return the data filtered by the A of high-order ARX models, which whitens the noise.
 
     Source: Zhu and Hjalmarsson, "The Box-Jenkins Steiglitz-McBride algorithm", Automatica, 2016.
     """
@@ -584,7 +584,7 @@ def _whitened(runs: Sequence[Run], orders: Orders) -> list[list[Run]]:
 
 
 def _steiglitz_mcbride(runs: Sequence[Run], orders: Orders, rounds: int) -> Array:
-    """Return the poles of one recursion by ARX, iterated on data filtered by the poles found before."""
+    """Return the poles of one recursion by iterated ARX on filtered data."""
     simple = replace(orders, a=orders.a + orders.f, f=0, c=0, d=0)
     poles = np.zeros(simple.a)
     for _ in range(rounds + 1):

@@ -1,4 +1,4 @@
-"""Identification of continuous-time process models P1 to P3, by free-run errors."""
+"""Identification of continuous-time process models P1 to P3, by free-running errors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Structure = Literal["P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"]
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class ProcessModelEstimator(SeparableEstimator):
-    """Process model by variable projection: gain and zero are solved for, the poles searched.
+    """Process model by variable projection: gain and zero solved for, poles searched.
 
     P2UZ is Eq. (11) of "Analysis and modeling of a pneumatic artificial muscle system".
 
@@ -65,7 +65,7 @@ class ProcessModelEstimator(SeparableEstimator):
 
     @property
     def fixed_fields(self) -> tuple[str, ...]:
-        """The input's offset, which the output's makes up for."""
+        """The input's offset, which is redundant with the output's."""
         return ("process-model.input_offset",)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
@@ -75,7 +75,7 @@ class ProcessModelEstimator(SeparableEstimator):
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
-        """Return the condition and covariance from free-run errors; the input's offset is set."""
+        """Return condition and covariance from free-running errors; the input's offset is fixed."""
         fixed = [*at_bounds, *self.fixed(block)]
         return covariance_of(block, data, residual, fixed, self.free_runs)
 
@@ -95,7 +95,7 @@ class ProcessModelEstimator(SeparableEstimator):
 
     @property
     def n_times(self) -> int:
-        """Time constants searched."""
+        """Number of time constants searched."""
         return 1 if "U" in self.structure else int(self.structure[1])
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
@@ -112,7 +112,7 @@ class ProcessModelEstimator(SeparableEstimator):
         return np.array(lower), np.array(upper)
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return lags of a few speeds; of several, none alike, which no derivative would part."""
+        """Return initial lags; for several, distinct ones."""
         lower, upper = self.bounds(data)
         apart = np.where(np.arange(lower.size) < self.n_times, 0.05 * np.arange(lower.size), 0.0)
         return [lower + (share - apart) * (upper - lower) for share in (0.2, 0.4, 0.6, 0.8)]
@@ -146,7 +146,7 @@ class ProcessModelEstimator(SeparableEstimator):
         return np.column_stack(columns)
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:
-        """Return the basis and, where starts are fitted, what the lags of every run start with."""
+        """Return the regressors and, if starts are fitted, the responses to start states."""
         from scipy.linalg import block_diag
 
         columns = super().matrix(theta, data)

@@ -22,7 +22,7 @@ from mckibben.blocks.kernels import summing_kernel
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
-from mckibben.estimators.core.uncertainty import relative_sizes, told_by_runs
+from mckibben.estimators.core.uncertainty import covariance_by_runs, relative_sizes
 from mckibben.estimators.dynamics.linear_oscillator import (
     MOST_SUBSTEPS,
     Linear,
@@ -34,28 +34,29 @@ from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
 ANGLE = 1 / 3
-"""Of the linear oscillator in a substep, at most [rad]."""
+"""Largest angle of the linear oscillator per substep [rad]."""
 
 SPRING, DAMPING, LAG = 0.5, 0.1, 0.3
-"""Of a start, in units of the linear oscillator: what pulls the displacement back beside lags of the
-velocity, what damps, and how fast the first lag dies away."""
+"""Initial values in units of the linear oscillator: stiffness with lags of the velocity, damping,
+and decay rate of the first lag.
+"""
 
 UNIT, FORCED, READ = 0.7, 0.05, 0.01
-"""Sizes of random weights: of units by states, by the input, and of what is read of them."""
+"""Scales of random initial weights: of units by states, by the input, and of the output layer."""
 
 LEAST_GAIN = 1e-7
-"""Share of the squared error that a step gains, or the descent has arrived."""
+"""Smallest relative reduction of the squared error for another step."""
 
 RUNGE_KUTTA = ((0.0, 1.0, 0.5), (0.5, 2.0, 0.5), (0.5, 2.0, 1.0), (1.0, 1.0, 0.0))
-"""Of every stage how far into the step it is, the weight of its rates, and how far these then lead."""
+"""Runge-Kutta stages: position in the step, weight, and length of the following stage."""
 
 LARGEST = 1e6
-"""State, in units of the output's scale, that is out of all bounds."""
+"""State, in units of the output's scale, that counts as diverged."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class StateNetworkEstimator(SearchEstimator):
-    """State-space network by Gauss-Newton on free runs, told nothing but how many states there are.
+    """State-space network by Gauss-Newton on free runs, with a given number of states.
 
     Parameters
     ----------
@@ -74,10 +75,10 @@ class StateNetworkEstimator(SearchEstimator):
     title = "State-space network"
     purpose = "rate"
     can = (
-        "Nonlinear dynamics with memory of any kind, from force to displacement, told nothing"
-        " but the number of states."
+        "Nonlinear dynamics with memory of any kind, from force to displacement; only the number"
+        " of states is set."
     )
-    cannot = "Slow to fit; no inverse; nothing keeps it sensible beyond the data."
+    cannot = "Slow to fit; no inverse; arbitrary beyond the data."
     caution = "a network without physics is arbitrary beyond them"
     needs_time: ClassVar[bool] = True
 
@@ -119,7 +120,7 @@ class StateNetworkEstimator(SearchEstimator):
         return template.unpack(tracker.best), data
 
     def start(self, linear: Linear, data: TrainingData, substeps: int) -> StateNetwork:
-        """Return the network that the descent begins with."""
+        """Return the initial network of the descent."""
         rng, n, units = np.random.default_rng(self.seed), self.n_states, self.n_units
         force, moved = data.stacked("driven")[:, 0], data.target
         sizes = float(np.std(force)), float(np.std(moved))
@@ -152,7 +153,7 @@ class StateNetworkEstimator(SearchEstimator):
         return NetworkRuns(template, data, self._warm if self.periodic else None, tracker)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the outputs of blocks where samples count: in steady state, of periodic recordings."""
+        """Return the outputs of blocks at scored samples: in steady state for periodic recordings."""
         if not self.periodic:
             return super().free_runs(blocks, data)
         networks = [cast("StateNetwork", block) for block in blocks]
@@ -167,7 +168,7 @@ class StateNetworkEstimator(SearchEstimator):
         search = self.search(network, merged, Tracker())
         left = search.errors(network.pack())
         size = relative_sizes(network.pack())
-        condition, own = told_by_runs(search.slopes(network.pack()) * size, left, merged.runs)
+        condition, own = covariance_by_runs(search.slopes(network.pack()) * size, left, merged.runs)
         return condition, own * np.outer(size, size)
 
 
@@ -187,7 +188,7 @@ class NetworkRuns:
         self.paths = paths(data, template.substeps, warm, self.at_rest)
 
     def errors(self, theta: Array) -> Array:
-        """Return the errors where samples count; infinite where a run leaves all bounds."""
+        """Return the errors at scored samples; infinite for diverging runs."""
         found = self._followed(theta, theta.size)
         self._slopes = found[:, 1:]
         errors = found[:, 0] - self.target
@@ -195,16 +196,16 @@ class NetworkRuns:
         return np.asarray(errors)
 
     def slopes(self, theta: Array) -> Array:
-        """Return the derivatives where errors were last asked for."""
+        """Return the derivatives of the last evaluation of errors."""
         del theta
         return self._slopes
 
     def outputs(self, theta: Array) -> Array:
-        """Return the outputs where samples count."""
+        """Return the outputs at scored samples."""
         return self._followed(theta, 0)[:, 0]
 
     def _followed(self, theta: Array, p: int) -> Array:
-        """Return the outputs where samples count, and their derivatives by p weights, (n, 1 + p)."""
+        """Return the outputs at scored samples, and derivatives by p weights, (n, 1 + p)."""
         model = self.template
         n, units = len(model.linear), len(model.hidden)
         parts: Any = np.split(theta, np.cumsum([n * (n + 2), units * (n + 2)]))
@@ -294,7 +295,7 @@ def follow_network(
     skipped: int,
     found: Array,
 ) -> bool:
-    """Run a network over inputs joined by straight lines, one Runge-Kutta step each.
+    """Simulate a network with linearly interpolated inputs, one Runge-Kutta step per sample.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Identification of activation pressure: with memory, solved for at once; and as in its paper.
+"""Identification of activation pressure: with memory, in closed form; and as in its paper.
 
 Source of the latter: "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization
 and Particle Swarm Optimization", Sections 4.2 to 4.4; gamma and phi are found by least squares where
@@ -27,14 +27,14 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.signals.reversals import reversals
 
 SMOOTHED = 3.0
-"""Samples that the filter of the rate lasts where it is not set."""
+"""Default length of the rate filter [samples]."""
 
 # -- with memory -----------------------------------------------------------------------------
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class ActivationMemoryEstimator(SeparableEstimator):
-    """Activation pressure that needs no frequency.
+    """Activation pressure for any frequency.
 
     Parameters
     ----------
@@ -60,13 +60,13 @@ class ActivationMemoryEstimator(SeparableEstimator):
     )
     cannot = (
         "Is itself a compensator, so it has no inverse here; extrapolates as polynomials do "
-        "beyond the forces and contractions seen."
+        "beyond the recorded forces and contractions."
     )
     quick = True
     effort: ClassVar[float] = 1.0
     needs_time: ClassVar[bool] = True
     made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
-    told: ClassVar[tuple[str, ...]] = ("force",)
+    input_settings: ClassVar[tuple[str, ...]] = ("force",)
     rises: ClassVar[bool] = False
 
     input: str = "contraction"
@@ -111,13 +111,13 @@ class ActivationMemoryEstimator(SeparableEstimator):
         )
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the output by each coefficient alone but the constant, over the run's history."""
+        """Return the response to each coefficient but the constant, over the run's history."""
         unit = self.unit(data)
         alone = np.eye(unit.n_parameters)[1:]
         return unit.simulate_many(alone, run.inputs, sample_time=run.sample_time).T
 
     def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
-        """Solve with every run's errors relative to its own range, so that light loads count too."""
+        """Solve with every run's errors relative to its own range, so that light loads count equally."""
         parts = [run.y[run.counts] for run in data.runs]
         weights = np.concatenate(
             [np.full(y.size, 1.0 / max(float(np.ptp(y)), 1e-9)) for y in parts]
@@ -135,11 +135,14 @@ class ActivationMemoryEstimator(SeparableEstimator):
 # -- as published ----------------------------------------------------------------------------
 
 HELD = 0.05
-"""Share of the largest range of any run's input, below which that of a run is noise: it is held."""
+"""Range of an input, relative to the largest of any run, below which it is noise and the input
+constant.
+"""
 
 STATIC_SHARE = 0.1
-"""A run below this share of the fastest run's frequency is static: it bounds low and high pressure,
-and nothing of the rate is found from it."""
+"""Share of the fastest run's frequency below which a run is static: it determines low and high
+pressure, and no rate terms.
+"""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -159,13 +162,11 @@ class ActivationPressureEstimator(SearchEstimator):
 
     title = "Activation pressure by characteristic points"
     purpose = "force"
-    can = (
-        "Pressure for a contraction under a force, at one frequency of a sine; as its paper has it."
-    )
-    cannot = "Knows no minor loops and no other frequency: its hysteresis is a term in the rate."
+    can = "Pressure for a contraction under a force, at one frequency of a sine; as in its paper."
+    cannot = "No minor loops, one frequency: its hysteresis is a term in the rate."
     needs_time: ClassVar[bool] = True
     made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
-    told: ClassVar[tuple[str, ...]] = ("force",)
+    input_settings: ClassVar[tuple[str, ...]] = ("force",)
 
     input: str = "contraction"
     output: str = "pressure"
@@ -174,7 +175,7 @@ class ActivationPressureEstimator(SearchEstimator):
     frequency: Annotated[float, Ge(0)] | None = None
 
     def fixed(self, block: Block) -> tuple[int, ...]:
-        """Return the places of powers that forces or frequencies are too few for, and of gamma's factor.
+        """Return the indices of undetermined powers of force or frequency, and of gamma's factor.
 
         Those powers are exactly 0; gamma is 1 at the mean frequency, as phi has the size of both.
         """
@@ -182,7 +183,7 @@ class ActivationPressureEstimator(SearchEstimator):
         return tuple(sorted({*absent, block.n_parameters - 1}))
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the model found, set to the first moving run's frequency, and the data."""
+        """Return the model, set to the first moving run's frequency, and the data."""
         step, smoothed, given = data.timed(), self.rate_time_constant, self.frequency
         at = frequencies(data.runs) if given is None else np.full(len(data.runs), given)
         moving = at >= STATIC_SHARE * at.max()
@@ -235,14 +236,14 @@ class ActivationPressureEstimator(SearchEstimator):
 
 
 def frequencies(runs: Sequence[Run]) -> Array:
-    """Return the strongest frequency of each run's input [Hz]; 0 of one that is held."""
+    """Return the dominant frequency of each run's input [Hz]; 0 if it is constant."""
     spans = np.array([float(np.ptp(run.u)) for run in runs])
     found = np.array([dominant_frequency(run) for run in runs])
     return np.where(spans < HELD * spans.max(), 0.0, found)
 
 
 def dominant_frequency(run: Run) -> float:
-    """Return the strongest frequency of a run's input [Hz]."""
+    """Return the dominant frequency of a run's input [Hz]."""
     assert run.sample_time is not None
     moved = run.u - run.u.mean()
     spectrum = np.abs(np.fft.rfft(moved * np.hanning(moved.size), 4 * moved.size))
@@ -252,14 +253,14 @@ def dominant_frequency(run: Run) -> float:
 # -- characteristic points -------------------------------------------------------------------
 
 SAME_FORCE = 0.02
-"""Share of the largest mean force by which runs of one force differ at most."""
+"""Largest difference of runs of one force, relative to the largest mean force."""
 
 LOW, HIGH = 0.07, 0.975
 """Boundaries of low and high pressure as shares of the range: Table 1 has y_3 at .028 and y_4 at
 .391 MPa, of 0 to .4 MPa."""
 
 MARGIN, FARTHEST = 0.05, 3.0
-"""Least and greatest distance of a boundary from the extreme beside it: in contraction, relative to
+"""Smallest and largest distance of a boundary from the nearest extreme: in contraction, relative to
 the distance of the extremes (by Table 1, 0.2 to 1.4). The least holds for the pressures, too, relative
 to their range."""
 
@@ -318,7 +319,7 @@ def characteristic_points(runs: Sequence[Run], moving: Sequence[bool]) -> tuple[
 
 
 def by_force(runs: Sequence[Run]) -> dict[float, list[int]]:
-    """Return which runs have one mean force [N], weakest first."""
+    """Return the runs of equal mean force [N], weakest first."""
     means = [float(run.scheduled.mean()) for run in runs]
     groups: dict[float, list[int]] = {}
     apart = SAME_FORCE * max(map(abs, means))
@@ -329,13 +330,13 @@ def by_force(runs: Sequence[Run]) -> dict[float, list[int]]:
 
 
 def outermost(runs: Sequence[Run]) -> Array:
-    """Return contraction and pressure, (2, 2), where the runs turn at the least and the most."""
+    """Return contraction and pressure, (2, 2), at the outermost turning points."""
     turns = np.concatenate([_turns(run) for run in runs])
     return turns[[turns[:, 0].argmin(), turns[:, 0].argmax()]]
 
 
 def _turns(run: Run) -> Array:
-    """Return contraction and pressure where a run turns, or of all of it where it hardly does."""
+    """Return contraction and pressure at turning points, or over all of a run that hardly turns."""
     # where a run begins and ends, it does not turn
     places = [place for place in reversals(run.u)[1:-1] if run.counts[place]]
     if len(places) < 2:
@@ -344,7 +345,7 @@ def _turns(run: Run) -> Array:
 
 
 def boundaries(runs: Sequence[Run], extremes: Array, levels: tuple[float, float]) -> Array:
-    """Return the contractions e_3 and e_4 of a cubic that goes through the extremes at one force.
+    """Return the contractions e_3 and e_4 of a cubic through the extremes at one force.
 
     The errors of a run are relative to its own range of pressure, so that loops and slow cycles count
     alike.
@@ -372,7 +373,7 @@ def boundaries(runs: Sequence[Run], extremes: Array, levels: tuple[float, float]
 
 
 def regress(forces: Array, values: Array) -> Array:
-    """Return a cubic of the force through values, of lower order where there are few forces."""
+    """Return a cubic of the force through values; of lower order for few forces."""
     order = min(3, forces.size - 1)
     scale = max(float(np.abs(forces).max()), 1.0)
     found = np.polyfit(forces / scale, values, order) / scale ** np.arange(order, -1, -1)

@@ -51,7 +51,7 @@ class PolynomialForceEstimator(SeparableEstimator):
     cannot = "No hysteresis."
     inverse_kind = "exact"
     made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
     rises: ClassVar[bool] = False
 
     input: str = "length"
@@ -72,7 +72,7 @@ class PolynomialForceEstimator(SeparableEstimator):
 def force_columns(
     length: Array, pressure: Array, orders: tuple[int, int], span: tuple[float, float]
 ) -> Array:
-    """Return what the coefficients of a polynomial law multiply, but its constant, shape (n, k)."""
+    """Return the regressors of a polynomial law, without its constant, shape (n, k)."""
     x = (length - 0.5 * sum(span)) / (0.5 * (span[1] - span[0]))
     with_pressure = [pressure * x**i for i in range(orders[0] + 1)]
     return np.column_stack([*with_pressure, *[x**j for j in range(1, orders[1] + 1)]])
@@ -85,7 +85,7 @@ def force_law(
     span: tuple[float, float],
     channels: dict[str, Channel],
 ) -> PolynomialForce:
-    """Return the polynomial law of coefficients as `force_columns` orders them, and the constant."""
+    """Return the polynomial law of coefficients in the order of `force_columns`, and the constant."""
     n = orders[0] + 1
     return PolynomialForce(
         vector(linear[:n]),
@@ -113,7 +113,7 @@ class ChouHannafordEstimator(SeparableEstimator):
     inverse_kind = "exact"
     quick = True
     made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
     rises: ClassVar[bool] = False
 
     input: str = "length"
@@ -121,7 +121,7 @@ class ChouHannafordEstimator(SeparableEstimator):
     pressure: str = "pressure"
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return pressure times the square of the length, less its least, and whole.
+        """Return pressure times squared length, relative to its least, and absolute.
 
         The law crosses zero at b / sqrt(3): weights of at least 0 keep that between no length at all
         and the shortest seen.
@@ -131,7 +131,7 @@ class ChouHannafordEstimator(SeparableEstimator):
         return np.column_stack([pressure * (length**2 - shortest**2), pressure * length**2])
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
-        """Return a little of the first: without it there would be no braid."""
+        """Return a small lower bound of the first: without it there would be no braid."""
         reach = float(np.ptp(matrix[:, 0])) or 1.0
         low, high = data.output_range
         return np.array([1e-3 * (high - low) / reach, 0.0])
@@ -162,7 +162,7 @@ class TonduLopezEstimator(SeparableEstimator):
     can = "Static force of a cylinder with end and pressure corrections."
     cannot = "No hysteresis; bends less than data often do."
     made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
 
@@ -178,7 +178,7 @@ class TonduLopezEstimator(SeparableEstimator):
         return np.array([0.2, -2.0, 0.3]), np.array([0.9, 5.0, 3.0])
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return usual angles without corrections."""
+        """Return typical angles without corrections."""
         return [np.array([angle, 0.0, 1.0]) for angle in (0.35, 0.45, 0.55)]
 
     def law(

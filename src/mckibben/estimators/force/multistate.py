@@ -33,11 +33,11 @@ from mckibben.recording import Recording, listed
 Structure = Literal["eleven", "each-way", "eighteen"]
 STRUCTURES = {"eleven": ELEVEN, "each-way": EACH_WAY, "eighteen": EIGHTEEN}
 LEAST_SHARE = 1e-5
-"""Least force of an element, relative to the range of the output."""
+"""Smallest force of an element, relative to the range of the output."""
 
 LENGTHS = np.geomspace(0.02, 1.0, 8)
 TIMES = (0.1, 10.0)
-"""Break-away lengths that elements are tried with, relative to the range, and times, in samples."""
+"""Initial break-away lengths of elements, relative to the range, and times [samples]."""
 
 
 GAINS = (-0.5, 1.0)
@@ -50,7 +50,7 @@ def extract_hysteresis(
     *,
     output: str = "force_hysteresis",
 ) -> list[Recording]:
-    """Return recordings with what a model leaves of its output, as a static law: f_h = f - f_st.
+    """Return recordings with the residual of a static law as output: f_h = f - f_st.
 
     Source: "A Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the
     Mechanical Response of Pneumatic Artificial Muscles", Eq. (2).
@@ -79,7 +79,7 @@ def extract_hysteresis(
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class MultistateEstimator(SeparableEstimator):
-    """Multistate friction by bounded least squares from many starts, and exchange of elements.
+    """Multistate friction by bounded least squares from many starts, with exchange of elements.
 
     Break-away lengths and relaxation times are searched; stiffnesses, and a static law, are solved
     for. With ``static=None`` the output is taken to be the hysteresis alone, as the paper does
@@ -115,7 +115,7 @@ class MultistateEstimator(SeparableEstimator):
     n_refined: Annotated[int, Interval(ge=1)] = 8
 
     made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
     # where elements begin to slip makes corners in the cost, which take many short steps
@@ -124,7 +124,7 @@ class MultistateEstimator(SeparableEstimator):
 
     @property
     def directions(self) -> tuple[Direction, ...]:
-        """What each element is."""
+        """The direction of each element."""
         if isinstance(self.elements, str):
             return STRUCTURES[self.elements]
         return tuple(self.elements)
@@ -139,7 +139,7 @@ class MultistateEstimator(SeparableEstimator):
     # the stiffnesses are linear.
 
     def _pairs(self) -> list[int]:
-        """Return how many pairs of length and time each element has."""
+        """Return the number of length and time pairs of each element."""
         return [2 if element in ("shared", "both") else 1 for element in self.directions]
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
@@ -152,7 +152,7 @@ class MultistateEstimator(SeparableEstimator):
         return rows[:, 0], rows[:, 1]
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return elements that slip early and late, without delay."""
+        """Return initial elements that slip early and late, without delay."""
         low, high = data.input_range
         time = np.log(0.1 * (data.sample_time or 1.0))
         guesses = []
@@ -166,7 +166,7 @@ class MultistateEstimator(SeparableEstimator):
         return guesses
 
     def choices(self, data: TrainingData) -> list[Choice]:
-        """Return lengths and times to try for every element, the others held.
+        """Return candidate lengths and times for every element, others fixed.
 
         The cost has many local minima, in which one element does another's work: which of them the
         best of many starts ends in is left to rounding.
@@ -195,7 +195,7 @@ class MultistateEstimator(SeparableEstimator):
         return MultistateFriction((element,), values, initial=self.starting_rule)
 
     def _forces(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the force of every element by each of its stiffnesses, over the run's history."""
+        """Return the force of every element per unit of its stiffnesses, over the run's history."""
         length, pressure = run.inputs.T
         rising = np.diff(length, prepend=length[0]) >= 0
         columns = []
@@ -208,7 +208,7 @@ class MultistateEstimator(SeparableEstimator):
         return np.column_stack(columns) * np.reshape(grown, (-1, 1))
 
     def _reference(self, data: TrainingData) -> float:
-        """Return the pressure at which the values hold."""
+        """Return the reference pressure of the values."""
         pressures = data.once(
             "reference pressure",
             lambda: np.median(np.concatenate([run.scheduled[:, 0] for run in data.runs])),
@@ -217,7 +217,7 @@ class MultistateEstimator(SeparableEstimator):
 
     @property
     def n_stiffnesses(self) -> int:
-        """Linear parameters of the friction."""
+        """Number of linear parameters of the friction."""
         return sum(2 if element == "both" else 1 for element in self.directions)
 
     def friction(self, theta: Array, stiffnesses: Array, data: TrainingData) -> MultistateFriction:
@@ -237,7 +237,7 @@ class MultistateEstimator(SeparableEstimator):
         )
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the forces of the elements, then what the static law's coefficients multiply."""
+        """Return the forces of the elements, then the regressors of the static law."""
         friction = self._forces(theta, run, data)
         if self.static is None:
             return friction
@@ -247,7 +247,7 @@ class MultistateEstimator(SeparableEstimator):
 
     @property
     def solves_nonnegative(self) -> bool:
-        """Whether the linear parameters have least values: always, those of the static law none."""
+        """Whether linear parameters have lower bounds: those of the friction do."""
         return True
 
     @property
@@ -256,14 +256,14 @@ class MultistateEstimator(SeparableEstimator):
         return self.static is not None
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
-        """Return the least stiffnesses, with which every element gives some force."""
+        """Return the smallest stiffnesses, with which every element has some force."""
         largest = np.maximum(np.abs(matrix).max(axis=0), 1e-300)
         floor = np.asarray(LEAST_SHARE * np.ptp(data.target) / largest)
         floor[self.n_stiffnesses :] = -np.inf
         return floor
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
-        """Return the friction, with the static law beside it if there is one."""
+        """Return the friction, with the static law if there is one."""
         n = self.n_stiffnesses
         friction = self.friction(theta, linear[:n], data)
         if self.static is None:
@@ -273,7 +273,7 @@ class MultistateEstimator(SeparableEstimator):
         return Parallel((law, friction))
 
     def undetermined(self) -> tuple[int, ...]:
-        """Return the places of values that are not known, or are not told from nothing.
+        """Return the indices of values that are undetermined, or not distinct from zero.
 
         Values of friction are positive: one within two standard errors of 0 may be any smaller one. As
         residuals are not independent, more may be undetermined; `parameter_ranges` tells.
@@ -294,7 +294,7 @@ MULTISTATE = preset(
         "Friction force with elements for each direction of motion, rate included, integrated"
         " exactly."
     ),
-    cannot="Needs a static law beside it; compensated by feedforward only.",
+    cannot="Needs a static force law; compensated by feedforward only.",
     default_for="plan of force",
     elements="each-way",
     effort=3.0,
@@ -305,7 +305,7 @@ MULTISTATE_11 = preset(
     "Multistate friction by bounded least squares from many starts, and exchange of elements.",
     title="Multistate friction with eleven parameters",
     can="The paper's friction model of eleven parameters.",
-    cannot="Structure of one muscle; see multistate for yours.",
+    cannot="Structure of the paper's muscle; multistate selects one for yours.",
     elements="eleven",
 )
 
@@ -314,6 +314,6 @@ MULTISTATE_18 = preset(
     "Multistate friction with three elements in both directions: eighteen parameters.",
     title="Multistate friction with eighteen parameters",
     can="The paper's friction model of eighteen parameters.",
-    cannot="Structure of one muscle; many parameters are hardly determined.",
+    cannot="Structure of the paper's muscle; many parameters are hardly determined.",
     elements="eighteen",
 )

@@ -1,4 +1,4 @@
-"""Identification of a Prandtl-Ishlinskii memory followed by an increasing map and visco-elastic creep.
+"""Identification of a Prandtl-Ishlinskii model with increasing map and viscoelastic creep.
 
 Two things that rate-independent loops leave out of a pneumatic muscle: its friction grows with pressure,
 so the play operators act on log(u + offset); and braid and rubber creep, so the output goes on moving
@@ -34,23 +34,23 @@ from mckibben.estimators.hysteresis.pi import play_operators, spread
 from mckibben.estimators.optimisers.tracker import Tracker
 
 RAISED = 1e-5
-"""Step either way, of the logarithm of what is added to the input, for its derivative."""
+"""Step of the logarithm of the input offset, for its derivative."""
 
 MOST_ADDED = 20.0
-"""Largest addition to the input, relative to its range."""
+"""Largest input offset, relative to the input range."""
 
 FASTEST, SLOWEST = 3.0, 3.0
-"""Of the time constants: samples, and durations of the longest run."""
+"""Bounds of the time constants: in samples, and in durations of the longest run."""
 
 HELPS = 0.9
-"""Share of the error up to which it may help that creep was under way when runs began."""
+"""Ratio of errors below which an initial creep state is estimated."""
 
 FEWEST = 20
-"""Samples that tell whether later parts of runs are foreseen."""
+"""Smallest number of samples for testing that choice on later parts of runs."""
 
 UNDER_WAY = (
-    "creep was under way when the recordings began, and what was left of it was found: it goes on where "
-    "outputs are known, and elsewhere the muscle is taken to be settled"
+    "creep was in progress when the recordings began, and its state was estimated; without known "
+    "outputs, runs start without creep"
 )
 
 MOST_CREEP = 0.3
@@ -106,7 +106,7 @@ class CreepPIEstimator(SeparableEstimator):
 
     @property
     def fixed_fields(self) -> tuple[str, ...]:
-        """The offset of the operators' sum, which begins at 0."""
+        """The offset of the operators' sum, which starts at 0."""
         return ("pi.offset",)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
@@ -132,7 +132,7 @@ class CreepPIEstimator(SeparableEstimator):
         return begun
 
     def _foresees(self, data: TrainingData, tracker: Tracker) -> bool:
-        """Tell whether what comes later in the runs is foreseen better with what was left of creep."""
+        """Return whether estimated initial creep improves the prediction of later parts of runs."""
         missed = {True: 0.0, False: 0.0}
         for end in (0.5, 0.75):
             known = data.between(0.0, end).thinned(SEARCH_SAMPLES)
@@ -168,44 +168,46 @@ class CreepPIEstimator(SeparableEstimator):
         lower[0] = LEAST_REVERSIBLE
         return np.array(lower), np.array(upper)
 
-    def n_begun(self, data: TrainingData) -> int:
-        """Return how many columns the basis has for creep that was under way when runs began."""
+    def n_initial(self, data: TrainingData) -> int:
+        """Return the number of regressors of initial creep."""
         if self.settled is not False:
             return 0
         return self.n_creep * (1 + max(run.place for run in data.runs))
 
     def begun(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return how creep that was under way when runs began fades over a run's history, (n, n_begun).
+        """Return the decay of initial creep over a run's history, (n, n_initial).
 
         What an element was behind by, times its compliance, is one number an element and a run.
         """
-        columns = np.zeros((run.history.size, self.n_begun(data)))
+        columns = np.zeros((run.history.size, self.n_initial(data)))
         if columns.size:
             taus, _ = self.tail(theta)
             own = slice(run.place * self.n_creep, (1 + run.place) * self.n_creep)
             columns[:, own] = np.exp(-elapsed(run)[:, np.newaxis] / taus)
         return columns
 
-    def begun_moves(self, theta: Array, left: Array, run: Run, data: TrainingData) -> Array:
-        """Return how that moves with the logarithms of the time constants, (n, n_creep)."""
+    def initial_creep_slopes(
+        self, theta: Array, left: Array, run: Run, data: TrainingData
+    ) -> Array:
+        """Return its derivatives by the logarithms of the time constants, (n, n_creep)."""
         taus, _ = self.tail(theta)
         columns = self.begun(theta, run, data) * left
         by_element = columns.reshape(len(columns), -1, self.n_creep).sum(axis=1)
         return np.asarray(by_element * elapsed(run)[:, np.newaxis] / taus)
 
     def tail(self, theta: Array) -> tuple[Array, Array]:
-        """Return time constants and compliances as they are searched."""
+        """Return time constants and compliances in the order of the search."""
         taus, compliances = np.split(theta[theta.size - 2 * self.n_creep :], 2)
         return np.exp(taus), compliances
 
     def creep(self, theta: Array) -> tuple[Array, Array]:
-        """Return time constants and compliances, the fastest first."""
+        """Return time constants and compliances, fastest first."""
         taus, compliances = self.tail(theta)
         order = np.argsort(taus, kind="stable")
         return taus[order], compliances[order]
 
     def creep_parts(self, theta: Array, channel: Channel) -> tuple[Block, ...]:
-        """Return the block of the creep, if there is any."""
+        """Return the creep block, if there is any."""
         taus, compliances = self.creep(theta)
         rule: Literal["first_sample", "fitted"] = (
             "fitted" if self.settled is False else "first_sample"
@@ -215,7 +217,7 @@ class CreepPIEstimator(SeparableEstimator):
         return (Creep(vector(compliances), vector(taus), rule, channel, channel),)
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return fading weights, on the logarithm and nearly on the input itself, with some creep."""
+        """Return decreasing weights, on the logarithm and nearly on the input, with some creep."""
         lower, upper = self.bounds(data)
         n, k = self.n_operators, self.n_creep
         place = np.linspace(lower[n + 1 : n + 1 + k], upper[n + 1 : n + 1 + k], 5)[1:4]
@@ -229,7 +231,7 @@ class CreepPIEstimator(SeparableEstimator):
         return guesses
 
     def memory(self, theta: Array, data: TrainingData) -> tuple[float, Array, Array, Array]:
-        """Return the logarithm's offset, thresholds on it, its ends, and the operators' sums there."""
+        """Return the logarithm's offset, its thresholds and range, and the operators' sums there."""
         offset = float(np.exp(theta[self.n_operators]))
         ends = Logarithm(offset).simulate(np.array(data.input_range))
         radii = self.threshold_share * spread(self.n_operators, (ends[0], ends[1]))
@@ -269,13 +271,13 @@ class CreepPIEstimator(SeparableEstimator):
             given = pieces.pieces(x) @ linear
             moved = creep_moves(given, taus, compliances, run.sample_time)
             if left.size:
-                moved[:, : taus.size] += self.begun_moves(theta, left, run, data)
+                moved[:, : taus.size] += self.initial_creep_slopes(theta, left, run, data)
             return np.column_stack([crept, moved])
 
         return counting(data, of)
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
-        """Return a little of every piece, so that the map increases everywhere."""
+        """Return a small lower bound of every piece, so that the map increases."""
         low, high = data.output_range
         floor = np.full(matrix.shape[1], 1e-6 * (high - low))
         floor[self.map_size :] = -np.inf  # what is left of creep
@@ -303,7 +305,7 @@ class CreepPIEstimator(SeparableEstimator):
 
 
 def elapsed(run: Run) -> Array:
-    """Return the time since a run began, as its elements have felt it [s]."""
+    """Return the time since the start of a run, for its creep elements [s]."""
     assert run.sample_time is not None
     return np.asarray(run.sample_time * np.arange(1.0, 1.0 + run.history.size))
 
@@ -311,7 +313,7 @@ def elapsed(run: Run) -> Array:
 def with_creep(
     columns: Array, taus: Sequence[float] | Array, compliances: Array, step: float | None
 ) -> Array:
-    """Return columns, shape (n, k), each with visco-elastic creep."""
+    """Return columns, shape (n, k), each with viscoelastic creep."""
     if len(taus) == 0:
         return columns
     assert step is not None
@@ -323,7 +325,7 @@ def with_creep(
 
 
 def creep_moves(given: Array, taus: Array, compliances: Array, step: float | None) -> Array:
-    """Return how something with creep moves with log time constants, then compliances, (n, 2 k)."""
+    """Return derivatives of a creeping signal by log time constants, then compliances, (n, 2 k)."""
     from scipy.signal import lfilter
 
     if len(taus) == 0:

@@ -64,7 +64,7 @@ class DuhemEstimator(SeparableEstimator):
         )
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the output by each coefficient but the constant one, over the run's history."""
+        """Return the output per coefficient, without the constant, over the run's history."""
         unit = self.unit(theta, data)
         n = unit.n_parameters - 1
         alone = np.column_stack([np.eye(n)[1:], np.full(n - 1, unit.alpha)])

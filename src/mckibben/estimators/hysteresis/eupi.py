@@ -37,7 +37,7 @@ class EUPIEstimator(SeparableEstimator):
     title = "Extended unparallel Prandtl–Ishlinskii model (EUPI)"
     purpose = "memory"
     can = "Asymmetric loops by edges of different slope and threshold."
-    cannot = "One asymmetry for all operators; the inverse wants weights that are not negative."
+    cannot = "One asymmetry for all operators; the inverse needs non-negative weights."
     inverse_kind = "solved"
     makes = ("eupi",)
     effort: ClassVar[float] = 0.3
@@ -50,7 +50,7 @@ class EUPIEstimator(SeparableEstimator):
         return np.array([0.3, 0.0]), np.array([3.0, 3.0])
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return parallel edges, and ones a little apart."""
+        """Return parallel edges, and slightly different ones."""
         return [np.array(edges) for edges in ([1.0, 1.0], [1.2, 0.8], [0.8, 1.2])]
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
@@ -64,7 +64,7 @@ class EUPIEstimator(SeparableEstimator):
         return np.column_stack([CUBIC.pieces(x / (high - low)), operators])
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
-        """Return a little of every piece of the cubic, so that it increases."""
+        """Return a small lower bound of every piece of the cubic, so that it increases."""
         low, high = data.output_range
         return np.where(np.arange(matrix.shape[1]) < CUBIC.size, 1e-3 * (high - low), 0.0)
 

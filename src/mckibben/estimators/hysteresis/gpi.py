@@ -21,7 +21,7 @@ from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.pi import spread
 
 Shape = tuple[Array, Array, list[Array], Callable[[Array], list[Envelope]]]
-"""Lower and upper bounds of shape parameters, guesses, and the envelopes, rising then falling."""
+"""Bounds of the shape parameters, initial guesses, and the envelopes, rising then falling."""
 
 
 def tanh_shape(low: float, high: float, n_knots: int) -> Shape:
@@ -77,7 +77,7 @@ SHAPES = {
 }
 
 HEIGHTS = np.array([[-0.5], [0.0], [0.5]])
-"""Of envelopes to start from, relative to the largest expected."""
+"""Initial heights of envelopes, relative to the largest expected."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -105,10 +105,10 @@ class GPIEstimator(SeparableEstimator):
 
     title = "Generalised Prandtl–Ishlinskii model (GPI)"
     purpose = "memory"
-    can = "Asymmetric, saturating loops between two envelopes, minor loops by few weights."
+    can = "Asymmetric, saturating loops between two envelopes, minor loops with few weights."
     cannot = (
-        "Where envelopes differ the output holds after a reversal, whether or not the muscle "
-        "does; no rate, no creep."
+        "Where envelopes differ the output is constant after a reversal, even if the muscle's "
+        "is not; no rate, no creep."
     )
     inverse_kind = "exact"
     quick = True
@@ -123,14 +123,14 @@ class GPIEstimator(SeparableEstimator):
 
     @property
     def solves_offset(self) -> bool:
-        """Whether the envelopes' common height is solved for.
+        """Whether the envelopes' common height is fitted.
 
         Virgin operators are nearest to 0, wherever the envelopes are, so their height is searched.
         """
         return self.starting_rule != "virgin"
 
     def shape(self, data: TrainingData) -> Shape:
-        """Return the parametrisation: of the shape, the gap, and the height where it is searched."""
+        """Return the parametrisation: shape, gap, and the height if it is searched."""
         lower, upper, guesses, envelopes = SHAPES[self.envelope](*data.input_range, self.n_knots)
         low, high = data.output_range
         most = 1.0 + 2.0 * max(abs(low), abs(high)) / max(high - low, 1e-12)
@@ -147,7 +147,7 @@ class GPIEstimator(SeparableEstimator):
         return self.shape(data)[2]
 
     def envelopes(self, theta: Array, data: TrainingData) -> tuple[Envelope, Envelope]:
-        """Return both envelopes, in order over the whole input range."""
+        """Return both envelopes, ordered over the whole input range."""
 
         def made() -> tuple[Envelope, Envelope]:
             gap = theta.size - 2 + self.solves_offset

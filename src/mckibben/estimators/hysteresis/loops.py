@@ -1,4 +1,4 @@
-"""Identification of a reversible, increasing polynomial with loops on top: Bouc-Wen and Maxwell-slip.
+"""Identification of loops on an increasing reversible polynomial: Bouc-Wen and Maxwell-slip.
 
 y = offset + sum_k a_k B_k(x) + sum_j w_j (s_j x - z_j) + sum_j v_j z_j, all of a, w and v at least
 0, where x runs from 0 to 1 over the input's range, the B_k are integrals of Bernstein polynomials,
@@ -28,23 +28,23 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
 
 LEAST_SLOPE = 1e-4
-"""Least share of the output's range that each piece of the polynomial gives."""
+"""Smallest share of the output's range for each piece of the polynomial."""
 
 SLOWEST, FASTEST = 0.3, 300.0
 """Rates of Bouc-Wen models, relative to one over the range of the input."""
 
 MOST_ASYMMETRIC = 0.19
-"""Largest size of each of their five shape numbers: together they stay below 1."""
+"""Bound of each of the five shape parameters, whose magnitudes must sum to less than 1."""
 
 Degree = Annotated[int, Interval(ge=1, le=9)]
 
 MOST_UNEQUAL = np.log(4.0)
-"""Largest logarithm of the ratio of stiffnesses, or limits, of springs in both directions."""
+"""Largest logarithm of the ratio of stiffnesses, or limits, between directions."""
 
 
 @dataclass(frozen=True)
 class Loops:
-    """Linear parameters of a reversible polynomial with loops on top.
+    """Linear parameters of a reversible polynomial with loops.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Loops:
     both_ways: bool
 
     def columns(self, x: Array, z: Array, slopes: Array) -> Array:
-        """Return the pieces of the polynomial, then the loops that lag, then those that lead.
+        """Return the pieces of the polynomial, then lagging loops, then leading ones.
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class Loops:
         return np.column_stack([pieces, slopes * x[:, np.newaxis] - z, z])
 
     def least(self, size: int, data: TrainingData) -> Array:
-        """Return a little of every piece of the polynomial, and nothing of the loops."""
+        """Return a small lower bound of every piece of the polynomial, and 0 for the loops."""
         floor = np.zeros(size)
         low, high = data.output_range
         floor[: self.degree] = LEAST_SLOPE * (high - low)
@@ -99,7 +99,7 @@ def relative(run: Run, data: TrainingData) -> Array:
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class BoucWenEstimator(SeparableEstimator):
-    """Bouc-Wen model by variable projection: rate and shape are searched, the rest is solved for.
+    """Bouc-Wen model by variable projection: rate and shape searched, the rest solved for.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class BoucWenEstimator(SeparableEstimator):
     title = "Bouc–Wen model"
     purpose = "memory"
     inverse_kind = "solved"
-    can = "A loop that saturates, with five numbers or so, and a reversible polynomial."
+    can = "A loop that saturates, with about five parameters, and a reversible polynomial."
     cannot = "Minor loops need not close; loops are symmetric but for the polynomial."
     quick = True
     makes = ("bouc-wen",)
@@ -143,7 +143,7 @@ class BoucWenEstimator(SeparableEstimator):
         return [np.array([np.log(rate), *shape]) for rate in (3, 10, 30) for shape in shapes]
 
     def unit(self, theta: Array, data: TrainingData) -> BoucWen | GeneralizedBoucWen:
-        """Return the model of z alone; an asymmetric shape turns over at mid-range."""
+        """Return the model of z alone; an asymmetric shape reverses at mid-range."""
         low, high = data.input_range
         span, rate = high - low, float(np.exp(theta[0])) / (high - low)
         fields = self.common_fields(data)
@@ -155,7 +155,7 @@ class BoucWenEstimator(SeparableEstimator):
 
     @property
     def linear(self) -> Loops:
-        """What is solved for."""
+        """The linear parameters."""
         return Loops(self.degree, self.nonnegative)
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
@@ -186,7 +186,7 @@ GBW = preset(
     BoucWenEstimator,
     "Generalised Bouc-Wen model: rate and shape are searched, the rest is solved for.",
     title="Generalised Bouc–Wen model (GBW)",
-    can="Asymmetric saturating loops, by five shape numbers.",
+    can="Asymmetric saturating loops, with five shape parameters.",
     cannot="Minor loops need not close; many starts are needed to identify it.",
     quick=False,
     makes=("generalized-bouc-wen",),
@@ -197,7 +197,7 @@ GBW = preset(
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class MaxwellSlipEstimator(SeparableEstimator):
-    """Maxwell-slip model: by least squares, but for the ratios of its directions where it has any.
+    """Maxwell-slip model by least squares; ratios of its directions, if any, are searched.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ class MaxwellSlipEstimator(SeparableEstimator):
 
     @property
     def fixed_fields(self) -> tuple[str, ...]:
-        """Both ratios, where directions are alike."""
+        """Both ratios, if directions are equal."""
         return (
             () if self.asymmetric else ("maxwell-slip.stiffness_ratio", "maxwell-slip.limit_ratio")
         )
@@ -237,7 +237,7 @@ class MaxwellSlipEstimator(SeparableEstimator):
 
     @property
     def linear(self) -> Loops:
-        """What is solved for."""
+        """The linear parameters."""
         return Loops(self.degree, self.nonnegative)
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
@@ -280,7 +280,7 @@ MAXWELL_SLIP = preset(
     MaxwellSlipEstimator,
     "Maxwell-slip model by least squares.",
     title="Maxwell-slip model",
-    can="Springs that slip beside a reversible curve; symmetric loops.",
+    can="Slipping springs in parallel with a reversible curve; symmetric loops.",
     cannot="Asymmetry only by the curve.",
     quick=True,
     asymmetric=False,
@@ -290,7 +290,7 @@ MMS = preset(
     MaxwellSlipEstimator,
     "Modified Maxwell-slip model: the two ratios of its directions are searched.",
     title="Modified Maxwell-slip model (MMS)",
-    can="Springs that slip, of different stiffness and limit up and down.",
+    can="Springs that slip, with different stiffness and limit for rising and falling input.",
     cannot="One asymmetry for all springs.",
     asymmetric=True,
     effort=0.5,

@@ -23,22 +23,26 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
 
 LEAST_PIECE = 1e-6
-"""Least share of the output's range that a piece of an increasing map gives."""
+"""Smallest share of the output's range for a piece of an increasing map."""
 
 CROWDED = (1, 2, 4)
-"""Powers of their shares of half the input's range by which thresholds begin that are identified."""
+"""Exponents of the initial thresholds, as powers of their share of half the input range, if
+thresholds are identified.
+"""
 
 MOST_BY_RATE = 5.0
 """The same where thresholds are identified, as is printed."""
 
 MOST_STEPS = 150
-"""Evaluations of a refinement where thresholds are identified."""
+"""Maximum number of evaluations of a refinement with identified thresholds."""
 
-RAISED, APART = 1e-7, 1e-9
-"""By how much thresholds are raised for derivatives, and their least distance, of the input's range."""
+RAISED, LEAST_DISTANCE = 1e-7, 1e-9
+"""Step of thresholds for derivatives, and their smallest distance, relative to the input range."""
 
 RATE_SHARE = 0.5
-"""Largest change of a weight by rate, relative to the largest weight, at the fastest input seen."""
+"""Largest change of a weight by rate, relative to the largest weight, at the fastest recorded
+input.
+"""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -105,7 +109,7 @@ class MPIEstimator(SeparableEstimator):
 
     @property
     def fixed_fields(self) -> tuple[str, ...]:
-        """The offset of the operators' sum, which begins at the output's lowest."""
+        """The offset of the operators' sum, which starts at the output's lowest value."""
         return ("pi.offset", "rate-dependent-pi.offset")
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
@@ -147,12 +151,12 @@ class MPIEstimator(SeparableEstimator):
         return self.thresholds == "identified"
 
     @property
-    def n_beside(self) -> int:
-        """Thresholds that are identified."""
+    def n_further(self) -> int:
+        """Number of identified thresholds."""
         return self.n_operators * self.identified
 
     def most_evaluations(self, size: int) -> int:
-        """Return more where thresholds are searched, too."""
+        """Return a larger number if thresholds are searched."""
         return MOST_STEPS if self.identified else super().most_evaluations(size)
 
     def radii(self, theta: Array, data: TrainingData) -> Array:
@@ -163,11 +167,11 @@ class MPIEstimator(SeparableEstimator):
         return np.asarray(0.5 * (high - low) * theta[-self.n_operators :])
 
     def weights(self, theta: Array) -> Array:
-        """Return the relative weights, then those by rate."""
+        """Return the relative weights, then the rate-dependent ones."""
         return theta[: self.n_operators * (1 + self.rate_dependent)]
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of the relative weights, then of those by rate relative to the fastest.
+        """Return bounds of the relative weights, then of the rate-dependent ones.
 
         Then of thresholds that are identified, relative to half the input's range.
         """
@@ -180,7 +184,7 @@ class MPIEstimator(SeparableEstimator):
         return np.concatenate([lower, -share, none]), np.concatenate([np.ones(n), share, none + 1])
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return the weights of the best PI model, and two even distributions, whatever the rate."""
+        """Return the weights of the best PI model, and two even distributions, without rate."""
         low, high = data.input_range
         by_rate = np.zeros(self.n_operators * self.rate_dependent)
         even, guesses = spread(self.n_operators, data.input_range), []
@@ -193,7 +197,7 @@ class MPIEstimator(SeparableEstimator):
             fading = np.exp(-3 * radii / (high - low))
             reversible = np.where(radii == 0, 1.0, 0.1)
             for guess in (weights / top, fading, reversible):
-                guesses.append(np.concatenate([guess, by_rate, share[: self.n_beside]]))
+                guesses.append(np.concatenate([guess, by_rate, share[: self.n_further]]))
         return guesses
 
     def _plays(self, radii: Array, data: TrainingData) -> Array:
@@ -201,7 +205,7 @@ class MPIEstimator(SeparableEstimator):
         return counting(data, lambda run: play_operators(run.history, radii, self.starting_rule))
 
     def operators(self, radii: Array, run: Run, data: TrainingData) -> Array:
-        """Return play operators over the run's history, then these times the relative rate."""
+        """Return play operators over the run's history, then their products with the relative rate."""
         play = play_operators(run.history, radii, self.starting_rule)
         if not self.rate_dependent:
             return play
@@ -215,7 +219,7 @@ class MPIEstimator(SeparableEstimator):
         return float(weights @ lowest), float(weights @ highest)
 
     def _ends(self, theta: Array, columns: Array, data: TrainingData) -> tuple[Array, Array]:
-        """Return rows of columns, of which operators are the first, at the ends of the map's argument.
+        """Return columns, operators first, at the ends of the map's argument.
 
         Where the input has only risen to the ends of its range, and rests there; of thresholds that are
         identified, where the weighted sum of the data is least and most.
@@ -236,7 +240,7 @@ class MPIEstimator(SeparableEstimator):
         return self._pieces(theta, self.operators(self.radii(theta, data), run, data), data)
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:
-        """Return the basis at the samples that count; the operators are computed only once."""
+        """Return the basis at the scored samples; operators are computed only once."""
         return self._pieces(theta, self._operators(theta, data), data)
 
     def _operators(self, theta: Array, data: TrainingData) -> Array:
@@ -271,13 +275,13 @@ class MPIEstimator(SeparableEstimator):
         return np.asarray((self.map.slopes(x) @ linear)[:, np.newaxis] * moved)
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
-        """Return a little of every piece, so that the map increases everywhere."""
+        """Return a small lower bound of every piece, so that the map increases."""
         span = data.output_range[1] - data.output_range[0]
         return np.full(matrix.shape[1], LEAST_PIECE * span)
 
     @property
     def solves_nonnegative(self) -> bool:
-        """Whether the linear parameters may not be negative: for increasing maps only."""
+        """Whether linear parameters must be non-negative: for increasing maps only."""
         return self.nonnegative and self.output_map in ("piecewise-linear", "polynomial")
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Series:
@@ -290,12 +294,12 @@ class MPIEstimator(SeparableEstimator):
         return Series((first, self.map.build(linear, offset, bottom, top, channel)))
 
     def first_part(self, theta: Array, scale: float, offset: float, data: TrainingData) -> Block:
-        """Return the hysteresis part, thresholds in their order and none twice."""
+        """Return the hysteresis part, with sorted distinct thresholds."""
         n, radii = self.n_operators, self.radii(theta, data)
         weights = (scale * self.weights(theta)).reshape(-1, n)
         if self.identified:
             order, (low, high) = np.argsort(radii, kind="stable"), data.input_range
-            least = APART * (high - low) * np.arange(n)
+            least = LEAST_DISTANCE * (high - low) * np.arange(n)
             radii = np.maximum.accumulate(radii[order] - least) + least
             weights = weights[:, order]
         static, thresholds = vector(weights[0]), vector(radii)
@@ -313,7 +317,7 @@ RDPI = preset(
     purpose="rate",
     can="Prandtl-Ishlinskii memory with weights that follow the rate.",
     cannot=(
-        "Extrapolates badly beyond the rates seen; its inverse swings where weights by rate "
+        "Extrapolates badly beyond the recorded rates; its inverse oscillates where weights by rate "
         "are strongly negative."
     ),
     caution="weights that follow the rate are arbitrary at other rates",

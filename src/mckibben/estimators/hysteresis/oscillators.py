@@ -1,4 +1,4 @@
-"""Identification of oscillators with hysteresis in their loop: Gauss-Newton on free runs.
+"""Identification of oscillators with internal hysteresis: Gauss-Newton on free runs.
 
 A linear oscillator is found first; its stiffness is shared between spring and element in a few ways,
 from each of which a descent on one run in coarse steps begins, and the best goes on with all runs in
@@ -30,7 +30,7 @@ from mckibben.blocks.kernels import kernel
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
-from mckibben.estimators.core.uncertainty import relative_sizes, told_by_runs
+from mckibben.estimators.core.uncertainty import covariance_by_runs, relative_sizes
 from mckibben.estimators.dynamics.linear_oscillator import (
     MOST_SUBSTEPS,
     Path,
@@ -44,41 +44,42 @@ from mckibben.presets import preset
 from mckibben.system.compiling import deferred
 
 ANGLE, COARSE_ANGLE = 1 / 30, 1 / 3
-"""Of the linear oscillator in a substep, and in one of the search's coarse ones, at most [rad]."""
+"""Largest angle of the linear oscillator per substep [rad], in the fit and in the coarse search."""
 
 FEWEST_COARSE = 2
 
 FIRST_STEPS, STEPS = 12, 60
-"""Steps from every start, and of the best."""
+"""Steps from every start, and from the best ones."""
 
 SHARES, BENDS = (0.1, 0.3, 0.6), (0.5, 3.0, 10.0)
-"""Of elements to start from: shares of the linear stiffness; and how far loops are bent, as what the
-slope about no force loses over the largest displacement, relative."""
+"""Initial hysteretic elements: shares of the linear stiffness; and relative loss of slope over the
+largest displacement.
+"""
 
 ROUNDS = 8
-"""Times that a start is searched, in ever finer structures."""
+"""Number of refinements of the structure per start."""
 
 FIRST_GAIN, LEAST_GAIN = 1e-3, 1e-9
-"""Share of the squared error that a step gains, or the descent has arrived."""
+"""Smallest relative reductions of the squared error for another step."""
 
 LARGEST = 1e50
-"""Error, or derivative of one, that still is one: sums of its squares are numbers."""
+"""Largest error or derivative; sums of squares stay finite."""
 
 DIFFERENCE = 1e-6
-"""Of a parameter, relative, by which starts at rest are moved."""
+"""Relative step of a parameter for derivatives of starts at rest."""
 
 OWN = 3
-"""Parameters before those of the element: inertia, damping, stiffness."""
+"""Number of parameters before those of the element: inertia, damping, stiffness."""
 
 BEYOND = 1.1
-"""The outermost knots, by the largest force of the element."""
+"""Position of the outermost knots, relative to the largest force of the element."""
 
 TIGHT = 0.8
-"""Share of the range of knots that the forces have to fill."""
+"""Smallest share of the knots' range that the forces must cover."""
 
 
 def following(element: Any) -> Callable[..., None]:
-    """Return what runs an oscillator over inputs a step apart, joined by straight lines.
+    """Return a simulation of an oscillator with linearly interpolated inputs.
 
     Parameters
     ----------
@@ -183,7 +184,7 @@ follow_bouc_wen, follow_duhem = following(bouc_wen_element), following(duhem_ele
 
 
 def bouc_wen_starts(slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:
-    """Return oscillators whose element hardens, and softens."""
+    """Return initial oscillators with hardening and softening elements."""
     return [
         BoucWenOscillator(slope=slope, gamma=bend, delta=way * bend, **fields)
         for way in (-0.5, 0.5)
@@ -191,7 +192,7 @@ def bouc_wen_starts(slope: float, bend: float, fields: dict[str, Any]) -> list[O
 
 
 def duhem_starts(slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:
-    """Return one of two pieces a curve, whose slope goes to 0 where its element's force is largest."""
+    """Return an initial element of two pieces per curve, whose slope vanishes at its largest force."""
     most, rising = slope / bend, (2.0 * slope, slope, 0.0)
     return [
         DuhemOscillator(rising=rising, falling=rising[::-1], knots=(-most, 0.0, most), **fields)
@@ -200,18 +201,19 @@ def duhem_starts(slope: float, bend: float, fields: dict[str, Any]) -> list[Osci
 
 @dataclass(frozen=True)
 class Element:
-    """How oscillators with one kind of element are searched."""
+    """Search of oscillators with one kind of element."""
 
     n_positive: int
-    """Parameters of the block, the first ones, that are searched by their logarithms."""
+    """Number of leading parameters that are searched by their logarithms."""
 
     order: int
-    """The others have the unit of this power of a force, over displacement."""
+    """The other parameters have the unit of force to this power, over displacement."""
 
     follows: Callable[..., None]
     starts: Callable[[float, float, dict[str, Any]], list[Oscillator]]
-    """Models to start from, by the element's slope about no force, the share of it that 1 mm takes
-    away, and all other fields."""
+    """Initial models: from the element's slope at zero force, its relative loss per mm, and all
+    other fields.
+    """
 
 
 ELEMENTS = {
@@ -221,9 +223,9 @@ ELEMENTS = {
 
 
 class FreeRuns:
-    """Errors of models of one structure on all runs, and their derivatives, computed with them.
+    """Errors of models of one structure on all runs, with derivatives.
 
-    A tracker counts evaluations, and is told of the best where ``told``.
+    A tracker counts evaluations, and is reports of the best where ``reports``.
     """
 
     def __init__(
@@ -233,10 +235,10 @@ class FreeRuns:
         paths: Sequence[Path],
         estimator: OscillatorEstimator,
         tracker: Tracker,
-        told: bool = False,
+        reports: bool = False,
     ) -> None:
         self.template, self.target, self.paths = template, data.target, paths
-        self.tracker, self.told = tracker, told
+        self.tracker, self.reports = tracker, reports
         element = ELEMENTS[estimator.element]
         self.n_positive, self.follows = element.n_positive, element.follows
         self.at_rest = estimator.at_rest
@@ -248,7 +250,7 @@ class FreeRuns:
             self.size[-1] = travel
 
     def coordinates(self, model: Oscillator) -> Array:
-        """Return where a model is searched: logarithms of what is positive, then the others' sizes."""
+        """Return the search coordinates of a model: logarithms of positive parameters, then others."""
         theta = model.pack() / self.size
         theta[: self.n_positive] = np.log(np.maximum(theta[: self.n_positive], 1e-300))
         return theta
@@ -285,7 +287,7 @@ class FreeRuns:
         return self.model(theta), float(np.sqrt(np.mean(errors**2)))
 
     def errors(self, theta: Array) -> Array:
-        """Return the errors where samples count; infinite where there is no such model."""
+        """Return the errors at scored samples; infinite if there is no such model."""
         try:
             model = self.model(theta)
             found = self.outputs(model, slopes=True) - self.target
@@ -296,7 +298,7 @@ class FreeRuns:
             if not all(size < LARGEST for size in sizes):
                 found = np.full(self.target.size, np.inf)
         cost = float(np.sqrt(np.mean(found**2)))
-        if self.told:
+        if self.reports:
             self.tracker.saw(theta, cost)
         else:
             self.tracker.evaluations += 1
@@ -304,7 +306,7 @@ class FreeRuns:
         return found
 
     def slopes(self, theta: Array) -> Array:
-        """Return the derivatives where errors were last asked for."""
+        """Return the derivatives of the last evaluation of errors."""
         with np.errstate(invalid="ignore", over="ignore"):
             found: Array = self._slopes * self.scale(self.model(theta))
         return found
@@ -315,7 +317,7 @@ class FreeRuns:
         return self._forces
 
     def outputs(self, model: Oscillator, slopes: bool = False) -> Array:
-        """Return the outputs where samples count; note the derivatives by the parameters, if wanted."""
+        """Return the outputs at scored samples; store derivatives by the parameters if requested."""
         values = model.pack()
         has_offset = model.output_offset is not None
         p = values.size - has_offset
@@ -341,7 +343,7 @@ class FreeRuns:
         return np.concatenate(found) + (model.output_offset or 0.0)
 
     def _begun(self, model: Oscillator, path: Path, p: int) -> tuple[Array, Array]:
-        """Return the state before the first input of a path, and its derivatives."""
+        """Return the initial state of a path, and its derivatives."""
         moved = np.zeros((3, p))
         if not self.at_rest:
             return np.zeros(3), moved
@@ -360,7 +362,7 @@ class FreeRuns:
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class OscillatorEstimator(SearchEstimator):
-    """Mass, damper, spring and an element that remembers, by Gauss-Newton on free runs.
+    """Mass, damper, spring and a hysteretic element, by Gauss-Newton on free runs.
 
     Parameters
     ----------
@@ -396,7 +398,7 @@ class OscillatorEstimator(SearchEstimator):
     effort: ClassVar[float] = 3.0
 
     def refined(self, model: Oscillator, forces: Array) -> Oscillator | None:
-        """Return the model with up to twice the pieces, spread over the forces that its element has."""
+        """Return the model with up to twice the pieces, spread over its element's forces."""
         if not isinstance(model, DuhemOscillator):
             return None
         n, most = len(model.knots) // 2, float(np.abs(forces).max())
@@ -450,8 +452,8 @@ class OscillatorEstimator(SearchEstimator):
             if finer is None:
                 break
             model, _ = begun(finer)
-        for substeps, gain, told in ((coarse, FIRST_GAIN, False), (fine, LEAST_GAIN, True)):
-            search = self.search(model, merged, substeps, tracker, told)
+        for substeps, gain, reports in ((coarse, FIRST_GAIN, False), (fine, LEAST_GAIN, True)):
+            search = self.search(model, merged, substeps, tracker, reports)
             model, _ = search.descended(STEPS, gain)
         return model, data
 
@@ -461,20 +463,20 @@ class OscillatorEstimator(SearchEstimator):
         data: TrainingData,
         substeps: int,
         tracker: Tracker,
-        told: bool = False,
+        reports: bool = False,
     ) -> FreeRuns:
         """Return the errors of models of one structure on all runs."""
         warm = self._warm if self.periodic else None
         steps = paths(data, substeps, warm, self.at_rest)
-        return FreeRuns(model, data, steps, self, tracker, told)
+        return FreeRuns(model, data, steps, self, tracker, reports)
 
     @property
     def at_rest(self) -> bool:
-        """Whether runs begin at rest where their first input leads, instead of at none."""
+        """Whether runs start in equilibrium with their first input, instead of at zero."""
         return not self.periodic and self.starting_rule == "first_sample"
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the outputs of blocks where samples count: in steady state, of periodic recordings."""
+        """Return the outputs of blocks at scored samples: in steady state for periodic recordings."""
         if not self.periodic:
             return super().free_runs(blocks, data)
         rows = []
@@ -493,13 +495,13 @@ class OscillatorEstimator(SearchEstimator):
         search.errors(theta)
         size = relative_sizes(block.pack())
         slopes = search.slopes(theta) / search.scale(block) * size
-        condition, own = told_by_runs(slopes, residual, data.runs)
+        condition, own = covariance_by_runs(slopes, residual, data.runs)
         return condition, own * np.outer(size, size)
 
 
 BOUC_WEN_OSCILLATOR = preset(
     OscillatorEstimator,
-    "Bouc-Wen oscillator by Gauss-Newton on free runs, begun with a linear one's stiffness shared.",
+    "Bouc-Wen oscillator by Gauss-Newton on free runs, started from a linear one.",
     title="Bouc–Wen oscillator",
     can=(
         "A mass, a damper and a spring with Bouc-Wen hysteresis inside the loop, from force "
@@ -521,8 +523,8 @@ DUHEM_OSCILLATOR = preset(
         "slopes of one element, free in either direction."
     ),
     cannot=(
-        "The element remembers one number, so nothing of minor loops once they are left; "
-        "slopes beyond the forces seen are held; no inverse."
+        "One hysteretic state, so minor loops are forgotten once they are left; "
+        "slopes are constant beyond the recorded forces; no inverse."
     ),
     element="duhem",
 )

@@ -1,4 +1,4 @@
-"""Memoryless maps behind a hysteresis model, as sums of increasing pieces to solve for.
+"""Memoryless output maps of hysteresis models, as sums of increasing pieces.
 
 With non-negative weights on increasing pieces the map increases, whatever the data, so it has an
 inverse.
@@ -46,17 +46,17 @@ class OutputMap(ABC):
 
 
 class PiecewiseLinearMap(OutputMap):
-    """Straight lines between equally spaced knots: a superposition of dead zones."""
+    """Piecewise-linear map with equally spaced knots: a superposition of dead zones."""
 
     def pieces(self, x: Array) -> Array:
-        """Return a ramp for every line; the first and last go on beyond the knots."""
+        """Return a ramp per piece; the first and last are extrapolated."""
         ramps = x[:, np.newaxis] * self.size - np.arange(self.size)
         lowest, highest = np.zeros(self.size), np.ones(self.size)
         lowest[0], highest[-1] = -np.inf, np.inf
         return np.clip(ramps, lowest, highest)
 
     def slopes(self, x: Array) -> Array:
-        """Return the number of lines on the line that the argument is on, and 0 on the others."""
+        """Return the number of pieces on the piece of the argument, and 0 on the others."""
         line = np.clip(np.floor(x * self.size), 0, self.size - 1)
         return self.size * (line[:, np.newaxis] == np.arange(self.size)).astype(np.float64)
 
@@ -87,7 +87,7 @@ class PolynomialMap(OutputMap):
     def build(
         self, weights: Array, offset: float, low: float, high: float, channel: Channel
     ) -> Block:
-        """Return the polynomial block, in powers of the centred argument, which keeps digits."""
+        """Return the polynomial block, in powers of the centred argument for numerical accuracy."""
         polynomial = np.polynomial.Polynomial(self.powers(weights))
         centred = polynomial(np.polynomial.Polynomial([0.5, 0.5])).coef
         centred = np.pad(centred, (0, self.size + 1 - centred.size))

@@ -43,7 +43,7 @@ def spread(n: int, ends: tuple[float, float]) -> Array:
 
 
 def play_operators(u: Array, radii: Array, rule: str) -> Array:
-    """Return play operators side by side over an input, shape (n, N)."""
+    """Return play operators over an input, shape (n, N)."""
     operators = np.empty((u.size, radii.size))
     u = np.ascontiguousarray(u)
     play_matrix(u, u, u, radii, started(radii, u[0], u[0], rule), operators)
@@ -51,7 +51,7 @@ def play_operators(u: Array, radii: Array, rule: str) -> Array:
 
 
 SHORTEST = 0.02
-"""Segment whose slope is more than noise, relative to the longest branch."""
+"""Shortest segment with a significant slope, relative to the longest branch."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -108,7 +108,7 @@ class PIEstimator(SeparableEstimator):
         return PI(radii, vector(linear), offset, **self.common_fields(data))
 
     def _by_slopes(self, data: TrainingData) -> PI:
-        """Cut the widest loop where its operators begin to move, and difference slopes.
+        """Cut the widest loop where its operators start to move, and difference slopes.
 
         A segment lasts from one operator's beginning to the next one's: the printed Delta r on a rise
         from rest, twice that after a reversal, where a play closes over 2 r. Printed weights are
@@ -129,7 +129,7 @@ class PIEstimator(SeparableEstimator):
 
 
 def _segments(data: TrainingData, radii: Array, rule: str) -> tuple[Array, Array]:
-    """Return how far input and output go in each segment of the widest loop, each of shape (N,).
+    """Return the changes of input and output in each segment of the widest loop, each of shape (N,).
 
     Of the longest rise and the longest fall together, among those on which operators begin to move one
     after the other, each from where it stood.

@@ -18,7 +18,7 @@ from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.presets import preset
 
 LEAST_REVERSIBLE = 1e-4
-"""Least share of the output's range that each operator on the diagonal gives."""
+"""Smallest share of the output's range for each operator on the diagonal."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -37,8 +37,8 @@ class GridEstimator(SeparableEstimator):
     purpose = "memory"
     param_grid: ClassVar[Grid] = {"n_levels": (6, 10, 15)}
     cannot = (
-        "Weights that no reversal has excited are not determined; nothing beyond the largest "
-        "input seen."
+        "Weights that no reversal has excited are not determined; constant beyond the largest "
+        "recorded input."
     )
     effort: ClassVar[float] = 0.15
 
@@ -56,14 +56,14 @@ class GridEstimator(SeparableEstimator):
         return vector(np.linspace(*data.input_range, self.n_levels + 1))
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the output of every cell alone, over the run's history."""
+        """Return the output of every cell separately, over the run's history."""
         grid = self.grid(data)
         n = len(grid.weights)
         alone = np.column_stack([np.eye(n), np.zeros(n)])
         return grid.simulate_many(alone, run.history, initial=self.starting_rule).T
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
-        """Return a little of every cell on the diagonal: without, there is no inverse."""
+        """Return a small lower bound of every diagonal cell, which the inverse needs."""
         floor = np.zeros(matrix.shape[1])
         low, high = data.output_range
         diagonal = np.cumsum(np.arange(1, self.n_levels + 1)) - 1

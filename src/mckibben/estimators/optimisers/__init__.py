@@ -1,1 +1,1 @@
-"""How parameters are found: one search of a kind."""
+"""Optimisers, one per kind of search."""

@@ -1,4 +1,4 @@
-"""Parameters that a model is linear in, solved for."""
+"""Linear least squares."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from mckibben.arrays import Array
 
 CONSTANT = 1e-13
-"""Share of its mean below which what a column varies by is rounding, not to be fitted with."""
+"""Variation of a column, relative to its mean, below which it is constant to rounding."""
 
 
 def solve_linear(

@@ -1,4 +1,4 @@
-"""The best of many starts, refined within bounds, and exchanged where groups of parameters may be."""
+"""Multi-start optimisation within bounds, with exchange of parameter groups."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from mckibben.arrays import Array
 from mckibben.estimators.optimisers.tracker import Tracker
 
 MARGIN = 1e-9
-"""Least distance from the bounds at which a refinement begins, relative to theirs."""
+"""Smallest distance of a start from the bounds, relative to their width."""
 
 SHORTEST = 1e-9
-"""Step, relative to the parameters, that is none."""
+"""Step, relative to the parameters, that counts as zero."""
 
 EXCHANGES = 3
-"""How often groups of parameters are exchanged and what was found refined, at most."""
+"""Maximum number of exchanges of parameter groups, each followed by a refinement."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Values, shape (n, k), that some of the parameters may be exchanged for, together."""
+    """Alternatives, shape (n, k), for some of the parameters together."""
 
     places: NDArray[np.intp]
     values: Array
 
 
 def exchange(cost: Callable[[Array], float], start: Array, choices: Sequence[Choice]) -> Array:
-    """Return the best point found by exchanging group after group, or the start where none is better.
+    """Return the best point after exchanging group after group, or the start if none is better.
 
     It leaves local minima from which no small step leads on.
     """
@@ -58,7 +58,7 @@ def multi_start(
     jacobian: Callable[[Array], Array] | None = None,
     choices: Sequence[Choice] = (),
 ) -> Array:
-    """Return the best point found by refining the most promising of many starts within bounds.
+    """Return the best point after refining the most promising of many starts within bounds.
 
     Every start is evaluated once; the best ``n_refined`` are refined by a bounded trust-region
     method, with the derivatives of the residuals where given, else with finite differences. Where
@@ -123,7 +123,7 @@ def follow_best(
     most: int,
     same: float = -1.0,
 ) -> None:
-    """Begin at many starts, and follow those that promise most, the best first, ``most`` of them.
+    """Evaluate many starts, and refine the best ``most`` of them.
 
     ``begun`` leads from a start to a place not far from it, and the cost there. Starts whose costs
     differ by up to ``same``, relatively, have come to one place, which is followed once.
@@ -146,7 +146,7 @@ def trust_region(
     max_evaluations: int,
     bounds: tuple[Array | float, Array | float] = (-np.inf, np.inf),
 ) -> list[tuple[Array, float]]:
-    """Return the start, then the points of ever smaller sums of squares that the search takes.
+    """Yield the start, then the points of decreasing cost of the search.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What goes with every search: its progress, the best so far, and what an interrupt leaves."""
+"""Progress, best point and interruption of a search."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _whole: ContextVar[bool] = ContextVar("_whole", default=False)
 
 @contextmanager
 def whole_searches() -> Iterator[None]:
-    """Let an interrupt end a fit within this context, instead of leaving the best found until then.
+    """Let an interrupt abort a fit within this context, instead of returning the best point.
 
     A search cut short is no model to be ranked, or kept as finished.
     """
@@ -33,43 +33,43 @@ def whole_searches() -> Iterator[None]:
 
 @dataclass
 class Tracker:
-    """Keeps the best point of a search, reports progress, and survives an interrupt."""
+    """Stores the best point of a search, reports progress, and handles an interrupt."""
 
     progress: Progress | None = None
     budget: int = 1
-    """Evaluations expected, for the share done."""
+    """Expected number of evaluations, for the progress."""
 
     evaluations: int = 0
     best_cost: float = np.inf
     best: Array | None = None
     interrupted: bool = False
     notes: list[str] = field(default_factory=list)
-    """What the user should know of what was found."""
+    """Notes for the user on the result."""
 
     def reached(self, share: float) -> None:
-        """Report the share of the work that is done, unless it is broken off."""
+        """Report the share of the work done, unless interrupted."""
         if self.progress is not None and not self.interrupted:
             self.progress(share, self.best_cost)
 
     def part(self, first: float, last: float) -> Tracker:
-        """Return a tracker of a part of the work, which lies between two shares of it.
+        """Return a tracker of a part of the work, between two shares of it.
 
         It keeps a best of its own.
         """
 
-        def told(share: float, best: float) -> None:
+        def report(share: float, best: float) -> None:
             if self.progress is not None:
                 self.progress(first + (last - first) * share, best)
 
-        return Tracker(progress=told, budget=self.budget)
+        return Tracker(progress=report, budget=self.budget)
 
     def saw_all(self, part: Tracker) -> None:
-        """Take note of a part that is done, but for its best."""
+        """Register a finished part, without its best point."""
         self.evaluations += part.evaluations
         self.interrupted = self.interrupted or part.interrupted
 
     def end(self) -> None:
-        """Pass an interrupt on where only whole searches are wanted.
+        """Re-raise an interrupt if only complete searches are wanted.
 
         Raises
         ------
@@ -81,7 +81,7 @@ class Tracker:
 
     @contextmanager
     def searching(self) -> Iterator[None]:
-        """Let an interrupt end the search done within this context, once there is something to keep.
+        """Let an interrupt end the search within this context, once there is a result.
 
         Raises
         ------
@@ -96,7 +96,7 @@ class Tracker:
             self.interrupted = True
 
     def saw(self, point: Array, cost: float) -> None:
-        """Take note of one evaluation."""
+        """Register one evaluation."""
         self.evaluations += 1
         if cost < self.best_cost:
             self.best_cost, self.best = cost, np.array(point)

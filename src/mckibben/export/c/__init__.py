@@ -1,1 +1,1 @@
-"""Blocks as C99: translated from their kernels, with the numbers and wiring of a model around them."""
+"""Blocks as C99: translated kernels with the coefficients and wiring of a model."""

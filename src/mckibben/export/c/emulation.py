@@ -33,7 +33,7 @@ EMULATED = (
     *("-M", "mps2-an386", "-cpu", "cortex-m4", "-display", "none", "-monitor", "none"),
     *("-semihosting-config", "enable=on,target=native"),
 )
-"""The board that the emulator is."""
+"""Emulated board."""
 
 TICKS_PER_INSTRUCTION = 1.6
 """Of the 25 MHz timer, an instruction taking 64 ns of the emulator's time (icount shift 6)."""
@@ -41,7 +41,7 @@ TICKS_PER_INSTRUCTION = 1.6
 
 @dataclass(frozen=True)
 class Emulation:
-    """What a model did on the emulated microcontroller.
+    """Result of a model on the emulated microcontroller.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Emulation:
 
 
 def missing_tools() -> list[str]:
-    """Return the programs that emulation needs and this machine has not."""
+    """Return the programs for emulation that are not installed."""
     return [tool for tool in (COMPILER, SIZE, EMULATOR) if shutil.which(tool) is None]
 
 
@@ -93,11 +93,11 @@ def emulate(block: Block, *, sample_time: float | None = None) -> Emulation:
     with tempfile.TemporaryDirectory() as place:
         write_texts(Path(place), texts)
         program, flash = built(Path(place))
-        told = _run(
+        output = _run(
             *(EMULATOR, *EMULATED, "-icount", "shift=6"),
             *("-serial", "none", "-kernel", str(program)),
         )
-    (empty, stack, ram), *lines = (line.split() for line in told.splitlines())
+    (empty, stack, ram), *lines = (line.split() for line in output.splitlines())
     ticks = np.array([int(line[0]) for line in lines])
     bits = np.array([[int(word, 16) for word in line[1:]] for line in lines], dtype=np.uint32)
     off = np.abs(bits.view(np.float32).astype(np.float64) - content["expected"])
@@ -143,7 +143,7 @@ def serial_device(
     single: bool = True,
     emulated: bool = False,
 ) -> Iterator[str]:
-    """Run a served model without a board, and give the name of its serial port.
+    """Run a served model without a board, and yield the name of its serial port.
 
     Parameters
     ----------

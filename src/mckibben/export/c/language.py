@@ -1,4 +1,4 @@
-"""The kernel language, see ``docs/kernels.md``: how a kernel's source is read, and what is refused.
+"""The kernel language, see ``docs/kernels.md``: parsing of kernels, and unsupported constructs.
 
 Kernels are Python functions of numbers and arrays that numba compiles. The part of Python that they are
 written in is small enough to have one meaning in Python, in numba and in C.
@@ -21,10 +21,10 @@ from mckibben.errors import KernelError
 from mckibben.export.naming import commented
 
 BOOL, INT, REAL = "bool", "int", "float"
-"""Types of values, as annotated: each holds those before it."""
+"""Types of values, as annotated; each includes those before it."""
 
 TYPES = {BOOL: "int", INT: "int", REAL: "mck_real"}
-"""What they are in C."""
+"""Their types in C."""
 
 _FUNCTIONS = """acos acosh asin asinh atan atan2 atanh ceil copysign cos cosh exp expm1 fabs floor
 log log10 log1p log2 pow sin sinh sqrt tan tanh trunc"""
@@ -34,7 +34,7 @@ FUNCTIONS = frozenset(_FUNCTIONS.split())
 
 
 class Source:
-    """The source of a kernel: its syntax tree, its comments, and what its names mean.
+    """The source of a kernel: its syntax tree, its comments, and the meaning of its names.
 
     Of its local names, ``stored`` is how often each is assigned to, ``given`` are its arguments,
     ``changing`` have more than one value in a call, and ``counters`` are counted by loops.
@@ -58,7 +58,7 @@ class Source:
         self.counters = {ast.unparse(n.target) for n in ast.walk(tree) if isinstance(n, ast.For)}
 
     def refusal(self, node: ast.AST, construct: str, instead: str) -> KernelError:
-        """Return the error for a construct that is outside the language."""
+        """Return the error for an unsupported construct."""
         line = self._first + getattr(node, "lineno", 1) - 1
         return KernelError(inspect.getfile(self.function), line, construct, instead)
 
@@ -94,7 +94,7 @@ class Source:
         return found
 
     def number(self, node: ast.expr) -> int | float | None:
-        """Return the number that is written out or named by a constant; None for anything else."""
+        """Return the value of a literal or a constant; None for anything else."""
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
             number = self.number(node.operand)
             return None if number is None else -number
@@ -114,11 +114,11 @@ class Source:
 
 
 source_of = cache(Source)
-"""The source of a kernel, read once."""
+"""The source of a kernel; cached."""
 
 
 class _WithoutDerivatives(ast.NodeTransformer):
-    """Leaves out what derivatives alone ask for: ``DERIVED`` is false in C."""
+    """Removes code for derivatives: ``DERIVED`` is false in C."""
 
     def visit_If(self, node: ast.If) -> ast.If | list[ast.stmt]:
         self.generic_visit(node)
@@ -128,13 +128,13 @@ class _WithoutDerivatives(ast.NodeTransformer):
 
 
 def used(*nodes: ast.AST, how: type[ast.expr_context] = ast.expr_context) -> Counter[str]:
-    """Return how often each name is used in parts of a kernel, or read, or assigned to."""
+    """Return how often each name is used, read, or assigned to in parts of a kernel."""
     names = (n for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name))
     return Counter(name.id for name in names if isinstance(name.ctx, how))
 
 
 def _comments(text: str) -> Iterator[tuple[int, tuple[str, bool]]]:
-    """Yield the row of every comment, its words, and whether it has the line for itself."""
+    """Yield row and text of every comment, and whether it is alone in its line."""
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         if token.type == tokenize.COMMENT and not token.string.startswith("# type:"):
             alone = token.line.lstrip().startswith("#")

@@ -1,4 +1,4 @@
-"""A model as a folder of C99 that compiles as it is: on a PC, a microcontroller, Arduino, MATLAB."""
+"""A model as a folder of portable C99: for a PC, a microcontroller, Arduino, MATLAB."""
 
 from __future__ import annotations
 
@@ -33,19 +33,21 @@ TOLERANCES = {False: "1e-9", True: "1e-4"}
 """Of the self-test, relative to the range: in double and in single precision."""
 
 SHARED = Path(__file__).parent / "server" / "mck.h"
-"""What all C of a model shares."""
+"""Files shared by the C code of all models."""
 
 LONGEST_STEP = 1e6
-"""Time between steps of an exported model [s]."""
+"""Largest sample time of an exported model [s]."""
 
 PACE, TURNS = 9, 24
-"""Samples from one turning point of test inputs to the next, and how many of those."""
+"""Samples between turning points of the test inputs, and their number."""
 
 NOTICED = 5e-5
-"""Error of a filter in single precision, relative to the range of its output."""
+"""Error of a filter in single precision, relative to its output range, above which a warning is
+issued.
+"""
 
 SAMPLES, MOST_PRODUCTS = 100_000, 30_000_000
-"""On which that is found: fewer samples of filters with very many states."""
+"""Number of samples of that test; fewer for filters with very many states."""
 
 
 def export_c(
@@ -58,7 +60,7 @@ def export_c(
     force: bool = False,
     serving: Serving | None = None,
 ) -> Path:
-    """Write a model as a folder of C99, with a self-test whose vectors Python computed.
+    """Write a model as a folder of C99, with a self-test against vectors from Python.
 
     The same model gives the same bytes.
 
@@ -125,7 +127,7 @@ def c_files(
 
 
 def vectors(block: Block, sample_time: float | None, *, single: bool = False) -> dict[str, Any]:
-    """Return test vectors: inputs within the range of the model, and what Python makes of them.
+    """Return test vectors: inputs within the model's range, and Python's outputs.
 
     Inputs have minor loops and holds; single precision can hold them where it is asked for.
 
@@ -175,7 +177,7 @@ def source_files(content: Mapping[str, Any]) -> dict[str, str]:
 def described(
     block: Block, *, name: str, sample_time: float | None, single: bool
 ) -> dict[str, Any]:
-    """Return all that the templates say of a model."""
+    """Return the values for the templates of a model."""
     from mckibben import __version__
 
     identifier(name)
@@ -191,7 +193,7 @@ def described(
         for each in wiring.steps
     ]
     calls = [each for each in steps if isinstance(each, dict)]
-    inputs, outputs = _told(block.inputs), _told(block.outputs)
+    inputs, outputs = _channel_entries(block.inputs), _channel_entries(block.outputs)
     cost, size, n_numbers = wiring.cost, 4 if single else 8, max(wiring.n_numbers, 1)
     constants = sum(call.coefficients.size for call in wiring.calls)
     return {
@@ -226,7 +228,7 @@ def described(
 
 
 def check_single(block: Block, sample_time: float | None) -> None:
-    """Refuse what single precision cannot hold, and warn of a filter that it would lead astray.
+    """Raise an error for values that single precision cannot hold, and warn of inaccurate filters.
 
     Raises
     ------
@@ -249,7 +251,7 @@ def check_single(block: Block, sample_time: float | None) -> None:
 
 
 def _warn_of_rounding(block: Block, sample_time: float | None) -> None:
-    """Run the same kernel on single and on double precision numbers."""
+    """Compare the same kernel in single and double precision."""
     rng = np.random.default_rng(0)
     samples = min(SAMPLES, MOST_PRODUCTS // max(block.n_states, 1))
     inputs = wander(*input_limits(block), rng, 400, samples // 400).astype(np.float32)
@@ -273,7 +275,7 @@ def _run(block: Block, inputs: np.ndarray, sample_time: float | None) -> np.ndar
 
 
 def checked_sample_time(block: Block, sample_time: float | None) -> float | None:
-    """Return the time between steps of a model; None where it has none.
+    """Return the sample time of a model; None if it has none.
 
     Raises
     ------
@@ -295,7 +297,7 @@ def checked_sample_time(block: Block, sample_time: float | None) -> float | None
 
 
 def own_time(block: Block) -> float | None:
-    """Return the sample time that a block, or a part of it, is bound to."""
+    """Return the fixed sample time of a block or one of its parts."""
     if block.sample_time is not None:
         return block.sample_time
     steps = (own_time(part) for part in getattr(block, "parts", ()))
@@ -303,7 +305,7 @@ def own_time(block: Block) -> float | None:
 
 
 def _call(call: Call, index: int, translation: Translation) -> dict[str, Any]:
-    """Return what the templates say of a block that is run."""
+    """Return the template values of a block call."""
     block, single, name = call.block, translation.single, f"coefficients_{index}"
     numbers, state = (name, call.coefficients.size), ("state", block.n_states)
     sample, outputs = (
@@ -334,7 +336,7 @@ def _call(call: Call, index: int, translation: Translation) -> dict[str, Any]:
 
 
 def _starts(calls: list[Call]) -> str:
-    """Return how the memory of blocks starts, in words."""
+    """Return a description of the start states of blocks."""
     words = [
         "as the model gives it"
         if call.state is not None
@@ -347,21 +349,21 @@ def _starts(calls: list[Call]) -> str:
     return " or ".join(dict.fromkeys(words or ["from its inputs"]))
 
 
-def _told(channels: tuple[Channel, ...]) -> list[dict[str, str]]:
+def _channel_entries(channels: tuple[Channel, ...]) -> list[dict[str, str]]:
     return [{"name": said(channel.name), "unit": said(channel.unit) or "1"} for channel in channels]
 
 
 def _constants(
     inputs: list[dict[str, str]], outputs: list[dict[str, str]], step: float | None
 ) -> list[tuple[str, str, str]]:
-    told: list[tuple[str, str, str]] = [
+    entries: list[tuple[str, str, str]] = [
         ("N_INPUTS", str(len(inputs)), ""),
         ("N_OUTPUTS", str(len(outputs)), ""),
     ]
     for way, channels in (("IN", inputs), ("OUT", outputs)):
         endings = macros([channel["name"] for channel in channels])
-        told += [
+        entries += [
             (f"{way}_{ending}", str(place), channels[place]["unit"])
             for place, ending in enumerate(endings)
         ]
-    return [*told, ("SAMPLE_TIME", repr(step), "s")] if step else told
+    return [*entries, ("SAMPLE_TIME", repr(step), "s")] if step else entries

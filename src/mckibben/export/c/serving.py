@@ -1,4 +1,4 @@
-"""What an exported model accepts over a serial line: fixed here, and nowhere on the line."""
+"""Settings of an exported model's serial server, fixed at export."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mckibben.export.templating import literal, render
 SERVER = tuple(Path(__file__).parent / "server" / f"mck_server.{end}" for end in ("c", "h"))
 
 ROOM = 236
-"""Bytes of a frame for what it says."""
+"""Payload of a frame [bytes]."""
 
 MOST_NUMBERS = 0xFFFF
 
@@ -32,7 +32,7 @@ MOST_MICROSECONDS = 2**32 - 1
 
 @dataclass(frozen=True)
 class Serving:
-    """How a model is served.
+    """Settings of a serial server.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
 
 
 def _known(block: Block) -> tuple[Array, Array]:
-    """Return the driven inputs' range as far as the block knows it."""
+    """Return the driven inputs' range, if the block has one."""
     if hasattr(block, "input_range"):
         return np.array([block.input_limits[0]]), np.array([block.input_limits[1]])
     n = len(block.inputs) - len(block.scheduling)
@@ -109,7 +109,7 @@ def _known(block: Block) -> tuple[Array, Array]:
 def served(
     block: Block, content: Mapping[str, Any], serving: Serving, period: float | None
 ) -> dict[str, Any]:
-    """Return what the templates say of a served model, beside what they say of the model.
+    """Return the template values of a served model, in addition to those of the model.
 
     Raises
     ------
@@ -141,31 +141,31 @@ def served(
         "inputs": [_port(channel, single) for channel in channels[: len(block.inputs)]],
         "outputs": [_port(channel, single) for channel in channels[len(block.inputs) :]],
     }
-    told = about | {
+    server = about | {
         "microseconds": round(1e6 * period),
         "channels": channels,
         "about": [],
         "fingerprint_bytes": "",
     }
-    full = {**content, "served": told}
+    full = {**content, "served": server}
     texts = [render("mckibben.export.c", file, full) for file in ("model.c.j2", "server.c.j2")]
     digest = hashlib.sha256("\n".join([*texts, json.dumps(about)]).encode()).digest()[:8]
     about["fingerprint"] = digest.hex()
-    told["fingerprint"], text = digest.hex(), json.dumps(about, separators=(",", ":"))
+    server["fingerprint"], text = digest.hex(), json.dumps(about, separators=(",", ":"))
     if len(text) > MOST_NUMBERS:
         raise ModelError(f"{n} channels are too many to describe", remedy="export fewer channels")
-    told["link.json"] = json.dumps(about, indent=2) + "\n"
-    told["about"] = [json.dumps(text[k : k + 80]) for k in range(0, len(text), 80)]
-    told["fingerprint_bytes"] = ", ".join(f"0x{byte:02X}" for byte in digest)
+    server["link.json"] = json.dumps(about, indent=2) + "\n"
+    server["about"] = [json.dumps(text[k : k + 80]) for k in range(0, len(text), 80)]
+    server["fingerprint_bytes"] = ", ".join(f"0x{byte:02X}" for byte in digest)
     return {
-        "served": told,
+        "served": server,
         "shared": [*content["shared"], *SERVER],
         "sources": [*content["sources"], SERVER[0].name, f"{content['name']}_server.c"],
     }
 
 
 def _port(channel: Mapping[str, str], single: bool) -> dict[str, Any]:
-    """Return a channel as ``link.json`` has it, with the numbers of the device."""
+    """Return a channel as in ``link.json``, with the device's numbers."""
     kind = np.float32 if single else np.float64
     numbers = {key: float(kind(channel[key].rstrip("f"))) for key in ("low", "high", "safe")}
     unit = "" if channel["unit"] == "1" else channel["unit"]
@@ -173,7 +173,7 @@ def _port(channel: Mapping[str, str], single: bool) -> dict[str, Any]:
 
 
 def _ticks(serving: Serving, period: float | None) -> int:
-    """Return after how many silent ticks the watchdog acts."""
+    """Return the number of silent ticks after which the watchdog acts."""
     step = period or 0.0
     longest = 1e-6 * MOST_MICROSECONDS
     require(1 <= 1e6 * step <= MOST_MICROSECONDS, "sample_time", period, f"1e-6 to {longest:.0f} s")
@@ -184,8 +184,8 @@ def _ticks(serving: Serving, period: float | None) -> int:
 
 
 def served_files(content: Mapping[str, Any]) -> dict[str, str]:
-    """Return the files of the server, text by path, beside those of the model."""
-    name, told = content["name"], content["served"]
+    """Return the files of the server, text by path, in addition to those of the model."""
+    name, server = content["name"], content["served"]
     files = {
         f"src/{name}_server.h": "server.h.j2",
         f"src/{name}_server.c": "server.c.j2",
@@ -194,5 +194,5 @@ def served_files(content: Mapping[str, Any]) -> dict[str, str]:
     }
     return {
         **{path: render("mckibben.export.c", file, content) for path, file in files.items()},
-        "link.json": told["link.json"],
+        "link.json": server["link.json"],
     }

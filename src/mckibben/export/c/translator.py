@@ -1,4 +1,4 @@
-"""Kernels to C99: one function of C for every function of Python, with its names and comments.
+"""Translation of kernels to C99: one C function per Python function, with its names and comments.
 
 ``docs/kernels.md`` describes what can be translated. Arrays become pointers, with their sizes as
 arguments of their own where a function needs them; results behind the first are written through
@@ -25,7 +25,7 @@ LEAST, MOST = 1e-6, 3.4e38
 """Range of the sizes of constants that are the same in both precisions."""
 
 ATOM, UNARY, TIMES, PLUS, RELATION, EQUAL, AND, OR, CHOICE = 15, 13, 12, 11, 9, 8, 5, 4, 3
-"""How tightly operators of C bind."""
+"""Precedence of operators in C."""
 
 _BINARY = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod)
 ARITHMETIC: dict[type[ast.AST], str] = dict(zip(_BINARY, "+-*//%", strict=True))
@@ -33,38 +33,38 @@ _COMPARED = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 COMPARISON = dict(zip(_COMPARED, ("<", "<=", ">", ">=", "==", "!="), strict=True))
 
 WHOLE = 32767
-"""Largest whole number that is written out: each `int` of C holds it, and single precision."""
+"""Largest integer literal: it fits into an `int` of C and is exact in single precision."""
 
 FITTING = {INT: "take int(...) of it", BOOL: "compare it"}
-"""What to write instead of a number that a type does not hold."""
+"""Replacements for numbers that a type cannot represent."""
 
 
 class Value(NamedTuple):
-    """An expression of C: its text, how tightly it binds, and its type."""
+    """An expression of C: text, precedence and type."""
 
     text: str
     binds: int = ATOM
     type: str = INT
 
     def within(self, least: int) -> str:
-        """Return the text, in brackets where it binds less tightly than asked for."""
+        """Return the text, in brackets if its precedence is lower than required."""
         return self.text if self.binds >= least else f"({self.text})"
 
     def to(self, kind: str) -> Value:
-        """Return it as a real number, if it is a whole one and that is asked for."""
+        """Return it as a real number, if it is an integer and that is required."""
         if kind != REAL or self.type == kind:
             return self
         return Value(f"(mck_real){self.within(UNARY)}", UNARY, REAL)
 
 
 class Whole(Counter[str]):
-    """A sum of whole numbers, as places in arrays and sizes are: how often each term of C counts.
+    """A sum of integers, as in indices and sizes: the count of each term of C.
 
     The term "" is the number 1.
     """
 
     def plus(self, other: Whole, times: int = 1) -> Whole:
-        """Return the sum with another one, taken so many times."""
+        """Return the sum with another one, times a factor."""
         terms = [*self, *(term for term in other if term not in self)]
         sums = {term: self[term] + times * other[term] for term in terms}
         return Whole({term: count for term, count in sums.items() if count})
@@ -84,7 +84,7 @@ class Whole(Counter[str]):
 
 @dataclass
 class View:
-    """An array, or a part of one: a pointer, the place where it begins, its size, and its row length.
+    """An array, or a part of one: pointer, offset, size, and row length.
 
     ``roots`` are the names of the pointers that are written to where it is.
     """
@@ -105,7 +105,7 @@ class View:
 
 
 class Parameter(NamedTuple):
-    """A parameter of a function of C, for the argument of Python at a ``place``.
+    """A parameter of a C function, for the argument of Python at a ``place``.
 
     It is an ``item`` of a tuple there, and ``asks`` of an array "itself", its "size" or its "columns".
     """
@@ -119,7 +119,7 @@ class Parameter(NamedTuple):
 
 @dataclass
 class Function:
-    """A function of C: its name, what it takes and returns, which arrays it writes to, and its text."""
+    """A C function: name, parameters and results, arrays written to, and text."""
 
     name: str
     returns: list[str]
@@ -128,13 +128,13 @@ class Function:
     text: str = ""
 
     def call(self, *arguments: tuple[str, int]) -> str:
-        """Return a call with arguments in Python's order, each its text and, of arrays, its size."""
+        """Return a call with arguments in Python's order, each as text with the size of arrays."""
         given = [str(arguments[each.place][each.asks == "size"]) for each in self.parameters]
         return f"{self.name}({', '.join(given)})"
 
 
 class Translation:
-    """Functions of C in the order in which they need one another, and the constants that they use.
+    """C functions in order of dependence, and the constants that they use.
 
     They are in ``single`` or in double precision, and have names that are not ``taken``.
     """
@@ -148,7 +148,7 @@ class Translation:
         self._locals: set[str] = set()
 
     def add(self, kernel: Any, bound: tuple[tuple[str, Any], ...] = ()) -> Function:
-        """Return the function of a kernel, added with those that it calls if it is new.
+        """Return the function of a kernel; a new one is added with its callees.
 
         ``bound`` is, by parameter, the kernel that it is called with, or how many arrays of a tuple. A
         construct outside the language raises `KernelError`.
@@ -165,7 +165,7 @@ class Translation:
         return self._functions[key]
 
     def free_name(self, source: Source) -> str:
-        """Return a name that no function has yet, nor a local name of one begun before."""
+        """Return a name not used by a function, nor by a local of an earlier one."""
         taken = {*self.constants, *TAKEN, *self.names, *self._locals}
         self._locals |= {*source.locals, *(f"{name}_size" for name in source.given)}
         plain, module = source.tree.name.strip("_"), source.function.__module__.rpartition(".")[2]
@@ -174,7 +174,7 @@ class Translation:
         return free
 
     def constant(self, name: str, text: str) -> str:
-        """Return the name of a constant, which another one of the same name does not have."""
+        """Return a unique name for a constant."""
         while name in TAKEN or self.constants.setdefault(name, text) != text:
             name += "_"
         return name
@@ -187,7 +187,7 @@ class Translation:
 
 
 class _Translator:
-    """Translates one function, with what is bound to its parameters.
+    """Translates one function, with the values bound to its parameters.
 
     It is written repeatedly, each time with the types of names and the arrays written to that the pass
     before has found, until its text stays the same.
@@ -241,7 +241,7 @@ class _Translator:
                 raise self.refusal(arg, what, "use float, int, bool, Array or kernels")
 
     def _unpacked(self, name: str, known: int) -> list[str]:
-        """Return what the arrays of a tuple are called where the body unpacks it, and drop that line."""
+        """Return the names of an unpacked tuple's arrays, and drop that line."""
         for statement in self.body:
             if isinstance(statement, ast.Assign) and ast.unparse(statement.value) == name:
                 names = [ast.unparse(n) for n in getattr(statement.targets[0], "elts", [])]
@@ -259,7 +259,7 @@ class _Translator:
         return View(pointer, Whole([size]), (name,), columns=rows)
 
     def _safe(self, name: str) -> str:
-        """Return a local name that C has not taken; macros have capitals."""
+        """Return a local name that is not reserved in C; macros have capitals."""
         free = not (name.isupper() or name in TAKEN or name in self.whole.names)
         return name if free else self._made(f"{name.lower()}_")
 
@@ -274,7 +274,7 @@ class _Translator:
         return self._made(f"{name}_{self.spares}")
 
     def _emit(self, text: str) -> None:
-        """Append a line of C with the statement's comment, behind those that have to be before it."""
+        """Append a line of C with the statement's comment, after pending lines."""
         words, self.comment = f" /* {self.comment} */" if self.comment else "", ""
         for line in (*self.pending, text + words):
             self.lines += wrapped("    " * self.depth + line)
@@ -359,7 +359,7 @@ class _Translator:
         self.known &= one
 
     def _loop(self, body: Sequence[ast.stmt], counter: str = "_", *, endless: bool = False) -> None:
-        """Write the body of a loop, and what is known behind it."""
+        """Write the body of a loop, and update known values after it."""
         before, self.known = self.known, {*self.known, counter}
         self.breaks.append({*self.nowhere})
         self._block(body)
@@ -452,7 +452,7 @@ class _Translator:
         self._emit(f"{opening}{place.text} = {value.to(place.type).text};")
 
     def _learn(self, target: ast.expr, kind: str) -> None:
-        """Note that a number of a type is assigned to a name, or that an array is written to."""
+        """Register the assignment of a type to a name, or of an array element."""
         if isinstance(target, ast.Name):
             before = self.types.get(target.id, BOOL)
             self.types[target.id] = _widest(before, kind)
@@ -462,7 +462,7 @@ class _Translator:
             self.function.written |= {*self.view(target.value).roots}
 
     def _pointer(self, target: ast.expr, kind: str) -> str:
-        """Return a pointer to where a result is written; that of `_` is not needed."""
+        """Return a pointer for a result; none for `_`."""
         if isinstance(target, ast.Name) and target.id == "_":
             name = self._spare("unused")
             self.pending.append(f"{TYPES[kind]} {name};")
@@ -490,7 +490,7 @@ class _Translator:
         self.arrays[target.id] = View(name, size, (target.id, *view.roots), columns=columns)
 
     def _changes(self, text: str, loop: ast.For | None = None) -> bool:
-        """Return whether what a text of C computes may be another number later, or in a loop."""
+        """Return whether the value of a C expression may change later, or in a loop."""
         stored = used(loop, how=ast.Store) if loop else self.source.changing
         words = {*re.findall(r"\w+", text)}
         read = self._roots(name for name in self.arrays if self._safe(name) in words)
@@ -541,7 +541,7 @@ class _Translator:
         raise self.refusal(node, f"{ast.unparse(node)!r} for an array", instead)
 
     def _at(self, place: ast.expr, size: Whole, row: Value | None = None) -> Whole:
-        """Return where a number or a row is; a place below 0, written out, is counted from the end."""
+        """Return the position of a number or a row; negative literals count from the end."""
         number = self.source.number(place)
         if number is None and isinstance(place, ast.UnaryOp):
             raise self.refusal(place, f"a place {ast.unparse(place)!r}", "count from a.size")
@@ -621,7 +621,7 @@ class _Translator:
         raise self.refusal(node, f"{ast.unparse(node)!r} for a number", instead)
 
     def _as(self, node: ast.expr, kind: str) -> Value:
-        """Return a number as one of a type, which has to hold it."""
+        """Return a number as one of a type, which must represent it."""
         value = self.value(node)
         if _widest(value.type, kind) != kind:
             what = f"{ast.unparse(node)!r}, of type {value.type}, for {kind}"
@@ -644,13 +644,13 @@ class _Translator:
         return found._replace(text=self.whole.constant(name.strip("_").upper(), found.text))
 
     def _assigned(self, node: ast.Name) -> None:
-        """Refuse a name that has no value on some way to here."""
+        """Raise an error for a name that may be unassigned here."""
         if node.id not in self.known:
             what = f"{node.id!r} where it may not be assigned"
             raise self.refusal(node, what, "assign it before the branch or loop")
 
     def _written(self, number: int | float, node: ast.AST) -> Value:
-        """Return a number in C, or refuse one that `int` or single precision does not hold."""
+        """Return a literal in C; raise an error if `int` or single precision cannot represent it."""
         if not isinstance(number, float):
             if abs(number) > WHOLE:
                 raise self.refusal(node, f"the whole number {number}", f"write {number}.0")
@@ -746,7 +746,7 @@ class _Translator:
         return arrays if isinstance(arrays, list) else known if hasattr(known, "py_func") else None
 
     def _call(self, node: ast.Call, pointers: Sequence[str] = ()) -> Value:
-        """Return a call, whose results behind the first go where pointers say, or nowhere."""
+        """Return a call, with pointers for results after the first."""
         callee = None if self._meaning(node.func) is accumulate else self._callee(node)
         if (callee is None or callee.written) and node is not self.alone:
             what = f"{ast.unparse(node.func)}(), which fills arrays, within another expression"

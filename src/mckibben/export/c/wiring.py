@@ -1,4 +1,4 @@
-"""Compositions flattened: which part runs when, on which signals."""
+"""Compositions flattened to calls of blocks on signals, in order."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Sum:
 
 
 class Wiring:
-    """What a model does in a step, in order, as C has it.
+    """The calls of a step, in order, as in the C code.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Wiring:
             if not part.c_kernels:
                 raise ModelError(
                     f"{part.title!r} has no C",
-                    remedy="declare a start_kernel beside its kernel, as blocks of the package do",
+                    remedy="declare a start_kernel with its kernel, as blocks of the package do",
                 )
             state = step.state
             if state is None and not isinstance(part.start, str):
@@ -93,7 +93,7 @@ class Wiring:
 
 
 def state_of(block: Block, memory: ArrayLike, sample_time: float | None) -> Array:
-    """Return the state of a block that its C has in memory, without what it only computes in.
+    """Return the state of a block as stored by its C code, without working memory.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A model as a functional mock-up unit (FMU), which Simulink-like tools import.
+"""A model as a functional mock-up unit (FMU), for Simulink-like tools.
 
 One zip: the description, the C it is built from, libraries for the platforms that this machine can
 build for, and a page on how to import it. The same model gives the same bytes on the same machine.
@@ -42,7 +42,7 @@ _render = partial(render, "mckibben.export.fmu")
 FLAGS = ("-std=c99", "-O2", "-s", "-ffp-contract=off", "-shared")
 
 DEFAULT_STEP = 0.01
-"""Communication step suggested where the model has no time of its own [s]."""
+"""Suggested communication step of a model without sample time [s]."""
 
 BASE_UNITS: dict[str, dict[str, str] | None] = {
     "bar": {"kg": "1", "m": "-1", "s": "-2", "factor": "100000"},
@@ -56,11 +56,11 @@ BASE_UNITS: dict[str, dict[str, str] | None] = {
     "degC": {"K": "1", "offset": "273.15"},
     "1": {},
 }
-"""What units are of the SI; others are named without."""
+"""SI base units of the units; other units have only a name."""
 
 
 class Platform(NamedTuple):
-    """A kind of machine that an FMU runs on: its folder in an FMU, its libraries, its target for zig."""
+    """A platform of an FMU: its folder, its library ending, its target for zig."""
 
     folder: str
     suffix: str
@@ -140,7 +140,7 @@ def export_fmu(
 def fmu_files(
     block: Block, *, name: str = "model", sample_time: float | None = None
 ) -> dict[str, str]:
-    """Return the files of an FMU but for its libraries, text by path in the zip."""
+    """Return the files of an FMU except its libraries, text by path in the zip."""
     content = described(block, name=name, sample_time=sample_time, single=False)
     low, high = input_limits(block)
     starts = np.where(np.isfinite(low) & np.isfinite(high), np.clip(0.0, low, high), 0.0)
@@ -181,13 +181,13 @@ def _headers() -> dict[str, str]:
 
 
 def _token(block: Block, sample_time: float | None) -> str:
-    """Return what tells this model from others: a digest of what it is."""
+    """Return the model's unique identifier: a digest of its content."""
     digest = hashlib.sha256(json.dumps([to_dict(block), sample_time], sort_keys=True).encode())
     return f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
 
 
 def _variables(content: Mapping[str, Any], starts: Sequence[float]) -> list[dict[str, Any]]:
-    """Return the channels as variables, all names different; time and status are taken."""
+    """Return the channels as variables with distinct names; time and status are reserved."""
     taken = {"time", "status"}
     variables = []
     channels = [("input", *each) for each in zip(content["inputs"], starts, strict=True)]
@@ -220,7 +220,7 @@ def _libraries(files: Mapping[str, str], name: str, platforms: Sequence[str]) ->
 
 
 def own_platform() -> str | None:
-    """Return the name of the platform that this machine is, if it is one of them."""
+    """Return this machine's platform, if it is one of them."""
     if platform.machine() not in ("x86_64", "AMD64"):
         return None
     return {"linux": "linux", "win32": "windows", "darwin": "macos"}.get(sys.platform)

@@ -1,4 +1,4 @@
-"""A compensator as the source of a package of ROS 2, with a plug-in for ros2_control.
+"""A compensator as the source of a ROS 2 package, with a plug-in for ros2_control.
 
 The controller is a few dozen lines round the exported C, which are the same for every model; what
 differs are names and numbers. It is written for Jazzy and later.

@@ -1,4 +1,4 @@
-"""The pressure that gives a contraction: at every force and frequency, then on random waves."""
+"""Pressure for a contraction: at every force and frequency, then on random waves."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ BAR_PER_MPA = 10.0
 
 @dataclass(frozen=True)
 class Study:
-    """Slow cycles, sines and random waves, and the paper's model as printed and as found."""
+    """Slow cycles, sines and random waves, and the paper's model as printed and as fitted."""
 
     experiment: Experiment
     slow: Recordings
@@ -87,7 +87,7 @@ def run(experiment: Experiment) -> None:
 
 
 def by_condition(runs: Runs, stage: str) -> Recordings:
-    """Return the recordings of a stage; those of one condition have the run in the name of their row."""
+    """Return the recordings of a stage; repeated conditions are numbered in the name of their row."""
     found: dict[tuple[float, float, str], Recording] = {}
     for name in runs.names(stage=stage):
         force, frequency = float(runs.of(name, "force")), float(runs.of(name, "frequency"))
@@ -102,7 +102,7 @@ REPEATS = 0.1
 
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
-    """Tell slow cycles, sines and random waves apart, by the pressure, and under which force each is."""
+    """Sort recordings into slow cycles, sines and random waves by pressure, and by force."""
     demand_one_sign(recordings, "force")
     runs = training_data(recordings, "pressure", "contraction", None, ("force",)).runs
     forces = {i: force for force, own in by_force(runs).items() for i in own}
@@ -137,12 +137,12 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
 
 
 def static(model: ActivationPressure, recording: Recording) -> Array:
-    """Return the pressure that the paper's model gives without its extracted hysteresis."""
+    """Return the pressure of the paper's model without its extracted hysteresis."""
     return replace(model, gamma=(0.0, 0.0)).simulate(recording)["pressure"]
 
 
 def modelled(study: Study, recording: Recording, frequency: float) -> dict[str, Array]:
-    """Return the pressures that the paper's model, which needs the frequency, and ours give."""
+    """Return the pressures of the paper's model, which needs the frequency, and of ours."""
     theirs = replace(study.found, frequency=frequency).simulate(recording)["pressure"]
     return {THEIRS: theirs, OURS: study.experiment.simulate(OURS, recording)["pressure"]}
 
@@ -160,7 +160,7 @@ def static_rmse(model: ActivationPressure, runs: Iterable[Recording]) -> float:
 
 
 def _scores(study: Study, key: str, recordings: Recordings) -> None:
-    """Add errors and correlations; give the worst, how many are above what is printed, and the ends."""
+    """Add errors and correlations; return the worst, the count above the printed ones, and the ends."""
     rows: dict[str, list[float]] = {}
     for (_, frequency, row), one in recordings.items():
         y, both = one["pressure"], modelled(study, one, frequency).values()
@@ -183,7 +183,7 @@ ORDER = [2, 0, 1, 3]
 
 
 def _profile(study: Study) -> None:
-    """Add the characteristic points at every force, and how far the static pressure is off."""
+    """Add the characteristic points at every force, and the error of the static pressure."""
     experiment, slow = study.experiment, study.slow
     known = all(-0.1 * STRONGEST <= force <= 1.1 * STRONGEST for force, *_ in slow)
     models = {"printed": study.printed} if known else {}
@@ -215,7 +215,7 @@ def _constants(study: Study) -> None:
 
 
 def _rates(study: Study) -> None:
-    """Add gamma and phi, of which only the product has a meaning: gamma is 1 at mean frequency."""
+    """Add gamma and phi, whose product is identified: gamma is 1 at mean frequency."""
     frequencies = np.unique([frequency for _, frequency, _ in study.sines])
     forces = np.unique([force for force, *_ in (*study.slow, *study.sines)])
     middle, columns = float(np.mean(frequencies)), []
@@ -236,7 +236,7 @@ def _rates(study: Study) -> None:
 
 
 def _extremes(study: Study) -> None:
-    """Add the extrema of the loops, and the static pressure before and after it goes through them."""
+    """Add the extrema of the loops, and the static pressure before and after adjustment to them."""
     experiment, sines = study.experiment, [*study.sines.values()]
     data = training_data(sines, "contraction", "pressure", None, ("force",))
     local, whole = list[Array](), list[Array]()
@@ -281,7 +281,7 @@ def _distance(cubic: Array, along: Array, end: Array, spans: tuple[float, float]
 
 
 def _loops(study: Study) -> None:
-    """Add loops of sines and random waves, and the hysteresis extracted from them."""
+    """Add loops of sines and random waves, and their extracted hysteresis."""
     for key, recordings in (("sines", study.sines), ("waves", study.waves)):
         panels: dict[str, Curves] = {}
         for condition in _sample([*recordings]):

@@ -1,1 +1,1 @@
-"""Paper B: models of the field side by side."""
+"""Paper B: comparison of models of the field."""

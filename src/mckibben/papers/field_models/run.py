@@ -64,8 +64,8 @@ def methods() -> dict[str, tuple[str, dict[str, Any]]]:
     }
 
 
-class Tried(NamedTuple):
-    """A method: its model plain and matched, of the first seed that gave one; errors; why seeds failed.
+class MethodResult(NamedTuple):
+    """A method: its plain and matched model of the first successful seed; errors; reasons of failure.
 
     Errors have the shape (2, seeds, 4), plain first; the last axis is that of `FAILED`.
     """
@@ -76,7 +76,7 @@ class Tried(NamedTuple):
 
     @property
     def lowest_test(self) -> float | None:
-        """The lower median test RMSE of plain and matched [mm].
+        """The lower of the median test RMSE of plain and matched models [mm].
 
         None where most seeds failed, or are worse than the mean of what was measured.
         """
@@ -117,7 +117,7 @@ def run(experiment: Experiment) -> None:
 
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
-    """Take what turns ever lower, or else the longest, to calibrate; the longest of the rest tests."""
+    """Sort recordings: decreasing cycles, or the longest, to calibrate; the longest other to test."""
     if len(recordings) < 2:
         raise DataError(
             "there is one recording",
@@ -141,7 +141,7 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
 
 
 def matched(model: Block, recording: Recording) -> Series:
-    """Return a model with the paper's match behind it, Eqs. (1) to (3): gain by ranges, then offset.
+    """Return a model followed by the paper's match, Eqs. (1) to (3): gain by ranges, then offset.
 
     Raises
     ------
@@ -159,9 +159,9 @@ def matched(model: Block, recording: Recording) -> Series:
 
 def _tried(
     experiment: Experiment, train: Recording, test: Recording, seeds: range
-) -> dict[str, Tried]:
+) -> dict[str, MethodResult]:
     tell, every = experiment.within(0.05, 0.3), methods()
-    found: dict[str, Tried] = {}
+    found: dict[str, MethodResult] = {}
     for place, (name, (model, settings)) in enumerate(every.items()):
         models: list[tuple[Block, Series]] = []
         errors, failures = [], []
@@ -177,7 +177,7 @@ def _tried(
                 failures.append(str(error))
                 errors.append([FAILED, FAILED])
         first = models[0] if models else None
-        found[name] = Tried(first, np.array(errors).swapaxes(0, 1), failures)
+        found[name] = MethodResult(first, np.array(errors).swapaxes(0, 1), failures)
     return found
 
 
@@ -194,7 +194,7 @@ def _errors(model: Block, *recordings: Recording) -> list[float]:
     return found
 
 
-def _errors_tables(experiment: Experiment, tried: Mapping[str, Tried]) -> None:
+def _errors_tables(experiment: Experiment, tried: Mapping[str, MethodResult]) -> None:
     columns = ("RMSE calibration [mm]", "fitness [%]", "RMSE test [mm]", "fitness [%] test")
     rows: dict[str, list[Cell]] = {}
     spread: list[list[Cell]] = []
@@ -213,8 +213,8 @@ def _errors_tables(experiment: Experiment, tried: Mapping[str, Tried]) -> None:
     experiment.table("seeds", ["match", *each, "seeds that worked"], spread, **experiment.facts)
 
 
-def _parameters(experiment: Experiment, tried: Mapping[str, Tried]) -> None:
-    """Add Table 1, and the parameters of P2UZ, Box-Jenkins and PI beside the printed."""
+def _parameters(experiment: Experiment, tried: Mapping[str, MethodResult]) -> None:
+    """Add Table 1, and the parameters of P2UZ, Box-Jenkins and PI with the printed ones."""
     models = {name: one.models for name, one in tried.items() if one.models is not None}
     match: dict[str, Any] = {name: both[1].parts[1] for name, both in models.items()}
     plain = {name: both[0] for name, both in models.items()}
@@ -272,9 +272,9 @@ def _inside(row: Mapping[str, Any], path: str, scale: float) -> Cell:
 
 
 def _summary(
-    experiment: Experiment, tried: Mapping[str, Tried], board: Leaderboard
+    experiment: Experiment, tried: Mapping[str, MethodResult], board: Leaderboard
 ) -> dict[str, Row]:
-    """Give what came out, and return the models of the field that are named, each by its name."""
+    """Set the summary's facts, and return the named models of the field."""
     worked = {name: low for name in PAPERS if (low := tried[name].lowest_test) is not None}
     best = min(worked, key=worked.__getitem__, default=None)
     if best is not None:
@@ -297,10 +297,10 @@ def _summary(
 def _figures(
     experiment: Experiment,
     runs: Mapping[str, Recording],
-    tried: Mapping[str, Tried],
+    tried: Mapping[str, MethodResult],
     shown: Mapping[str, Row],
 ) -> None:
-    """Add signals, loops and responses; models far out of the measured range would hide the others."""
+    """Add signals, loops and responses; models far out of the measured range are left out."""
     theirs = {name: both[1] for name in PAPERS if (both := tried[name].models)}
     ours: dict[str, Block] = {name: row.block for name, row in shown.items() if row.block}
     if (both := tried[LEAST_SQUARES].models) is not None:

@@ -43,7 +43,7 @@ by which a constant one moves; of the input's range, by which a held one, and re
 
 @dataclass(frozen=True)
 class Study:
-    """Recordings on one grid, the run of each status, and what each model was fitted to."""
+    """Recordings on one grid, the run of each status, and the training runs of each model."""
 
     experiment: Experiment
     runs: Runs
@@ -53,7 +53,7 @@ class Study:
     learned: dict[str, list[str]] = field(default_factory=dict)
 
     def counted(self, run: str, x: str = "displacement", model: str = "") -> Array:
-        """Return a channel, as a model gives it if one is named; of a held input, under the force."""
+        """Return a channel, as modelled if a model is named; for a constant input, over the force."""
         one = self.experiment.simulate(model, self.runs[run]) if model else self.runs[run]
         start = self.runs.labels[run].labels.get("start", 0.0)
         return (one.time if x == "time" else one[x])[round(start / self.step) :]
@@ -87,7 +87,7 @@ def run(experiment: Experiment) -> None:
 
 
 def driven(recordings: Sequence[Recording]) -> str:
-    """Return the input that all recordings have, beside displacement and force."""
+    """Return the input common to all recordings, besides displacement and force."""
     shared = [x for x in ("voltage", "pressure") if all(x in one for one in recordings)]
     if not shared:
         remedy = "add the voltage of the valve to all of them, or the pressure"
@@ -96,7 +96,7 @@ def driven(recordings: Sequence[Recording]) -> str:
 
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
-    """Tell runs without load, with a constant one, with a held input, pulls and random ones apart."""
+    """Sort runs: without load, constant load, constant input, pulls, random."""
     drive = driven(recordings)
     forces = [np.abs(one["force"]) for one in recordings]
     largest = max(float(np.percentile(f, 99)) for f in forces) if moves(forces) else np.inf
@@ -129,7 +129,7 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
 
 
 def _label(one: Recording, drive: str, largest: float, span: float) -> dict[str, Any]:
-    """Return the kind of a run, its force [N], and how often its motion repeats [Hz]."""
+    """Return the kind of a run, its force [N], and the frequency of its motion [Hz]."""
     u, force, step = one[drive], np.abs(one["force"]), one.sample_time or 1.0
     low, high = np.percentile(force, (1, 99))
     whole = cycles(u)
@@ -189,7 +189,7 @@ def _fit(study: Study) -> None:
 
 
 def _errors(study: Study) -> None:
-    """Add errors by status, on pulls, on motion that is not repeated, and with the input held."""
+    """Add errors by status, on pulls, on motion that is not repeated, and at constant input."""
     experiment, runs, learned = study.experiment, study.runs, study.learned
     held, varying = runs.names(stage="held"), study.statuses[VARYING]
     groups = {f"status {k}": [name] for k, name in study.statuses.items()} | {
@@ -227,7 +227,7 @@ def _errors(study: Study) -> None:
 
 
 def _constants(study: Study) -> None:
-    """Add Table 1 beside ours, and where the printed MPI passes the turning point of its map."""
+    """Add Table 1 with ours, and where the printed MPI passes the turning point of its map."""
     experiment, largest, status = study.experiment, {}, study.statuses[1]
     hysteresis, map_of_b = experiment.paper.printed("mpi-narmax-mpi").parts
     powers = np.polynomial.Polynomial(map_of_b.polynomial)
@@ -301,7 +301,7 @@ def _force(study: Study) -> None:
 
 
 def _track(study: Study, rig: Rig) -> None:
-    """Add how a sine is followed under the pulls of status 4, with every controller."""
+    """Add the tracking of a sine under the pulls of status 4, for every controller."""
     experiment, step, pulls = study.experiment, study.step, study.runs[study.statuses[VARYING]]
     seed, models = experiment.seed, experiment.models
     experiment.tell(0.9, "closed loops")

@@ -69,7 +69,7 @@ CLOSED = {model: f"{model}, closed loop" for model in MODELS}
 
 
 class Hysteresis(NamedTuple):
-    """Isobaric runs by title with what the law leaves, and the fits to one of them and to its loop."""
+    """Isobaric runs by title with the law's residual, and the fits to one of them and its loop."""
 
     law: PolynomialForce
     runs: dict[str, Recording]
@@ -129,7 +129,7 @@ def _static_laws(experiment: Experiment, isometric: Sequence[Recording]) -> Poly
 
 
 def _hysteresis(runs: Runs, law: PolynomialForce) -> Hysteresis:
-    """Return what the law leaves of the isobaric runs, in the order of their pressures."""
+    """Return the residual of the law in the isobaric runs, in the order of their pressures."""
     (chosen,) = runs.names("train", stage="friction")
     names = runs.names(stage="friction")
     names.sort(key=lambda name: (runs.of(name, "pressure"), name != chosen))
@@ -186,7 +186,7 @@ report of a search to the next, and how near to its least error is near."""
 
 
 def _parameters(experiment: Experiment, key: str, model: str, found: Hysteresis) -> None:
-    """Add the parameters of a friction, and how far the closed loop determines them."""
+    """Add the parameters of a friction model, and whether the closed loop determines them."""
     fits, (of, settings) = [first := found.fitted[CLOSED[model]]], MODELS[model]
     for seed in range(experiment.seed + 1, experiment.seed + (2 if experiment.quick else 5)):
         own = settings | FROM_FIRST_SAMPLE | {"seed": seed}
@@ -211,7 +211,7 @@ def _parameters(experiment: Experiment, key: str, model: str, found: Hysteresis)
 
 
 def _figures(experiment: Experiment, isometric: Sequence[Recording], found: Hysteresis) -> None:
-    """Add the runs, what is extracted of them, and what models leave of it."""
+    """Add the runs, the extracted hysteresis, and the residuals of models."""
     length, extracted = found.loop["length"], found.loop[HYSTERESIS]
     modelled = {n: experiment.simulate(CLOSED[n], found.loop)[HYSTERESIS] for n in FRICTIONS}
     held = {f"{one['length'].mean():.0f} mm": one for one in isometric}
@@ -245,7 +245,7 @@ STROKE, APPROACH, SWINGING = 0.8, 10.0, 7.0
 
 
 def _feedforward(experiment: Experiment, found: Hysteresis) -> None:
-    """Add forces tracked on the rig without feedback; references are ours, as the paper tries none."""
+    """Add forces tracked on the rig without feedback; references are ours, as the paper has none."""
     if experiment.rig is None:
         return
     law, (n, turns) = found.law, (1, 5) if experiment.quick else (3, 9)
@@ -286,7 +286,7 @@ HELD, STROKES = 0.5, 0.1
 
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
-    """Return which runs are isometric and isobaric, and which one identifies friction.
+    """Return the isometric and isobaric runs, and the one that identifies friction.
 
     That is the largest loop at the pressure nearest to two thirds of the highest, as 4 of 6 bar.
     """

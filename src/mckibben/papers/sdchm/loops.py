@@ -1,4 +1,4 @@
-"""Closed loops on the arm: inverses of the models that predict, and PID."""
+"""Closed loops on the arm: inverses of the predictive models, and PID."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ BEYOND = ((0.02, 0.0), (0.1, 0.0), (0.3, 0.0), (1.0, 0.0), (0.02, 1.0), (0.02, 2
 
 
 class Task(NamedTuple):
-    """A reference, the outputs that move, what the words of its table need, and a load [kg]."""
+    """A reference, the moving outputs, the facts of its table, and a load [kg]."""
 
     reference: Recording
     moving: Sequence[str]
@@ -57,7 +57,7 @@ class Task(NamedTuple):
 
     @property
     def settle(self) -> float:
-        """How much is not scored [s]: the first third, so that whole cycles are left."""
+        """Time that is not scored [s]: the first third, so that whole cycles remain."""
         return (self.reference.duration or 0.0) / 3
 
 
@@ -70,7 +70,7 @@ def numbered(recording: Recording, what: str) -> list[str]:
 def held(
     outputs: Sequence[str], moving: str, time: Array, p0: float, scale: float = 1.0, f: float = F
 ) -> Task:
-    """Return a task that moves one output, as Table 5's or at another frequency; the others hold."""
+    """Return a task that moves one output, as in Table 5 or at another frequency."""
     channels = dict.fromkeys(outputs, np.full(time.size, scale * MEAN))
     channels[moving] = scale * (MEAN + SWING * np.sin(2 * np.pi * f * time))
     reference = Recording(channels | {EXTENSOR: np.full(time.size, p0)}, float(time[1]))
@@ -78,7 +78,7 @@ def held(
 
 
 def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
-    """Track the paper's references with every controller, and what it leaves open with some."""
+    """Track the paper's references with every controller, and further tasks with some."""
     outputs = numbered(next(iter(runs.values())), "displacement")
     quick, seed, step = experiment.quick, experiment.seed, 0.1 if experiment.quick else 0.05
     levels = [float(one[EXTENSOR].mean()) for one in runs.values()]
@@ -127,7 +127,7 @@ def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
 
 
 def compensators(experiment: Experiment, runs: Runs) -> dict[str, Block]:
-    """Return all inverses, each of a model that predicts; the paper's is learned (Section 4)."""
+    """Return all inverses of predictive models; the paper's is trained (Section 4)."""
     models = experiment.models
     swarm = printed_swarm(**(QUICK_SWARM if experiment.quick else {}))
     samples = QUICK_SAMPLES if experiment.quick else SAMPLES
@@ -158,7 +158,7 @@ def _tracked(common: None, trial: tuple[Block | Controller, Rig, Task, int], _: 
 
 
 def widths(recording: Recording, moving: str, outputs: Sequence[str]) -> dict[str, float]:
-    """Return e_w of the output that moves over the last period, and cross-motion of others [%]."""
+    """Return e_w of the moving output over the last period, and cross-motion of others [%]."""
     n = round(PERIOD / (recording.sample_time or 1.0))
     u, found = recording[f"reference_{moving}"][-n:], {}
     for name in outputs:  # each turned to begin at its minimum
@@ -173,7 +173,7 @@ def widths(recording: Recording, moving: str, outputs: Sequence[str]) -> dict[st
 def _shown(
     experiment: Experiment, key: str, task: Task, found: Mapping[str, Tracked]
 ) -> dict[str, Curves]:
-    """Add what came of a reference; return panels of every output over the one that moves, or time."""
+    """Add the results of a reference; return panels of every output over the moving one, or time."""
     alone, one = len(task.moving) == 1, task.moving[0]
     panels: dict[str, dict[str, tuple[Array, Array]]] = {}
     rows: dict[str, dict[str, float]] = {}

@@ -92,7 +92,7 @@ def sdchm() -> Protocol:
 
 
 def quick() -> tuple[Protocol, list[str]]:
-    """Return the protocol with shortened runs, and the names of those that a quick run records."""
+    """Return the protocol with shortened runs, and the names of the runs of a quick run."""
     whole = sdchm()
     names = [run.name for run in whole.runs if run.name.startswith(QUICK_RUNS)]
     return replace(whole, name="sdchm-quick", runs=tuple(map(_shortened, whole.runs))), names
@@ -116,7 +116,7 @@ def _sines(stage: str, role: Role, driven: str, p0: float, peaks: Sequence[float
 
 
 def _joint(role: Role, number: int, p0: float | None) -> Run:
-    """Return a run with all pressures random at once: muscles up to 0.05 Hz, the extensor to 0.02 Hz."""
+    """Return a run with all pressures random: muscles up to 0.05 Hz, the extensor to 0.02 Hz."""
     time = np.arange(round(JOINT_TIME * 20.0)) / 20.0
     seed, rise = 1000 * list(JOINT).index(role) + 10 * number, np.minimum(time / JOINT_START, 1.0)
     waves = {k: rise * random_wave(time, 0.05, HIGHEST, seed=seed + k) for k in (1, 2, 3)}

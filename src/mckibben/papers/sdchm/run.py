@@ -1,4 +1,4 @@
-"""Coupled hysteresis of a soft arm: how it moves, how models predict it, what their inverses leave."""
+"""Coupled hysteresis of a soft arm: motion, predictions of models, and errors of their inverses."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _width(u: Array, y: Array) -> list[Cell]:
 
 
 def _motions(experiment: Experiment, runs: Runs) -> None:
-    """Add how the arm moves: by pattern, Figure 4, and by the extensor's pressure, Figure 5."""
+    """Add the motion of the arm: by pattern, Figure 4, and by the extensor's pressure, Figure 5."""
     whole = runs.names(stage="hysteresis") + runs.names(stage="network")
     patterns, alone = (runs.names(stage=key) or whole for key in ("coupling", "stiffness"))
     levels = sorted({float(runs.of(name, "p0")) for name in patterns})
@@ -170,7 +170,7 @@ def _parts(experiment: Experiment, runs: Runs) -> None:
 
 
 def _off(experiment: Experiment, name: str, recordings: Sequence[Recording]) -> Array:
-    """Return modelled less measured outputs over all recordings, shape (n, outputs) [mm]."""
+    """Return modelled minus measured outputs over all recordings, shape (n, outputs) [mm]."""
     outputs = numbered(recordings[0], "displacement")
     found = ((experiment.simulate(name, one), one) for one in recordings)
     return np.concatenate([model.matrix(outputs) - one.matrix(outputs) for model, one in found])
@@ -251,7 +251,7 @@ TURNS: tuple[Role, ...] = ("test", "validation", "train")
 
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
-    """Sort by which pressures move, whether alike, how high, and under which extensor's pressure."""
+    """Sort by the moving pressures, their peaks, and the extensor's pressure."""
     muscles = numbered(recordings[0], "pressure") or ["pressure_1", "pressure_2"]
     needed = [*muscles, *(m.replace("pressure", "displacement") for m in muscles), EXTENSOR]
     for one, name in product(recordings, needed):
@@ -303,12 +303,12 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
 
 
 def _swing(x: Array) -> float:
-    """Return a range without what is rare, such as spikes."""
+    """Return a range without rare values, such as spikes."""
     return float(np.ptp(np.quantile(x, (0.01, 0.99))))
 
 
 def _clustered(values: Sequence[float], gap: float) -> list[float]:
-    """Return for each value the mean of those that follow one another without such a gap."""
+    """Return for each value the mean of its cluster, separated by gaps."""
     ordered = np.sort(values)
     ends = np.flatnonzero(np.diff(ordered) > gap)
     means = [round(float(part.mean()), 2) for part in np.split(ordered, ends + 1)]

@@ -128,7 +128,7 @@ def through(air: Any, opening: float, pressure: float) -> tuple[float, float]:
 
 @compiled
 def valve_target(air: Any, command: float, pressure: float) -> float:
-    """Return the opening that the regulator wants, within -1 (vent) and 1 (fill)."""
+    """Return the valve opening commanded by the regulator, within -1 (vent) and 1 (fill)."""
     error = command - pressure
     if abs(error) <= air.dead_band:
         return 0.0

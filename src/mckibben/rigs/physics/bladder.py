@@ -1,4 +1,4 @@
-"""Bladder elasticity: a rubber tube that has to follow the braid.
+"""Bladder elasticity: a rubber tube that follows the braid.
 
 A Mooney-Rivlin tube of constant volume (Rivlin and Saunders 1951), stretched by 1 - e along the axis
 and round it by as much as the braid opens. Near the length where the threads lie along the axis the
@@ -14,7 +14,7 @@ from mckibben.rigs.physics.compiled import compiled
 def bladder_force(
     c10: float, c01: float, cos2: float, sin2: float, length: float, x: float
 ) -> tuple[float, float]:
-    """Return the force with which the tube resists shortening by ``x`` [N], and its slope [N/mm].
+    """Return the tube's resistance to shortening by ``x`` [N], and its slope [N/mm].
 
     ``c10`` and ``c01`` are the two constants times the volume of rubber [N mm]; ``cos2`` and ``sin2``
     are of the braid angle at rest.

@@ -1,4 +1,4 @@
-"""Braid geometry: what a pressure pulls, and the room it fills.
+"""Braid geometry: area and volume.
 
 The threads of the braid are inextensible, so that diameter and length go together. The pull is the
 pressure times the change of volume with contraction (Chou and Hannaford 1996), in the form of Tondu
@@ -48,7 +48,7 @@ def braid_volume(area: float, a: float, b: float, end_cap: float, length: float,
 
 @compiled
 def unfolded(gained: float, width: float) -> tuple[float, float, float]:
-    """Return the part of a gained volume for which the bladder has to reach out [mm³], and slopes.
+    """Return the part of a gained volume that stretches the bladder [mm³], and slopes.
 
     All of it when the muscle is wider than at rest, none when it is narrower, counted from rest; the
     change from one to the other takes ``width`` [mm³].
@@ -63,7 +63,7 @@ def unfolded(gained: float, width: float) -> tuple[float, float, float]:
 
 @compiled
 def acting_pressure(pressure: float, contact: float) -> tuple[float, float, float]:
-    """Return the pressure that reaches the braid [bar], its slope, and the slope's slope [1/bar].
+    """Return the pressure on the braid [bar], its slope, and the slope's slope [1/bar].
 
     Below the atmosphere the bladder leaves the braid, and nothing does.
     """

@@ -1,4 +1,4 @@
-"""How the physics is compiled."""
+"""Compilation of the physics."""
 
 from __future__ import annotations
 
@@ -20,5 +20,5 @@ GRAVITY = 9.81
 
 
 def compiled(function: Function) -> Function:
-    """Compile with exact arithmetic; nothing global, so that runs can share a process."""
+    """Compile with exact arithmetic, without global state."""
     return deferred(function)

@@ -1,4 +1,4 @@
-"""What muscles move: coordinates with mass, stiffness and friction, and the march through time.
+"""Mechanics: coordinates with mass, stiffness and friction, and time integration.
 
 The coordinates are few (the end of a muscle; a disc's mean shortening and two tilts), the muscles
 act on them through fixed lever arms. Every step solves the balance of forces at its end by Newton's
@@ -86,7 +86,7 @@ MOTION = np.dtype(
 
 @compiled
 def beside(mechanism: Any, states: Any) -> float:
-    """Return the pressure of the muscle that the others are tied to [bar]; 0 without one."""
+    """Return the pressure of the muscle that couples to the others [bar]; 0 without one."""
     if mechanism.stiffened_by < 0:
         return 0.0
     return max(states[mechanism.stiffened_by].pressure, 0.0)
@@ -94,7 +94,7 @@ def beside(mechanism: Any, states: Any) -> float:
 
 @compiled
 def shortening(muscle: Any, n: int, place: Any) -> float:
-    """Return how much nearer the ends of a muscle are [mm], by the place of the coordinates."""
+    """Return the shortening of a muscle [mm] at given coordinates."""
     x = 0.0
     for g in range(n):
         x += muscle.levers[g] * place[g]
@@ -105,7 +105,7 @@ def shortening(muscle: Any, n: int, place: Any) -> float:
 def resist(
     muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, step: float
 ) -> None:
-    """Work out what stands against each coordinate at the place tried, and its slopes."""
+    """Compute the resistance of each coordinate at a trial position, and its slopes."""
     n, tied = mechanism.n, beside(mechanism, states)
     for g in range(n):
         moved = motion.tried[g] - motion.place[g]
@@ -135,7 +135,7 @@ def resist(
 
 @compiled
 def solve(n: int, matrix: Any, right: Any) -> None:
-    """Solve a small positive definite system in place; the answer replaces ``right``."""
+    """Solve a small positive definite system in place; the solution replaces ``right``."""
     for i in range(n):
         for k in range(i + 1, n):
             share = matrix[k, i] / matrix[i, i]
@@ -150,7 +150,7 @@ def solve(n: int, matrix: Any, right: Any) -> None:
 
 @compiled
 def within_reach(muscles: Any, n: int, place: Any) -> bool:
-    """Tell whether no muscle would be longer than its threads."""
+    """Return whether all muscles are shorter than their threads."""
     spare = np.inf
     for j in range(muscles.size):
         spare = min(spare, shortening(muscles[j], n, place) - longest(muscles[j]))
@@ -159,14 +159,14 @@ def within_reach(muscles: Any, n: int, place: Any) -> bool:
 
 @compiled
 def newmark(motion: Any, g: int, step: float) -> float:
-    """Return the acceleration that takes a coordinate to the place tried."""
+    """Return the acceleration for reaching a trial position."""
     went = motion.tried[g] - motion.place[g] - step * motion.speed[g]
     return went / (BETA * step * step) - (0.5 - BETA) / BETA * motion.acceleration[g]
 
 
 @compiled
 def move(muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, step: float) -> None:
-    """March the coordinates through one step, pressures being those at its end."""
+    """Integrate the coordinates over one step, for pressures at its end."""
     n = mechanism.n
     before = (motion.balance[0], motion.balance[1], motion.balance[2])
     for g in range(n):
@@ -219,7 +219,7 @@ def move(muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, s
 def drive(
     muscles: Any, mechanism: Any, states: Any, motion: Any, target: float, step: float
 ) -> None:
-    """March a driven coordinate towards its target, as fast as the drive can."""
+    """Move a driven coordinate towards its target at up to the drive's speed."""
     reach = mechanism.speed_limit * step
     moved = min(max(target - motion.place[0], -reach), reach)
     motion.tried[0] = motion.place[0] + moved
@@ -228,7 +228,7 @@ def drive(
 
 @compiled
 def arrive(muscles: Any, mechanism: Any, states: Any, motion: Any, step: float) -> None:
-    """Make the move to the place tried good, in the guides and in every muscle."""
+    """Accept the move to the trial position, in the guides and in every muscle."""
     for j in range(muscles.size):
         x = shortening(muscles[j], mechanism.n, motion.tried)
         pull, _, own = taut_or_slack(muscles[j], states[j], x, step)
@@ -256,7 +256,7 @@ def breathe(
     squeezing: float,
     step: float,
 ) -> None:
-    """Let a regulator fill or vent its muscle for a step, while its command goes on in a line.
+    """Fill or vent a muscle for a step, with its command changing linearly.
 
     ``squeezed`` is room that the muscle lost by bending [mm³], and ``squeezing`` its change [mm³/s].
     """
@@ -298,7 +298,7 @@ def advance(
     steps: int,
     step: float,
 ) -> None:
-    """March from one sample to the next; commands and loads go on in straight lines."""
+    """Integrate from one sample to the next; commands and loads change linearly."""
     loads = np.empty(MOST_COORDINATES)
     for i in range(steps):
         start, end = i / steps, (i + 1) / steps
@@ -335,7 +335,7 @@ def advance(
 
 @compiled
 def note(muscles: Any, mechanism: Any, states: Any, motion: Any, row: Array) -> None:
-    """Write what sensors could see into a row: see `march`."""
+    """Store the measurable quantities in a row: see `march`."""
     n, m = mechanism.n, muscles.size
     for g in range(n):
         row[g] = motion.place[g]
@@ -363,7 +363,7 @@ def march(
     step: float,
     traces: Array,
 ) -> None:
-    """March through all samples, and note what sensors could see at each.
+    """Integrate over all samples, and store the measurable quantities at each.
 
     Commands have shape (n, muscles) [bar], loads (n, coordinates) [N or N mm], targets (n,) [mm].
     Between two samples they go on in straight lines, or are held at the first. Each row of

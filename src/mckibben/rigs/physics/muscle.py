@@ -92,7 +92,7 @@ MUSCLE_STATE = np.dtype(
     ],
     align=True,
 )
-"""What one muscle remembers."""
+"""State of one muscle."""
 
 
 @compiled
@@ -107,7 +107,7 @@ def relax(force: float, kept: float, drawn: float, moved: float) -> float:
 
 @compiled
 def prepare(muscle: Any, state: Any, beside: float, step: float) -> None:
-    """Work out what does not change while a step is solved.
+    """Compute the quantities that are constant within a step.
 
     ``beside`` is the pressure of the muscle that this one is tied to [bar].
     """
@@ -163,7 +163,7 @@ def longest(muscle: Any) -> float:
 
 @compiled
 def taut_or_slack(muscle: Any, state: Any, x: float, step: float) -> tuple[float, float, float]:
-    """Return pull [N], slope [N/mm] and own shortening [mm], where its ends are ``x`` mm nearer."""
+    """Return pull [N], slope [N/mm] and own shortening [mm], for ends ``x`` mm closer."""
     least, most = -muscle.push, MOST_CONTRACTION * muscle.length
     if x <= most:
         pull, slope = tension(muscle, state, x, step)
@@ -192,7 +192,7 @@ def taut_or_slack(muscle: Any, state: Any, x: float, step: float) -> tuple[float
 
 @compiled
 def commit(muscle: Any, state: Any, x: float, step: float) -> None:
-    """Make a step's move good: friction, creep, warmth and place, and count what was dissipated."""
+    """Accept a step's move: update friction, creep, temperature, position and dissipated energy."""
     moved = x - state.x
     lost = muscle.viscosity * moved * moved / step
     for i in range(muscle.n_elements):

@@ -1,1 +1,1 @@
-"""Set-ups: what a rig's muscles are built into, one file each."""
+"""Set-ups of muscles in rigs, one file each."""

@@ -27,7 +27,7 @@ from mckibben.rigs.system import Demands, System, Traces
 
 
 class Spread(Section):
-    """How hand-made muscles differ from the one described: a factor for each."""
+    """Differences of hand-made muscles from the nominal one: a factor for each."""
 
     diameter: tuple[EachPositive, ...] = parameter("factor on the diameter of each")
     bladder: tuple[EachPositive, ...] = parameter("factor on the bladder's stiffness of each")
@@ -44,7 +44,7 @@ class Arm(Rig):
     radius: tuple[EachPositive, ...] = parameter("distance of each muscle from the middle", "mm")
     angle: tuple[float, ...] = parameter("place of each muscle round the middle", "degrees")
     bending_stiffness: float = parameter("of the arm without pressure", "N mm/rad", gt=0)
-    bending_stiffening: float = parameter("what a bar in the extensor adds", "N mm/(rad bar)", ge=0)
+    bending_stiffening: float = parameter("added per bar in the extensor", "N mm/(rad bar)", ge=0)
     bending_friction: float = parameter("dry friction of bending", "N mm", ge=0, default=0.0)
     bending_presliding: float = parameter("its presliding stiffness", "N mm/rad", gt=0, default=1e5)
     bending_damping: float = parameter(

@@ -1,4 +1,4 @@
-"""A muscle fixed at one end that moves a mass with the other, hanging from it or on a rail."""
+"""A muscle fixed at one end, with a mass at the other, hanging or on a rail."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class MovingEnd(Rig):
     command: Literal["pressure", "voltage"] = parameter(
         "what drives the regulator", default="pressure"
     )
-    bar_per_volt: float = parameter("pressure that a volt asks for", "bar/V", gt=0, default=0.6)
+    bar_per_volt: float = parameter("pressure commanded per volt", "bar/V", gt=0, default=0.6)
     moved_mass: float = parameter("mass of slide and fittings", "kg", ge=0.01, le=100)
     vertical: bool = parameter("whether the moved mass hangs, too", default=True)
     payload: float = parameter("mass hanging from the end", "kg", ge=0, le=500, default=0.0)
@@ -42,7 +42,7 @@ class MovingEnd(Rig):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Pressure or voltage, and force where it may be pulled."""
+        """Pressure or voltage, and force if a load can be applied."""
         return (self.command, "force") if "force" in self.range else (self.command,)
 
     def build(self) -> System:

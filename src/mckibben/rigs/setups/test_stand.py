@@ -1,4 +1,4 @@
-"""A muscle between a load cell and a screw: its length is imposed, its force measured."""
+"""A muscle between a load cell and a screw: imposed length, measured force."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class TestStand(Rig):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Pressure, and the length to hold or to go to."""
+        """Pressure, and the imposed length."""
         return ("pressure", "length")
 
     def build(self) -> System:

@@ -50,7 +50,7 @@ def test_other_rates_are_brought_to_one(tmp_path: Path) -> None:
 def test_channels_that_no_name_recognises_are_chosen_one_after_another(tmp_path: Path) -> None:
     pytest.importorskip("nicegui")
     workspace = Workspace(tmp_path)
-    workspace.add_recording(Recording({"dist": np.arange(9.0), "forc": np.arange(9.0)}), name="a")
+    workspace.add_recording(Recording(dict.fromkeys(("dist", "forc"), np.zeros(9))), name="a")
     state = State(workspace, Jobs(workspace))
     state.settle()
     assert (state.inputs, state.outputs) == ([], [])

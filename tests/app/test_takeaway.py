@@ -50,7 +50,7 @@ def test_code_figures_and_recordings_are_written(workspace: Workspace) -> None:
         take(taking.figure, f"{kind}.svg", figure=kind)
     workspace.path("models", "muscle.json").unlink()
     folder = workspace.folder / "takeaway"
-    assert (folder / "m.xml").read_text().count("<spatial") == 6
+    assert '<general name="m"' in (folder / "m.xml").read_text()
     held = {p.name: zipfile.ZipFile(p).namelist() for p in folder.glob("*.zip")}
     assert {"a_c.c", "a_c.h"} <= {Path(name).name for name in held["a-c.zip"]}
     assert any(name.endswith("package.xml") for name in held["b-ros2.zip"])

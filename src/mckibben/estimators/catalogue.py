@@ -89,7 +89,7 @@ def caution(model: str) -> str | None:
     far off elsewhere: it is shown with its errors.
 
     >>> caution("gpi") is None, caution("narx")
-    (True, 'a polynomial of past values leaves all bounds beyond them')
+    (True, 'a polynomial of past values is unbounded beyond them')
     """
     return declared(model).caution
 

@@ -18,6 +18,7 @@ from mckibben.blocks.memoryless import PiecewiseLinear
 from mckibben.estimators.coupled.balance import TERMS, BalanceEstimator
 from mckibben.estimators.coupled.balance_slopes import run
 from mckibben.estimators.coupled.constrained import constrained_least_squares
+from mckibben.rigs import load_rig
 from mckibben.signals.broadband import random_wave
 
 STEP = 0.05
@@ -393,3 +394,24 @@ def test_least_squares_within_inequalities_meet_the_conditions_of_optimality() -
     assert (x[pressed > 0] == 0.0).all()
     with pytest.raises(ModelError):
         constrained_least_squares(slopes, target, np.eye(6)[[0, 0]] * [[1.0], [-1.0]], np.ones(2))
+
+
+def test_the_order_of_recordings_does_not_change_what_terms_are_chosen() -> None:
+    """Held lengths, measured twice: one after another, or in two turns."""
+    rig = load_rig("mas10-test-stand").changed({"sample_time": 0.05})
+    time = np.arange(0.0, 16.0, 0.05)
+    pressure = 6.0 - 0.75 * np.abs(time - 8.0)
+
+    def held(length: float, seed: int) -> Recording:
+        run = rig.run(
+            Recording({"pressure": pressure, "length": np.full(time.size, length)}, 0.05), seed=seed
+        )
+        given = {"pressure": run["pressure"], "force": run["force"]}
+        return Recording(given | {"displacement": 200.0 - run["length"]}, 0.05)
+
+    runs = {
+        (length, seed): held(length, seed) for length in (200.0, 192.0, 184.0) for seed in (1, 2)
+    }
+    turns = sorted(runs), sorted(runs, key=lambda key: key[1])
+    one, other = (BalanceEstimator().fit([runs[key] for key in turn]).terms_ for turn in turns)
+    assert one == other

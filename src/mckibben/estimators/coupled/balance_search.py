@@ -21,7 +21,7 @@ from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask
 from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, PriorErrors
 from mckibben.estimators.coupled.balance_problem import MOST_CUTS, Problem, bounded_least_squares
-from mckibben.estimators.coupled.balance_structure import Structure, Term
+from mckibben.estimators.coupled.balance_structure import Places, Structure, Term
 from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.statistics import autoregression
@@ -239,13 +239,13 @@ class Search:
         structure, n = self.structure, len(self.structure.terms)
         new = np.array([term.kind in NEW_SHAPE for term in structure.terms]) & ~self.active
         wanted = (tried & new) | self.active
-        grams, likely = self._grams(z, wanted, new), self._likely(z, wanted)
+        (grams, folds), likely = self._grams(z, wanted, new), self._likely(z, wanted)
         bounded = self._bounded(z.size)
         active = self.active.copy()
 
         def missed(free: Mask) -> Array:
             every = np.append(free, np.ones(z.size - n, dtype=bool))
-            return _left_out(grams, every, z, bounded, likely)
+            return _left_out(grams, folds, every, z, bounded, likely)
 
         best, ahead, passed = missed(active), active, 0
         while passed < AHEAD:
@@ -284,16 +284,25 @@ class Search:
         parts = self.problem.errors(self.structure, z)[0][: len(self.problem.runs)]
         return np.array([float(block @ block) for part in _blocks(parts) for block in part])
 
-    def _grams(self, z: Array, wanted: Mask, new: Mask | None = None) -> Array:
-        """Return the products of derivatives and target, per block of time."""
+    def _grams(self, z: Array, wanted: Mask, new: Mask | None = None) -> tuple[Array, Places]:
+        """Return the products of derivatives and target, per block of time, and the folds of blocks.
+
+        Each fold has a part of every run, so that it is not all that was measured under one condition;
+        runs of few blocks begin with different folds.
+        """
         parts, slopes = self.problem.errors(self.structure, z, wanted, new)
         parts = parts[: len(self.problem.runs)]  # without what is likely of starts
         slopes = slopes[: sum(part.size for part in parts)]
         table = np.column_stack([slopes, slopes @ z - np.concatenate(parts)])
         table[~np.isfinite(table).all(axis=1)] = 0.0
         ends = np.cumsum([part.size for part in parts])[:-1]
-        blocks = [block for part in _blocks(np.split(table, ends)) for block in part]
-        return np.array([block.T @ block for block in blocks])
+        runs = _blocks(np.split(table, ends))
+        folds = [
+            (np.arange(len(run)) * FOLDS // len(run) + place) % FOLDS
+            for place, run in enumerate(runs)
+        ]
+        grams = np.array([block.T @ block for run in runs for block in run])
+        return grams, np.concatenate(folds)
 
     def _likely(self, z: Array, wanted: Mask) -> Array:
         """Return the products of the prior's derivatives and target."""
@@ -319,9 +328,9 @@ class Search:
     def without_folds(self, z: Array) -> list[Array]:
         """Return the steps without each fold; empty if none is feasible."""
         free = np.append(self.active, np.ones(z.size - self.active.size, dtype=bool))
-        parts = _reduced(self._grams(z, self.active), free, z)
+        grams, folds = self._grams(z, self.active)
+        parts, found = _reduced(grams, free, z), []
         likely = _reduced(self._likely(z, self.active)[np.newaxis], free, z)[0]
-        folds, found = np.arange(len(parts)) * FOLDS // len(parts), []
         for fold in np.unique(folds):
             sizes, ways = np.linalg.eigh(parts[folds != fold].sum(axis=0) + likely)
             root = np.sqrt(np.maximum(sizes, 0.0))[:, np.newaxis] * ways.T
@@ -403,14 +412,15 @@ def _blocks(parts: list[Array]) -> list[list[Array]]:
     return [np.array_split(part, max(1, round(BLOCKS * len(part) / total))) for part in parts]
 
 
-def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask, likely: Array) -> Array:
+def _left_out(
+    grams: Array, folds: Places, free: Mask, z: Array, bounded: Mask, likely: Array
+) -> Array:
     """Return the squared errors of every block under the least squares of the others.
 
     ``grams`` are products of slopes and target by block, and ``likely`` those of what is believed; what
     is not free is as it is.
     """
     parts, likely = _reduced(grams, free, z), _reduced(likely[np.newaxis], free, z)[0]
-    folds = np.arange(len(grams)) * FOLDS // len(grams)
     whole, errors = parts.sum(axis=0), np.zeros(len(grams))
     for fold in np.unique(folds):
         out = folds == fold

@@ -93,14 +93,12 @@ def model_of(state: State, names: Sequence[str]) -> str:
 
 def select_model(state: State, names: Sequence[str], name: str = "model") -> None:
     """Let one of some models be chosen."""
-    first = next(iter(state.workspace.models()), "")
-    titles = {x: f"{x} (first of the leaderboard)" * (x == first) or x for x in names}
 
     def chosen(event: events.ValueChangeEventArguments[Any]) -> None:
         state.model = str(event.value)
         state.changed()
 
-    field = ui.select(titles, value=model_of(state, names), label="Model", on_change=chosen)
+    field = ui.select([*names], value=model_of(state, names), label="Model", on_change=chosen)
     mark(field.props("dense outlined"), name)
 
 

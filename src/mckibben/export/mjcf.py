@@ -256,9 +256,15 @@ def _range(muscle: Balance) -> str:
     return _row(-0.5 * stroke(muscle), 1.5 * stroke(muscle))
 
 
-def _world(root: ET.Element, text: str) -> None:
-    """Add the elements of an example."""
-    root.extend(ET.fromstring(f"<mujoco>{text}</mujoco>"))
+def _world(root: ET.Element, bodies: str) -> None:
+    """Add the world of an example."""
+    text = f"""
+    <mujoco>
+      <option timestep="0.001" integrator="implicitfast"/>
+      <worldbody><light pos="0 -1 1" dir="0 1 -1"/>{bodies}</worldbody>
+    </mujoco>
+    """
+    root.extend(ET.fromstring(text.strip()))
 
 
 def hanging(root: ET.Element, muscle: Balance, rest: float, name: str) -> list[Sites]:
@@ -266,9 +272,6 @@ def hanging(root: ET.Element, muscle: Balance, rest: float, name: str) -> list[S
     _world(
         root,
         f"""
-        <option timestep="0.001" integrator="implicitfast"/>
-        <worldbody>
-          <light pos="0 -1 1" dir="0 1 -1"/>
           <body name="{name}" pos="0 0 {_row(2 * rest)}">
             <geom type="cylinder" size="0.015 0.005" contype="0" conaffinity="0"/>
             <site name="{name}_from"/>
@@ -279,7 +282,6 @@ def hanging(root: ET.Element, muscle: Balance, rest: float, name: str) -> list[S
               <site name="{name}_to"/>
             </body>
           </body>
-        </worldbody>
         """,
     )
     return [Sites(f"{name}_from", f"{name}_to")]
@@ -293,9 +295,6 @@ def joint(root: ET.Element, muscle: Balance, rest: float, name: str) -> list[Sit
     _world(
         root,
         f"""
-        <option timestep="0.001" integrator="implicitfast"/>
-        <worldbody>
-          <light pos="0 -1 1" dir="0 1 -1"/>
           <site name="{name}_1_from" pos="{_row(lever)} 0 {_row(drop)}"/>
           <site name="{name}_2_from" pos="{_row(-lever)} 0 {_row(drop)}"/>
           <body name="forearm">
@@ -304,7 +303,6 @@ def joint(root: ET.Element, muscle: Balance, rest: float, name: str) -> list[Sit
             <site name="{name}_1_to" pos="{_row(lever)} 0 0"/>
             <site name="{name}_2_to" pos="{_row(-lever)} 0 0"/>
           </body>
-        </worldbody>
         """,
     )
     return [Sites(f"{name}_{k}_from", f"{name}_{k}_to") for k in (1, 2)]
@@ -324,9 +322,6 @@ def arm(root: ET.Element, muscle: Balance, rest: float, name: str) -> list[Sites
     _world(
         root,
         f"""
-        <option timestep="0.001" integrator="implicitfast"/>
-        <worldbody>
-          <light pos="0 -1 1" dir="0 1 -1"/>
           <body name="base" pos="0 0 {_row(2 * rest)}">
             <geom type="cylinder" size="{_row(1.2 * radius)} 0.004" contype="0" conaffinity="0"/>
             {tops}
@@ -340,7 +335,6 @@ def arm(root: ET.Element, muscle: Balance, rest: float, name: str) -> list[Sites
               {ends}
             </body>
           </body>
-        </worldbody>
         """,
     )
     return [Sites(f"{name}_{k}_from", f"{name}_{k}_to") for k in (1, 2, 3)]

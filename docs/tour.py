@@ -33,7 +33,7 @@ OPTIONS = ("--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--no-fir
 
 @dataclass(frozen=True)
 class Step:
-    """A picture: what is clicked before, what is waited for, and what is said above it."""
+    """A screenshot: the clicks before it, the element to wait for, and the text above it."""
 
     name: str
     heading: str
@@ -53,47 +53,48 @@ STEPS = (
     Step(
         "data",
         "Data",
-        "Every recording with its channels and role. *How it is read* shows what was understood of the "
-        "file, to be corrected: columns, units, rate, sign, calibration, lines, encoding. Drag across "
-        "the plot to cut; every step can be undone.",
+        "Each recording is listed with its channels and role. *How it is read* shows the import settings "
+        "(columns, units, rate, sign, calibration, lines, encoding), which can be corrected. Drag across "
+        "the plot to trim a recording; every step can be undone.",
         ("example",),
         "over-time",
     ),
     Step(
         "look",
         "Look",
-        "Loops, time courses, what the muscle does in numbers, and what to record next.",
+        "Hysteresis loops, time plots, a characterization of the muscle, and a plan of the next recording.",
         ("tab-look",),
         "look-loop",
     ),
     Step(
         "choice",
         "Models: the choice",
-        "Models by what they are for. Those that apply to the recordings are listed, the usual ones "
-        "ticked; for the others it says why not.",
+        "Models are grouped by purpose. Those that apply to the recordings can be selected, and the usual "
+        "ones are preselected; for the others, the reason is shown.",
         ("tab-models", "fit-models"),
         "fit",
     ),
     Step(
         "models",
         "Models: the leaderboard",
-        "Fits run in the background, one process each. The best stands first, beside the chosen model "
-        "in tabs: loop, time, residual, parameters, band, check.",
+        "Each fit runs in the background, in its own process. The best model is listed first. The tabs show "
+        "the selected model: loop, time, residual, parameters, band, check.",
         ("fit",),
         "closer-loop",
     ),
     Step(
         "compensate",
         "Compensate",
-        "A motion within what can be reached, and how the compensator follows it on another model or "
-        "on a virtual rig, beside no compensation.",
+        "The compensator follows a reachable reference on another model or on a virtual rig. Its error is "
+        "compared with that of no compensation.",
         ("tab-compensate", "run"),
         "runs",
     ),
     Step(
         "take",
         "Take away",
-        "Report, figures, model, C99, FMU, ROS 2, recordings; and all that was done as a script.",
+        "Download the report, figures, model, C99, FMU, ROS 2 package and recordings, and a script that "
+        "repeats all steps.",
         ("tab-take",),
         "things",
     ),
@@ -134,7 +135,7 @@ def walk(page: Any) -> None:
         print(f"{step.name}: {(PICTURES / f'{step.name}.png').stat().st_size} bytes")
 
 
-def tell() -> None:
+def write_page() -> None:
     """Write headings, words and pictures into the tour's page."""
     path = DOCS / "workbench.md"
     lines = ["<!-- tour: made by docs/tour.py -->", ""]
@@ -143,7 +144,7 @@ def tell() -> None:
         lines += [f"![{step.heading} in the workbench](pictures/tour/{step.name}.png)", ""]
     found = path.read_text(encoding="utf-8")
     before, _, rest = found.partition("<!-- tour")
-    after = re.split(r"(?m)^(?=## What it keeps to itself)", rest)[1]
+    after = re.split(r"(?m)^(?=## Privacy and security)", rest)[1]
     path.write_text(before + "\n".join(lines) + "\n" + after, encoding="utf-8")
 
 
@@ -168,7 +169,7 @@ def main() -> None:
         finally:
             process.terminate()
             process.wait(20)
-    tell()
+    write_page()
 
 
 if __name__ == "__main__":

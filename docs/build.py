@@ -1,9 +1,9 @@
-"""Build the documentation, offline: pages made from the code, pictures made by scripts, then Sphinx.
+"""Build the documentation, offline: pages from the code, figures from scripts, then Sphinx.
 
     python docs/build.py            # into docs/_build/html; warnings are errors
 
-Only the gallery fits models. The examples on pages of models are fitted by docs/models/fits.py, and the
-pictures of the workbench are made by docs/tour.py, both by hand.
+Only the gallery fits models. Run docs/models/fits.py to update the examples on the models' pages, and
+docs/tour.py to update the screenshots of the workbench.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 from making.api import write_api
 from making.commands import write_commands
 from making.gallery import write_gallery
+from making.glossary import write_glossary
 from making.models import write_models
 from making.pages import DOCS, MADE
 
@@ -26,7 +27,7 @@ def build(into: Path, jobs: int) -> int:
     """Run Sphinx over all pages; every warning is an error."""
     from sphinx.cmd.build import build_main
 
-    # all pages are written (-a): the search index holds the index entries of those written only
+    # -a writes all pages: the search index contains only pages that are written
     options = ["-W", "-a", "--keep-going", "-q", "-j", str(jobs), "-b", "html"]
     return build_main([*options, "-d", str(into.with_name("doctrees")), str(DOCS), str(into)])
 
@@ -47,12 +48,15 @@ def main() -> int:
         warnings.simplefilter("ignore")
         write_api()
         write_commands()
-        with ProcessPoolExecutor(1) as pool:  # the gallery's fits, beside the pages of models
+        write_glossary()
+        with ProcessPoolExecutor(
+            1
+        ) as pool:  # the gallery's fits, in parallel with the models' pages
             gallery = pool.submit(write_gallery)
             write_models()
             gallery.result()
     code = build(given.into, given.jobs)
-    print(f"Built: {given.into / 'index.html'}" if code == 0 else "There were warnings.")
+    print(f"Built: {given.into / 'index.html'}" if code == 0 else "Sphinx reported warnings.")
     return code
 
 

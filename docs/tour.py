@@ -53,40 +53,40 @@ STEPS = (
     Step(
         "data",
         "Data",
-        "Each recording is listed with its channels and role. *How it is read* shows the import settings "
-        "(columns, units, rate, sign, calibration, lines, encoding), which can be corrected. Drag across "
-        "the plot to trim a recording; every step can be undone.",
+        "Each recording is listed with its channels and role. *How it is read* opens the import "
+        "settings: columns, units, rate, sign, calibration, lines, encoding. Drag across the plot to "
+        "trim a recording. Every step can be undone.",
         ("example",),
         "over-time",
     ),
     Step(
         "look",
         "Look",
-        "Hysteresis loops, time plots, a characterization of the muscle, and a plan of the next recording.",
+        "Hysteresis loops, time plots, a characterization of the muscle, a plan of the next recording.",
         ("tab-look",),
         "look-loop",
     ),
     Step(
         "choice",
         "Models: the choice",
-        "Models are grouped by purpose. Those that apply to the recordings can be selected, and the usual "
-        "ones are preselected; for the others, the reason is shown.",
+        "Models are grouped by purpose. The usual ones are preselected. For a model that does not apply "
+        "to the recordings, the reason is shown.",
         ("tab-models", "fit-models"),
         "fit",
     ),
     Step(
         "models",
         "Models: the leaderboard",
-        "Each fit runs in the background, in its own process. The best model is listed first. The tabs show "
-        "the selected model: loop, time, residual, parameters, band, check.",
+        "Each fit runs in its own process in the background. The best model is listed first. Tabs show "
+        "the loop, time plot, residual, parameters, band and check of the selected model.",
         ("fit",),
         "closer-loop",
     ),
     Step(
         "compensate",
         "Compensate",
-        "The compensator follows a reachable reference on another model or on a virtual rig. Its error is "
-        "compared with that of no compensation.",
+        "The compensator follows a reachable reference on another model or a virtual rig. Its error is "
+        "compared with the error without compensation.",
         ("tab-compensate", "run"),
         "runs",
     ),

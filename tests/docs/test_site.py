@@ -33,7 +33,7 @@ FIRST = {
     "commands": "_generated/commands",
     "workbench": "workbench",
     "jupyter": "jupyter",
-    "glossary": "glossary",
+    "glossary": "_generated/glossary",
     "hysteresis": "models/choosing",
     "models": "models/choosing",
     "inverse": "tutorials/compensate",

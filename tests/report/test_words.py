@@ -12,6 +12,8 @@ from mckibben.diagnosis.data_gaps import data_gaps
 from mckibben.diagnosis.description import describe
 from mckibben.numerals import percent
 from mckibben.report import words
+from mckibben.report.columns import columns_of
+from mckibben.report.glossary import definition
 from mckibben.studying.study import Study
 from tests.report.studies_by_hand import hung, study, two_muscles
 
@@ -50,3 +52,10 @@ def test_the_three_answers_are_short_and_hold_their_numbers(make: Callable[[], S
     assert best is not None
     if best.band is not None:
         assert percent(min(best.band.coverage.values())) in said[1][1]
+
+
+def test_every_column_of_a_leaderboard_is_in_the_glossary() -> None:
+    row = study().leaderboard.rows[0].to_dict()
+    every = [one for by in words.CHOICES for one in columns_of([row], "mm", chosen_by=by)]
+    assert len(every) > 20
+    assert [one.label for one in every if not definition(one.label)] == []

@@ -26,6 +26,7 @@ from mckibben.report import interactive
 from mckibben.report.builder import Figure, Item, Table, Text
 from mckibben.report.builder import cell as as_text
 from mckibben.report.drawing import Drawing
+from mckibben.report.glossary import definition
 
 Json = dict[str, Any]
 
@@ -305,7 +306,7 @@ def table(
         with ui.element("thead"), ui.element("tr"):
             for name, first in zip(columns, rows[0] if rows else columns, strict=True):
                 with ui.element("th").classes("number" * isinstance(first, int | float)):
-                    ui.label(name)
+                    _titled(name, definition(name))
         with ui.element("tbody"):
             for at, cells in enumerate(rows):
                 line = ui.element("tr")

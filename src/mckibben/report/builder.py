@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from mckibben.errors import in_terms_of
 from mckibben.numerals import number, numeral, percent, typeset, typeset_within
 from mckibben.report import interactive
+from mckibben.report.glossary import definition
 from mckibben.report.mathematics import mathml
 
 if TYPE_CHECKING:
@@ -271,6 +272,7 @@ def _environment() -> Environment:
         "typeset": typeset,
         "typeset_within": lambda text: typeset_within(in_terms_of(str(text))),
         "mathml": mathml,
+        "definition": definition,
     }
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     return environment

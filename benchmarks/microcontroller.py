@@ -25,16 +25,18 @@ SAMPLE_TIME = 0.01
 
 HEAD = """# Blocks on a microcontroller
 
-Single precision on an Arm Cortex-M4F (`gcc -O2`), emulated by QEMU: instructions are exact and
-repeatable, cycles on a chip are some more. Each model is its documentation example unless it says
-otherwise, on about 200 samples with minor loops and holds. *First* is the first step, which also
-starts the memory. RAM is one model; stack is the deepest seen, the C library's included; flash is
-code and constants without the C library's `exp` and the like. The difference is the largest from
-Python in double precision, relative to the range of the output.
+Cost of one step in single precision on an Arm Cortex-M4F (`gcc -O2`) emulated by QEMU. Instruction
+counts are exact and repeatable; the number of cycles on a chip is somewhat larger. Each model is its
+documentation example unless stated otherwise, run on about 200 samples with minor loops and holds.
+
+- *First* is the first step, which also initializes the memory.
+- *RAM* is the memory of one model in bytes. *Stack* is the maximum, including the C library. *Flash* is
+  code and constants, without functions of the C library such as `exp`.
+- *Difference* is the largest difference from Python in double precision, relative to the output range.
 
 This page is written by `python benchmarks/microcontroller.py`.
 
-| model | instructions, median | at most | first | RAM | stack | flash | difference |
+| model | instructions, median | maximum | first | RAM | stack | flash | difference |
 |---|---:|---:|---:|---:|---:|---:|---:|"""
 
 

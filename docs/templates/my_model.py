@@ -1,6 +1,6 @@
-"""The elastic-plastic model: y = g u + w (u - F_r[u]), a spring beside a spring that slips.
+"""The elastic-plastic model: y = g u + w (u - F_r[u]), a spring in parallel with one that slips.
 
-F_r is the play operator of threshold r. Source: title of the paper, its equations, every departure.
+F_r is the play operator of threshold r. Source: title of the paper, equations, and any deviations.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstima
 
 @kernel
 def advance(u: float, c: Array, state: Array) -> None:
-    """Move the play operator, which is the state; c are [g, w, r]."""
+    """Advance the play operator, which is the state; c is [g, w, r]."""
     state[0] = min(max(state[0], u - c[2]), u + c[2])
 
 
 @kernel
 def trial(u: float, memory: tuple[Array, Array]) -> float:
-    """Return the output that an input would give: the model, and what its inverse is solved with."""
+    """Return the output for an input, without changing the state; the inverse is solved with it."""
     c, state = memory
     return c[0] * u + c[1] * (u - min(max(state[0], u - c[2]), u + c[2]))
 
 
 @kernel
 def elastic_plastic_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start as if the input had only risen to the first sample, or as if nothing had happened."""
+    """Initialize for an input that has only risen to the first sample, or for a virgin state."""
     u, r = inputs[0], coefficients[2]
     state[0] = min(max(0.0, u - r), u + r) if virgin else u - r
 
@@ -49,19 +49,19 @@ class ElasticPlastic(Invertible):
     Parameters
     ----------
     gain, weight : float
-        g, output per input while slipping, and w, what sticking adds; the inverse wants g + w > 0.
+        g, slope while slipping, and w, additional slope while sticking; the inverse requires g + w > 0.
     threshold : float
-        Travel of the input from the middle to slipping, in its unit; at least 0.
+        Change of the input from the middle until slipping; at least 0.
     input_range : (float, float), optional
-        Lowest and highest input; the inverse needs it and clips there.
+        Lowest and highest input; required by the inverse, which clips there.
     """
 
     kind = "elastic-plastic"
     start_kernel = elastic_plastic_start
     kernel, inverse_kernel, inverse_start_kernel = solved_kernels(trial, advance, start_kernel)
     solved, inverse_remembers = True, "input"
-    parameters = ("gain", "weight", "threshold")  # in this order they are the kernel's coefficients
-    typical = (4.0, -1.5, 0.4, (0.0, 5.0))  # of `example`, on which tests run
+    parameters = ("gain", "weight", "threshold")  # the kernel's coefficients, in this order
+    typical = (4.0, -1.5, 0.4, (0.0, 5.0))  # arguments of `example`, which the tests use
     notation = Notation(
         r"y = g u + w (u - F_r[u])", gain="g [{y}/{u}]", weight="w [{y}/{u}]", threshold="r [{u}]"
     )
@@ -75,16 +75,16 @@ class ElasticPlastic(Invertible):
     output: fields.ChannelField = fields.DISPLACEMENT
     n_states = 1
 
-    def peaks(self) -> Array:  # from which the operator just comes back to the lowest input
+    def peaks(self) -> Array:  # input from which the operator just returns to its lowest state
         return np.array([self.input_limits[0] + 2 * self.threshold])
 
-    def least_slope(self) -> float:  # of the output by the input: the inverse wants it positive
+    def least_slope(self) -> float:  # must be positive for the inverse
         return min(self.gain, self.gain + self.weight)
 
 
 @settings(kw_only=True, repr=False, eq=False)
 class ElasticPlasticEstimator(SeparableEstimator):
-    """Elastic-plastic model: its threshold is searched, its slopes are solved for in every trial."""
+    """Elastic-plastic model: the threshold is searched, the slopes are solved for by least squares."""
 
     title = "Elastic-plastic model"
     purpose = "memory"
@@ -94,17 +94,17 @@ class ElasticPlasticEstimator(SeparableEstimator):
     makes = ("elastic-plastic",)
     solves_offset = False
 
-    def bounds(self, data: TrainingData) -> tuple[Array, Array]:  # of theta, [threshold by range]
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:  # of theta, [threshold / range]
         return np.array([0.005]), np.array([0.45])
 
     def guesses(self, data: TrainingData) -> list[Array]:
         return [np.array([share]) for share in (0.02, 0.08, 0.2)]
 
-    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:  # what slopes multiply
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:  # regressors
         play = self.build(theta, np.array([0.0, 1.0]), 0.0, data).simulate(run.history)
         return np.column_stack([run.history - play, play])
 
-    def least(self, matrix: Array, data: TrainingData) -> Array:  # slopes: so there is an inverse
+    def least(self, matrix: Array, data: TrainingData) -> Array:  # bounds for the inverse
         return LEAST_REVERSIBLE * np.ptp(data.output_range) / np.ptp(matrix, axis=0)
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:

@@ -1,4 +1,4 @@
-"""Air and command: how near `air` comes to virtual regulators, and what it is worth in a loop.
+"""Errors of `air` on virtual regulators, in simulation and in a loop.
 
 Run: python docs/models/air.py      writes docs/models/air.md
 """
@@ -20,25 +20,28 @@ Array = NDArray[np.float64]
 
 HEAD = """# Valve, regulator and air
 
-Made by `python docs/models/air.py`; do not edit. `air` fitted to one run of a virtual rig, and running
-free on another with other random commands of the same kind. Sensor: standard deviation of noise and
-rounding; RMSE on the other run in bar, over all, and while the model fills, vents (by more than
-0.2 bar/s) and does neither.
+```{index} !valve, !air, !regulator
+```
+
+Made by `python docs/models/air.py`; do not edit. `air` is fitted to one run of a virtual rig and
+simulated on another with different random commands of the same kind. *Sensor* is the standard deviation
+of noise and quantization. The table shows RMSE [bar] on the fitted run, on the other run, and on the parts
+of the other run in which the model fills or vents (by more than 0.2 bar/s) or does neither.
 """
 
 LIMITS = """
-Near one pressure, in small steps, the run fitted is met to {least:.1f} times the sensor's noise. Over
-the whole range what is left is no noise: in the rigs air flows by ISO 6358, choked where pressures
-differ much, so that filling goes at one rate at first, and venting slows down towards that of the
-surroundings; and a muscle that moves has another room to fill. Lags that are the same everywhere are a
-compromise, which the model's standard errors do not speak of.
+With small steps near one pressure, the error on the fitted run is {least:.1f} times the sensor noise. Over the
+whole range, the model has systematic errors. The air flow in the rigs follows ISO 6358: at large pressure
+differences it is choked, so that filling starts at a constant rate and venting slows down towards
+atmospheric pressure. The volume of a moving muscle also changes. The constant lags of `air` are a
+compromise; its standard errors do not include this error.
 
 ## In a loop
 
-On the virtual rail, voltage to displacement, RMSE [mm] of sines of {stroke:.0f} mm, open loop: the
-inverse of `gpi` on the voltage; that of `gpi` on the measured pressure behind `air`; the same with its
-reference 20 ms further ahead than the dead time found, {dead:.0f} ms, which shows what a wrong preview
-costs.
+RMSE [mm] of open-loop tracking on the virtual rail, from voltage to displacement, for sines of {stroke:.0f} mm:
+the inverse of `gpi` identified on the voltage; the inverse of `gpi` identified on the measured pressure
+with `air` in series; and the latter with its reference 20 ms earlier than the identified dead time of
+{dead:.0f} ms, to show the effect of a wrong preview.
 
 | frequency [Hz] | `gpi` | `air` and `gpi` | 20 ms too early |
 |---:|---:|---:|---:|
@@ -76,7 +79,7 @@ def commands(kind: str, low: float, high: float, step: float, seed: int) -> Arra
 
 
 def run_of(name: str, kind: str, seed: int, step: float | None = None) -> Recording:
-    """Return a run of a rig with what was commanded beside what was measured."""
+    """Return a run of a rig with commands and measurements."""
     rig, step = load_rig(name), step or STEP[name]
     if name == "rail":
         return rig.run(
@@ -148,8 +151,8 @@ def main() -> None:
     rows = [row(name, kind) for name in STEP for kind in KINDS]
     lines += [text for text, _ in rows]
     table, stroke, dead = loop()
-    told = LIMITS.format(least=min(ratio for _, ratio in rows), stroke=stroke, dead=dead)
-    lines.append(told.rstrip("\n"))
+    limits = LIMITS.format(least=min(ratio for _, ratio in rows), stroke=stroke, dead=dead)
+    lines.append(limits.rstrip("\n"))
     lines += table
     Path(__file__).with_name("air.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 

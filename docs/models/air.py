@@ -24,24 +24,25 @@ HEAD = """# Valve, regulator and air
 ```
 
 Made by `python docs/models/air.py`; do not edit. `air` is fitted to one run of a virtual rig and
-simulated on another with different random commands of the same kind. *Sensor* is the standard deviation
-of noise and quantization. The table shows RMSE [bar] on the fitted run, on the other run, and on the parts
-of the other run in which the model fills or vents (by more than 0.2 bar/s) or does neither.
+simulated on another with different random commands of the same kind. *Sensor* is the standard
+deviation of noise and quantization. The table shows RMSE [bar] on the fitted run, on the other run,
+and on the parts of the other run in which the model fills or vents (by more than 0.2 bar/s) or does
+neither.
 """
 
 LIMITS = """
-With small steps near one pressure, the error on the fitted run is {least:.1f} times the sensor noise. Over the
-whole range, the model has systematic errors. The air flow in the rigs follows ISO 6358: at large pressure
-differences it is choked, so that filling starts at a constant rate and venting slows down towards
-atmospheric pressure. The volume of a moving muscle also changes. The constant lags of `air` are a
-compromise; its standard errors do not include this error.
+With small steps near one pressure, the error on the fitted run is {least:.1f} times the sensor
+noise. Over the whole range, the model has systematic errors. The air flow in the rigs follows ISO
+6358: at large pressure differences it is choked, so that filling starts at a constant rate and
+venting slows down towards atmospheric pressure. The volume of a moving muscle also changes. The
+constant lags of `air` are a compromise; its standard errors do not include this error.
 
 ## In a loop
 
-RMSE [mm] of open-loop tracking on the virtual rail, from voltage to displacement, for sines of {stroke:.0f} mm:
-the inverse of `gpi` identified on the voltage; the inverse of `gpi` identified on the measured pressure
-with `air` in series; and the latter with its reference 20 ms earlier than the identified dead time of
-{dead:.0f} ms, to show the effect of a wrong preview.
+RMSE [mm] of open-loop tracking on the virtual rail, from voltage to displacement, for sines of
+{stroke:.0f} mm: the inverse of `gpi` identified on the voltage; the inverse of `gpi` identified on
+the measured pressure with `air` in series; and the latter with its reference 20 ms earlier than the
+identified dead time of {dead:.0f} ms, to show the effect of a wrong preview.
 
 | frequency [Hz] | `gpi` | `air` and `gpi` | 20 ms too early |
 |---:|---:|---:|---:|

@@ -23,12 +23,12 @@ from mckibben.report.reproduction import drawing, markdown
 HERE = Path(__file__).parent
 HEAD = """# The five papers
 
-Made by `python docs/papers/make.py`; do not edit. Each page begins with where every system, equation,
-table and figure of its paper is; what is printed stands beside what a full run gives.
-`mckibben reproduce NAME` runs one again, `--data FOLDER` on recordings of your own muscle. Models with
-the parameters that a paper prints are `mckibben.papers.paper.printed(NAME)`.
+Made by `python docs/papers/make.py`; do not edit. Each page begins with an index of the systems,
+equations, tables and figures of the paper, followed by printed values next to those of a full run.
+`mckibben reproduce NAME` repeats the experiments; `--data FOLDER` uses recordings of your own muscle.
+`mckibben.papers.paper.printed(NAME)` returns models with the printed parameters.
 
-| number | paper | what it asks | with your muscle |
+| number | paper | question | with your muscle |
 |---|---|---|---|"""
 
 TUTORIALS = {

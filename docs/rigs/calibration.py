@@ -85,7 +85,7 @@ def soft_arm() -> Iterator[Row]:
         f"{span(widths)} %",
         "p0 = 1 bar, 1.3 bar peaks",
     )
-    yield "of these, muscles driven", "-", f"{span(driven)} %", ""
+    yield "driven muscles only", "-", f"{span(driven)} %", ""
     stiff = {
         p0: [
             float(np.ptp(last_cycle(runs[f"stiffness-p0-{p0:.1f}"], 50.0)[f"displacement_{k}"]))
@@ -102,7 +102,7 @@ def soft_arm() -> Iterator[Row]:
             f"{who}: range at p0 = 0, 0.5, 1, 2.5 bar",
             f"{wanted} decrease (Figure 5)",
             f"{moved} mm",
-            f"-{change:.0f} % in all",
+            f"-{change:.0f} % in total",
         )
     for k in (1, 2, 3):
         recording = runs[f"gpi-{k}"]
@@ -115,7 +115,7 @@ def soft_arm() -> Iterator[Row]:
     rise = runs["gpi-1"].slice(2500, 3750)
     order = np.argsort(rise["pressure_1"], kind="stable")
     there = np.interp(1.4, rise["pressure_1"][order], rise["displacement_1"][order])
-    yield "shortening of I on its way up at 1.4 bar, p0 = 0", "about 45 mm", f"{there:.0f} mm", ""
+    yield "displacement of I when rising to 1.4 bar, p0 = 0", "about 45 mm", f"{there:.0f} mm", ""
     yield from arm_hysteresis(runs["gpi-1"])
     yield from arm_motion(
         {pattern: runs[f"prediction-p0-0.1-drive-{pattern}"] for pattern in PATTERNS}
@@ -167,7 +167,7 @@ def arm_motion(runs: Mapping[str, Recording]) -> Iterator[Row]:
                 f"passive over driven, driven {pattern}",
                 f"{listed(own, 2)} (raw network {listed(other, 2)})",
                 listed(ours, 2),
-                "of the row above",
+                "of the preceding row",
             )
 
 
@@ -205,7 +205,7 @@ def hanging() -> Iterator[Row]:
     shortened = unloaded.run(Recording({"pressure": filled}, 0.02))["displacement"][-1]
     yield (
         "contraction at 6 bar without load",
-        "25 % (its maker's)",
+        "25 % (manufacturer)",
         f"{100 * shortened / rig.known()['rest_length']:.1f} %",
         "",
     )
@@ -215,7 +215,7 @@ def hanging() -> Iterator[Row]:
     moved = rig.run(Recording({"pressure": wave}, 0.02))["displacement"]
     yield (
         "loop width of the second major cycle",
-        f"{loop_width(wave[500:], model[500:]):.1f} % (its PI model)",
+        f"{loop_width(wave[500:], model[500:]):.1f} % (PI model)",
         f"{loop_width(wave[500:], moved[500:]):.1f} %",
         "",
     )
@@ -227,7 +227,7 @@ def hanging() -> Iterator[Row]:
     ):
         yield (
             f"curvature of its {name} branch: height over its chord at mid pressure",
-            f"{printed:+.1f} % (its PI model)",
+            f"{printed:+.1f} % (PI model)",
             f"{ours:+.1f} %",
             "of the range",
         )
@@ -243,7 +243,7 @@ def hanging() -> Iterator[Row]:
         for shape, run in zip(shapes, runs.values(), strict=True)
     ]
     yield (
-        "error of its printed PI model, calibration and test, matched as in the paper",
+        "error of the printed PI model, calibration and test, matched as in the paper",
         "2.60, 2.48 mm RMSE (Table 2)",
         f"{errors[0]:.2f}, {errors[1]:.2f} mm RMSE",
         f"matched by least squares on the calibration: {errors[2]:.2f}, {errors[3]:.2f} mm",
@@ -281,8 +281,8 @@ def test_stand() -> Iterator[Row]:
             off.append((recording["force"] - law)[taut])
     error = np.concatenate(off)
     yield (
-        "isometric force against the static law where it pulls",
-        "15.4 N RMSE (its own fit)",
+        "isometric force compared with the static law, where the muscle pulls",
+        "15.4 N RMSE (fit of the paper)",
         f"{np.sqrt(np.mean(error**2)):.1f} N RMSE",
         "9 lengths of 184 to 200 mm",
     )
@@ -330,7 +330,7 @@ def rail() -> Iterator[Row]:
         cycle = last_cycle(runs[f"free-{frequency:g}Hz"], period)
         yield (
             f"loop width at {frequency:g} Hz, no load",
-            f"{loop_width(wave[half:], model[half:]):.1f} % (its MPI model)",
+            f"{loop_width(wave[half:], model[half:]):.1f} % (MPI model)",
             f"{loop_width(cycle['voltage'], cycle['displacement']):.1f} %",
             "",
         )
@@ -343,13 +343,13 @@ def rail() -> Iterator[Row]:
         moved = last_cycle(runs[name], period)["displacement"]
         yield (
             f"stroke under {load}",
-            f"squeezed, from {np.ptp(free['displacement']):.1f} mm without (Figure 2)",
+            f"reduced, from {np.ptp(free['displacement']):.1f} mm without (Figure 2)",
             f"{np.ptp(moved):.1f} mm, highest point {moved.max():.1f} mm",
             "",
         )
     for known, other, printed in ((1, 2, "6.86"), (1, 3, "10.06"), (2, 3, "3.23")):
         yield (
-            f"MPI identified on status {known}, on status {other}: MAE",
+            f"MAE of MPI identified on status {known}, tested on status {other}",
             f"{printed} mm (Table 2)",
             f"{model_error(runs[f'status-{known}'], runs[f'status-{other}']):.2f} mm",
             "load sensitivity",
@@ -392,7 +392,7 @@ def mckibben() -> Iterator[Row]:
         "static pressure at the characteristic points of Table 1",
         "-",
         f"{np.sqrt(np.mean(np.square(off))):.2f} bar RMSE over {len(off)} points",
-        "reached ones of points 1, 2, 4 at 0 to 300 N; 0.3 to 3.9 bar",
+        "reachable points of 1, 2, 4 at 0 to 300 N; 0.3 to 3.9 bar",
     )
     for force in (0.0, 50.0, 150.0, 300.0):
         widths, printed = [], []
@@ -436,10 +436,11 @@ RIGS: Mapping[str, tuple[str, Callable[[], Iterator[Row]]]] = {
     "mckibben-530": ("activation-pressure", mckibben),
 }
 
-HEAD = """# What the virtual rigs do, beside what the papers print
+HEAD = """# Virtual rigs compared with their papers
 
-Made by `python docs/rigs/calibration.py`; do not edit. Each rig was recorded by its paper's protocol
-(`mckibben rig record PROTOCOL --out DIR`). A dash means that the paper prints nothing.
+Made by `python docs/rigs/calibration.py`; do not edit. Each rig was recorded with the protocol of
+its paper (`mckibben rig record PROTOCOL --out DIR`). A dash means that the paper prints no value.
+For the reasons of the differences, see [Differences](differences.md).
 """
 
 
@@ -452,8 +453,7 @@ def table() -> str:
         parts.append("| quantity | paper | rig | |\n|---|---|---|---|")
         parts += [f"| {' | '.join(row)} |" for row in rows()]
         parts.append("")
-    notes = Path(__file__).with_name("differences.md").read_text(encoding="utf-8")
-    return "\n".join([*parts, notes])
+    return "\n".join(parts)
 
 
 def main() -> None:

@@ -30,13 +30,13 @@ N_FIT = 150
 
 MODELS = ("pi", "gpi", "mpi", "eupi", "rdpi")
 
-HEAD = """# A measured muscle, and a rig made from its data sheet
+HEAD = """# A measured muscle and a rig from its data sheet
 
 Made by `python docs/rigs/measured.py FOLDER`; do not edit. The muscle is a Festo DMSP-10-250 measured
-by the authors of github.com/tbazina/pam_lqi_pid (not distributed here). The rig comes from data-sheet
-numbers alone (10 mm, 250 mm, 630 N at 8 bar, 25 %, and a loop of 16 %); it was driven with the measured
-pressures and read the same way. The same models, settings and splits; errors are free-running test RMSE
-in per cent of the range of displacement.
+by the authors of github.com/tbazina/pam_lqi_pid (not distributed here). The rig uses data-sheet values
+only (10 mm, 250 mm, 630 N at 8 bar, 25 %, and a loop width of 16 %). It was driven with the measured
+pressures and sampled in the same way. Models, settings and splits are the same. Errors are free-run test
+RMSE in per cent of the displacement range.
 """
 
 

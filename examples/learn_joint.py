@@ -3,10 +3,11 @@
     pip install 'mckibben[mujoco,gym]'
     python examples/learn_joint.py joint.xml
 
-The model is of ``mckibben export mjcf model.json --example joint --lag 0.05 -o joint.xml``. Both
-controllers set the difference of the two pressures from a weighted sum; the weights are found by the
-cross-entropy method on the same episodes. PID sums the error, its integral and the velocity; the policy
-also the reference ahead and the last action. What counts is the error on references not used to learn.
+Create the model with ``mckibben export mjcf model.json --example joint --lag 0.05 -o joint.xml``. The
+output of both controllers is the difference of the two pressures, a weighted sum of features. The weights
+are optimized by the cross-entropy method on the same episodes. The features of PID are the error, its
+integral and the velocity; those of the policy also include the previewed reference and the last action.
+The printed error is that on new references.
 """
 
 import sys
@@ -17,17 +18,17 @@ import numpy as np
 from mckibben.vector_environment import JointTracking
 
 COPIES, ROUNDS, ELITE = 128, 30, 16
-"""Candidates of a round, rounds, and how many of the best set the next round's distribution."""
+"""Candidates per round, rounds, and best candidates that define the next distribution."""
 
 PREVIEW = 8
-"""Control steps ahead that the policy sees."""
+"""Preview of the policy in control steps."""
 
 FIRST = 0.5
-"""Of an episode, that is not counted: it starts without pressure [s]."""
+"""Initial part of an episode that is not counted, as it starts without pressure [s]."""
 
 
 def features(seen: np.ndarray, integral: np.ndarray, pid: bool) -> np.ndarray:
-    """Return what a controller sums, shape (copies, features), from observations."""
+    """Return the features of a controller from observations, shape (copies, features)."""
     angle, speed, reference = seen[:, 0], seen[:, 1], seen[:, 2]
     common = (reference - angle, integral, -10.0 * speed)
     if pid:
@@ -38,7 +39,7 @@ def features(seen: np.ndarray, integral: np.ndarray, pid: bool) -> np.ndarray:
 
 
 def errors(env: JointTracking, weights: np.ndarray, seed: int, pid: bool) -> np.ndarray:
-    """Return the mean absolute error of every copy over an episode, of half the range."""
+    """Return the mean absolute error of every copy over an episode, relative to half the range."""
     seen, _ = env.reset(seed=seed)
     integral, total, counted = np.zeros(env.num_envs), np.zeros(env.num_envs), 0
     over = False
@@ -75,7 +76,7 @@ def main() -> None:
     begun = time.monotonic()
     for pid in (True, False):
         weights = np.tile(learned(env, pid), (COPIES, 1))
-        found = errors(env, weights, seed=1, pid=pid)  # references that learning did not see
+        found = errors(env, weights, seed=1, pid=pid)  # new references
         print(
             f"{'PID' if pid else 'policy'}: mean error {100 * found.mean():.2f} % of half the range, "
             f"worst of {COPIES} {100 * found.max():.2f} % ({time.monotonic() - begun:.0f} s)"

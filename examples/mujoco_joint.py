@@ -1,10 +1,10 @@
-"""A joint between two fitted muscles in MuJoCo, from plain XML: conventions, and backlash.
+"""A joint between two fitted muscles in MuJoCo, from plain XML: conventions and hysteresis.
 
     mckibben export mjcf model.json --rest-length 530 --example joint -o joint.xml
     python examples/mujoco_joint.py joint.xml docs/pictures/mujoco_joint.png
 
-On the left, what the numbers in the file mean. On the right, the pressures of the two muscles go up and
-down by turns about a common one: the joint comes back by another way.
+Left: meaning of the numbers in the file. Right: the pressures of the two muscles vary in opposite
+directions around a common mean; the joint returns on another branch.
 """
 
 import sys
@@ -15,13 +15,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 PERIOD, SWING = 8.0, 0.8
-"""Of the pressures' difference: period [s] and amplitude [bar]."""
+"""Period [s] and amplitude [bar] of the pressure difference."""
 
 ARROW = {"arrowstyle": "<->", "color": "0.3", "shrinkA": 0, "shrinkB": 0}
 
 
 def draw_conventions(axes: Axes) -> None:
-    """Draw a muscle at rest and one that has shortened, with the names of what is in the file."""
+    """Draw a muscle at rest and a shortened one, with the names used in the file."""
     for y, length, title in ((1.0, 1.0, "no pressure"), (0.0, 0.72, "pressure p")):
         axes.plot([0, length], [y, y], lw=9, color="#4c78a8", solid_capstyle="butt", alpha=0.6)
         axes.plot([0, length], [y, y], "ko", ms=5)

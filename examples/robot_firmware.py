@@ -1,15 +1,15 @@
-"""A compensator that learns, in firmware at 200 Hz, beside a fixed one on the same robot, which drifts.
+"""An adaptive compensator in firmware at 200 Hz, compared with a fixed one on a drifting robot.
 
     python examples/robot_firmware.py docs/pictures/robot_firmware.png --fast
 
-reference -> adaptive inverse on an emulated Cortex-M4F, over its serial port -> a virtual rig in another
-process -> what it measured, back to the firmware. Halfway the rubber softens and friction grows, each by
-a fifth. The fixed inverse then follows the same reference on the same rig, in Python.
+The reference goes over a serial port to an adaptive inverse on an emulated Cortex-M4F, its pressure to a
+virtual rig in another process, and the measurement back to the firmware. Halfway, stiffness decreases and
+friction increases by 20 %. The fixed inverse then follows the same reference on the same rig, in Python.
 
-QEMU and an Arm compiler must be installed; --here runs the same C as a process of this machine, and
---port leads a board that holds such an export. Host, firmware and rig step in lock-step: however late
-a step is, the numbers are the same, and --fast waits for no deadline. --model takes an adaptive inverse
-(``mckibben invert --adaptive``) for one fitted here; --save keeps what was learnt.
+QEMU and an Arm compiler are required. --here runs the same C code as a local process, and --port uses a
+board with such an export. Host, firmware and rig run in lock-step, so the results do not depend on timing,
+and --fast ignores deadlines. --model replaces the inverse that is fitted here by another adaptive inverse
+(``mckibben invert --adaptive``); --save stores the learned parameters.
 """
 
 from __future__ import annotations
@@ -36,24 +36,24 @@ from mckibben.stream import FixedRate
 
 RIG, PERIOD = "mas20-hanging", 0.005
 CHANGES = {"stiffness": 0.8, "friction": 1.2}
-"""What drifts, and by what factor."""
+"""Parameters that drift, and their factors."""
 
 APPROACH = 10.0
-"""How long it takes from rest to the wave [s]."""
+"""Duration of the transition from rest to the wave [s]."""
 
 WITHIN, PRESSURES = (-20.0, 60.0), (0.0, 6.0)
-"""What the firmware takes [mm] and gives [bar]."""
+"""Ranges of the firmware's input [mm] and output [bar]."""
 
 
 def drifting(duration: float) -> Drifting:
-    """Return the robot, whose drift is switched on halfway."""
+    """Return the robot, which begins to drift halfway."""
     rig = mckibben.load_rig(RIG).changed({"sample_time": PERIOD})
     half = 0.5 * duration
     return Drifting(rig, [Drift(group, factor, half) for group, factor in CHANGES.items()])
 
 
 def robot(pipe: Connection, duration: float) -> None:
-    """Be the robot: take a pressure, give the displacement, until there is none."""
+    """Run the robot: receive pressures and send displacements until the connection ends."""
     rig = drifting(duration)
     place = rig.outputs.index("displacement")
     pipe.send(float(rig.reset(0)[place]))
@@ -62,7 +62,7 @@ def robot(pipe: Connection, duration: float) -> None:
 
 
 def learning() -> Adaptive:
-    """Return an inverse fitted to two minutes of the rig, which learns from there."""
+    """Return an adaptive inverse fitted to two minutes of the rig."""
     time = np.arange(2400) * 0.05
     pressure = random_wave(time, 0.4, high=5.0, seed=1)
     recording = mckibben.load_rig(RIG).run(mckibben.Recording({"pressure": pressure}, 0.05))
@@ -72,7 +72,7 @@ def learning() -> Adaptive:
 
 
 def wanted(n: int) -> np.ndarray:
-    """Return a reference [mm]: smooth, with loops of all sizes, by way of rest."""
+    """Return a smooth reference [mm] from rest, with loops of all sizes."""
     time = np.arange(n) * PERIOD
     wave = random_wave(time, 0.4, high=22.0, low=4.0, min_frequency=0.05, seed=3)
     share = np.clip(time / APPROACH, 0.0, 1.0)
@@ -86,10 +86,10 @@ def follow(
     compensate: Callable[[float, float], float],
     moved: Callable[[float], float],
 ) -> np.ndarray:
-    """Follow a reference, one sample a turn, and return what was measured [mm]."""
+    """Follow a reference sample by sample, and return the measurements [mm]."""
     found = np.empty(len(reference))
     for k, _ in zip(range(len(reference)), turns, strict=False):
-        seen = min(max(measured, WITHIN[0]), WITHIN[1])  # a sensor may say anything
+        seen = min(max(measured, WITHIN[0]), WITHIN[1])  # sensors may fail
         found[k] = measured = moved(compensate(float(reference[k]), seen))
     return found
 
@@ -97,7 +97,7 @@ def follow(
 def in_firmware(
     link: Link, reference: np.ndarray, duration: float, *, fast: bool
 ) -> tuple[np.ndarray, str]:
-    """Return what was measured [mm], and how well time was kept."""
+    """Return the measurements [mm] and the statistics of deadlines."""
     ours, theirs = multiprocessing.Pipe()
     context = multiprocessing.get_context("spawn")
     process = context.Process(target=robot, args=(theirs, duration), daemon=True)
@@ -120,7 +120,7 @@ def in_firmware(
 
 
 def fixed(block: Adaptive, reference: np.ndarray, duration: float) -> np.ndarray:
-    """Return what is measured [mm] where the inverse does not learn."""
+    """Return the measurements [mm] with the fixed inverse."""
     rig, stream = drifting(duration), block.fixed.stream(PERIOD)
     place = rig.outputs.index("displacement")
 
@@ -134,17 +134,17 @@ def fixed(block: Adaptive, reference: np.ndarray, duration: float) -> np.ndarray
 
 
 def rms(errors: np.ndarray) -> float:
-    """Return the root of the mean square."""
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(errors**2)))
 
 
 def spans(n: int) -> tuple[slice, slice]:
-    """Return the fifth before the drift, and the last one."""
+    """Return the last fifth before the drift, and the last fifth."""
     return slice(3 * n // 10, n // 2), slice(4 * n // 5, n)
 
 
 def draw(path: Path, reference: np.ndarray, runs: dict[str, np.ndarray], told: str) -> None:
-    """Draw the errors over all the time, and the motion before and after the drift."""
+    """Draw the errors over time, and the motion before and after the drift."""
     n, window = len(reference), max(len(reference) // 120, 1)
     time = np.arange(n) * PERIOD
     half = 0.5 * n * PERIOD

@@ -1,11 +1,11 @@
-"""A controller and a robot in two processes, talking over UDP at a fixed rate.
+"""A controller and a robot in two processes, connected by UDP at a fixed rate.
 
     .venv/bin/python examples/robot_loop.py
 
-The robot is a virtual rig that applies the newest pressure it was sent and answers with the
-displacement it measured. The controller follows a slow wave. Each is told the other's address before it
-starts, hears nobody else, and the robot obeys no pressure beyond its limits. On a real robot, the other
-end is a microcontroller that speaks the same packets (see mckibben.stream.link).
+The robot is a virtual rig that applies the newest received pressure and sends the measured displacement.
+The controller follows a slow wave. Both know the other's address in advance and ignore all other senders.
+The robot refuses pressures outside its limits. On a real robot, the other end is a microcontroller with the
+same packet format (see mckibben.stream.link).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ RIG = "mas20-hanging"
 
 
 def robot(pipe: Connection, period: float, duration: float) -> None:
-    """Be the robot: step the rig at its own rate with the newest pressure."""
+    """Run the robot: step the rig at its own rate with the newest pressure."""
     rig = mckibben.load_rig(RIG).changed({"sample_time": period})
     readings = rig.reset(0)
     place = rig.outputs.index("displacement")
@@ -35,7 +35,7 @@ def robot(pipe: Connection, period: float, duration: float) -> None:
     pressure = limits.low
     with UDPLink(size=1, limits=[(limits.low, limits.high)]) as link:
         pipe.send(link.address)
-        link.accept(pipe.recv())  # nobody else commands it
+        link.accept(pipe.recv())  # ignore all other senders
         for _ in FixedRate(period, duration):
             wanted = link.newest()
             if wanted is not None:
@@ -47,7 +47,7 @@ def robot(pipe: Connection, period: float, duration: float) -> None:
 def controller(
     pipe: Connection, block: mckibben.Block, period: float, duration: float
 ) -> tuple[float, str]:
-    """Follow a wave, and return the root-mean-square error [mm] and how well time was kept."""
+    """Follow a wave, and return the RMS error [mm] and the statistics of deadlines."""
     step, rate, errors = Step(block, period), FixedRate(period, duration), []
     measured = 0.0
     with UDPLink(pipe.recv(), size=1) as link:

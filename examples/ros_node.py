@@ -2,7 +2,8 @@
 
     python3 examples/ros_node.py inverse.json --rate 100 --highest 6
 
-References [mm] on ``reference`` become pressures [bar] on ``pressure``, or 0 without any for a while.
+The node receives references [mm] on ``reference`` and publishes pressures [bar] on ``pressure``, or 0 if
+references stop.
 For real-time use, `mckibben export ros2` writes a controller for ros2_control.
 """
 

@@ -1,4 +1,4 @@
-"""Compensated motion: no compensation, an inverse model, and the inverse model with feedback."""
+"""Compensation: no compensation, an inverse model, and the inverse model with feedback."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Creep: displacement goes on after each step of pressure, and differs between rising and falling."""
+"""Creep: displacement continues after each pressure step, differently for rising and falling pressure."""
 
 import sys
 

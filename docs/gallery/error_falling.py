@@ -1,4 +1,4 @@
-"""The error falls as a model is fitted to what was planned: three rounds on a virtual muscle."""
+"""Planned recordings: the test error of a model decreases over three rounds on a virtual muscle."""
 
 import sys
 
@@ -32,6 +32,6 @@ for place, name in enumerate(names):
     error = (model.simulate(new)["displacement"] - new["displacement"])[100:]
     rms = np.sqrt(np.mean(error**2))
     axis.plot(new.time[100:], error, lw=1.2, label=f"{name}: {rms:.2f} mm RMS")
-axis.set(xlabel="time [s]", ylabel="error on motion never seen [mm]")
+axis.set(xlabel="time [s]", ylabel="test error [mm]")
 axis.legend(loc="upper right")
 figure.savefig(sys.argv[1], dpi=150)

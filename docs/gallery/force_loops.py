@@ -1,4 +1,4 @@
-"""Force over length at constant pressures: loops of a virtual muscle in a test stand."""
+"""Force over length at constant pressure: loops of a virtual muscle in a test stand."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""An exact inverse: model, inverse, and the two in series, which is the identity."""
+"""Exact inverse: model, inverse, and both in series, which is the identity."""
 
 import sys
 

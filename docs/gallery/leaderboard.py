@@ -1,4 +1,4 @@
-"""A leaderboard: four models fitted to one recording, chosen by cross-validation, tested on another."""
+"""Leaderboard: four models fitted to one recording, selected by cross-validation, tested on another."""
 
 import sys
 

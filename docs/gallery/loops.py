@@ -1,4 +1,4 @@
-"""What a muscle's hysteresis looks like: nested loops of a virtual muscle."""
+"""Hysteresis: nested loops of a virtual muscle."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""A model that has seen one recording, running free on another."""
+"""Free-run simulation: a model fitted to one recording, simulated on another."""
 
 import sys
 

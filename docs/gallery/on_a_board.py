@@ -1,4 +1,4 @@
-"""C on a board: instructions per step of exported inverses, counted on an emulated Arm Cortex-M4F."""
+"""Exported C: instructions per step of inverses on an emulated Arm Cortex-M4F."""
 
 import re
 import sys

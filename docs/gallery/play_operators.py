@@ -1,4 +1,4 @@
-"""Play operators: a Prandtl-Ishlinskii model is a weighted sum of these."""
+"""Play operators: a Prandtl-Ishlinskii model is their weighted sum."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""A prediction band: calibrated on one recording, shown on another."""
+"""Prediction band: calibrated on one recording, shown on another."""
 
 import sys
 

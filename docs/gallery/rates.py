@@ -1,4 +1,4 @@
-"""Rate dependence: the loop of a virtual muscle widens as the valve is driven faster."""
+"""Rate dependence: the loop of a virtual muscle widens with the frequency."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""One muscle of a soft arm moves the others: displacements of a run with a single pressure."""
+"""Coupling in a soft arm: displacements of all muscles when one is pressurized."""
 
 import sys
 

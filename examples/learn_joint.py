@@ -3,11 +3,11 @@
     pip install 'mckibben[mujoco,gym]'
     python examples/learn_joint.py joint.xml
 
-Create the model with ``mckibben export mjcf model.json --example joint --lag 0.05 -o joint.xml``. The
-output of both controllers is the difference of the two pressures, a weighted sum of features. The weights
-are optimized by the cross-entropy method on the same episodes. The features of PID are the error, its
-integral and the velocity; those of the policy also include the previewed reference and the last action.
-The printed error is that on new references.
+Create the model with ``mckibben export mjcf model.json --example joint --lag 0.05 -o joint.xml``.
+The output of both controllers is the difference of the two pressures, a weighted sum of features.
+The weights are optimized by the cross-entropy method on the same episodes. The features of PID are
+the error, its integral and the velocity; those of the policy also include the previewed reference
+and the last action. The printed error is that on new references.
 """
 
 import sys

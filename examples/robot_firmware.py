@@ -2,14 +2,15 @@
 
     python examples/robot_firmware.py docs/pictures/robot_firmware.png --fast
 
-The reference goes over a serial port to an adaptive inverse on an emulated Cortex-M4F, its pressure to a
-virtual rig in another process, and the measurement back to the firmware. Halfway, stiffness decreases and
-friction increases by 20 %. The fixed inverse then follows the same reference on the same rig, in Python.
+The reference goes over a serial port to an adaptive inverse on an emulated Cortex-M4F, its pressure
+to a virtual rig in another process, and the measurement back to the firmware. Halfway, stiffness
+decreases and friction increases by 20 %. The fixed inverse then follows the same reference on the
+same rig, in Python.
 
-QEMU and an Arm compiler are required. --here runs the same C code as a local process, and --port uses a
-board with such an export. Host, firmware and rig run in lock-step, so the results do not depend on timing,
-and --fast ignores deadlines. --model replaces the inverse that is fitted here by another adaptive inverse
-(``mckibben invert --adaptive``); --save stores the learned parameters.
+QEMU and an Arm compiler are required. --here runs the same C code as a local process, and --port
+uses a board with such an export. Host, firmware and rig run in lock-step, so the results do not
+depend on timing, and --fast ignores deadlines. --model replaces the inverse that is fitted here by
+another adaptive inverse (``mckibben invert --adaptive``); --save stores the learned parameters.
 """
 
 from __future__ import annotations

@@ -2,10 +2,10 @@
 
     .venv/bin/python examples/robot_loop.py
 
-The robot is a virtual rig that applies the newest received pressure and sends the measured displacement.
-The controller follows a slow wave. Both know the other's address in advance and ignore all other senders.
-The robot refuses pressures outside its limits. On a real robot, the other end is a microcontroller with the
-same packet format (see mckibben.stream.link).
+The robot is a virtual rig that applies the newest received pressure and sends the measured
+displacement. The controller follows a slow wave. Both know the other's address in advance and
+ignore all other senders. The robot refuses pressures outside its limits. On a real robot, the other
+end is a microcontroller with the same packet format (see mckibben.stream.link).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Creep: displacement continues after each pressure step, differently for rising and falling pressure."""
+"""Creep: displacement continues after pressure steps, differently in either direction."""
 
 import sys
 

@@ -12,7 +12,7 @@ from making.pages import MADE, plain, table, toctree, write
 
 
 class Use(NamedTuple):
-    """A page: what somebody wants to do, and the names that do it."""
+    """A page: a purpose, and the names for it."""
 
     title: str
     names: str
@@ -43,7 +43,7 @@ USES = {
         "mckibben: PIEstimator GPIEstimator MPIEstimator EUPIEstimator",
     ),
     "choose": Use(
-        "Choose among models",
+        "Select a model",
         "mckibben: compare study check review calibrate; mckibben.comparison.leaderboard: Leaderboard",
     ),
     "models": Use(
@@ -52,7 +52,7 @@ USES = {
         "Play Affine PiecewiseLinear Polynomial check_block",
     ),
     "control": Use(
-        "Invert, and close the loop",
+        "Invert a model, close the loop",
         "mckibben: invert track; mckibben.studying.results: Inverse Tracking; "
         "mckibben.control: track Tracked control_law Controller BlockController tune_pid "
         "DisturbanceObserver EstimatedLoad Twin dead_time_undone previewed before Before slow_rise "
@@ -69,7 +69,7 @@ USES = {
         "mckibben.muscles: list load show Muscle Sheet Prior prior_of described scaled",
     ),
     "export": Use(
-        "Export, and drive a device",
+        "Export a model, drive a device",
         "mckibben.export: export_c Serving state_of export_fmu export_ros2; "
         "mckibben.link: Link LinkError Port Device State Statistics Note",
     ),
@@ -129,7 +129,7 @@ def write_api() -> None:
         rows.append([f"[{use.title}]({page}.rst)", names])
     version = f"Version {plain(mckibben.__version__)}."
     lines = ["# API reference", "", "```{index} !API, !reference, !functions", "```", ""]
-    lines += [f"Names by what they are used for. {version} Every model's"]
-    lines += ["estimator, with its settings, is on [its own page](../models/index.md).", ""]
-    lines += [*table(["use", "names"], rows), *toctree(list(USES), "hidden")]
+    lines += [f"Classes and functions by purpose. {version} The estimator of each model,"]
+    lines += ["with its settings, is described on [the page of the model](../models/index.md).", ""]
+    lines += [*table(["purpose", "names"], rows), *toctree(list(USES), "hidden")]
     write(MADE / "api" / "index.md", "\n".join(lines))

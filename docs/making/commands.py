@@ -27,7 +27,7 @@ def options(command: click.Command, context: click.Context) -> list[str]:
         record for one in command.params if (record := one.get_help_record(context)) is not None
     ]
     rows = [[f"`{escaped(name)}`", plain(text)] for name, text in records]
-    return table(["option", "what it does"], rows)
+    return table(["option", "description"], rows)
 
 
 def escaped(name: str) -> str:
@@ -41,12 +41,12 @@ def write_commands() -> None:
     found = list(commands(app, root))
     lines = ["# Commands", "", "```{index} !commands, !command line, !options, !CLI", "```", ""]
     lines += ["`mckibben COMMAND --help` shows the same. Nearly all commands accept `--json`."]
-    lines += ["Exit codes: 0 done, 1 no model worked, 2 bad input, 130 interrupted.", ""]
+    lines += ["Exit codes: 0 success, 1 all models failed, 2 invalid input, 130 interrupted.", ""]
     short = [
         [f"[{path}](#{path.replace(' ', '-')})", plain(one.get_short_help_str(200))]
         for path, one in found
     ]
-    lines += table(["command", "what it does"], short)
+    lines += table(["command", "description"], short)
     for path, command in found:
         context = click.Context(command, info_name=path)
         usage = " ".join(command.collect_usage_pieces(context))

@@ -15,7 +15,7 @@ def write_gallery() -> None:
     lines = [
         "# Gallery",
         "",
-        "Every picture is made by the script below it, from `docs/gallery`.",
+        "Each figure is drawn by the script below it, in `docs/gallery`.",
         "",
     ]
     for script in sorted((DOCS / "gallery").glob("*.py")):

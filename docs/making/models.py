@@ -1,4 +1,4 @@
-"""A page for every model, made of what the model itself declares and of an example fitted before."""
+"""A page for every model, from its declarations and a fitted example."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def caption(model: str) -> str:
     """Return what the model in the picture was fitted to (docs/models/fits.py)."""
     if getattr(declared(model), "made_for", None) == ("force", "displacement"):
         return (
-            "A model fitted to what the system of the Bouc-Wen benchmark "
-            "(no muscle; Noël and Schoukens, 2016) does, computed from its printed numbers"
+            "A model fitted to a simulation of the Bouc-Wen benchmark with its published parameters "
+            "(not a muscle; Noël and Schoukens, 2016)"
         )
     return "A model fitted to short recordings of a virtual rig"
 
@@ -82,10 +82,9 @@ def write_models() -> None:
     lines = [
         "# Models by name",
         "",
-        "A page for every model: equations, parameters with units, settings, what it needs, "
-        "its inverse, its cost and its source. "
-        "[Which model should I choose?](../../models/choosing.md) compares them. "
-        "An asterisk marks what is good only near the motions it was trained on.",
+        "The page of each model describes its equations, parameters, settings, inverse, cost and "
+        "source. [Which model should I choose?](../../models/choosing.md) compares the models. "
+        "An asterisk marks models that are accurate only near their training data.",
         "",
     ]
     for need in needs():
@@ -96,8 +95,8 @@ def write_models() -> None:
             rows.append(
                 [f"[{names[model][0]}]({model}.md){star}", f"`{model}`", plain(ability(model))]
             )
-        lines += table(["model", "in commands", "what for"], rows)
-    lines += ["## All, by the alphabet", ""]
+        lines += table(["model", "name in commands", "purpose"], rows)
+    lines += ["## Alphabetical list", ""]
     ordered = sorted((name, model) for model, (name, _) in names.items())
     lines += [", ".join(f"[{name}]({model}.md)" for name, model in ordered) + ".", ""]
     write(MADE / "models" / "index.md", "\n".join([*lines, *toctree(list(names), "hidden")]))
@@ -111,27 +110,32 @@ def page(model: str, name: str, group: str, cost: Mapping[str, list[str]]) -> li
     lines += table(
         ["", ""],
         [
-            ["in commands", f"`{model}`"],
+            ["name in commands", f"`{model}`"],
             ["group", group],
-            ["maps", mapped(block)],
+            ["inputs → outputs", mapped(block)],
             [
-                "time",
-                "needed" if block.rate_dependent else "not needed: the order of samples is enough",
+                "sample times",
+                "required" if block.rate_dependent else "not required; the order is sufficient",
             ],
             ["inverse", inverse(block)],
-            ["a fit", f"about {estimator.effort:g} s for 10 000 samples"],
+            ["fit time", f"about {estimator.effort:g} s for 10 000 samples"],
             *([["source", "; ".join(sources)]] if (sources := source(block)) else []),
         ],
     )
-    lines += [f"**Can**: {plain(ability(model))}", "", f"**Cannot**: {plain(estimator.cannot)}", ""]
+    lines += [
+        f"**Capabilities**: {plain(ability(model))}",
+        "",
+        f"**Limitations**: {plain(estimator.cannot)}",
+        "",
+    ]
     if estimator.caution:
         lines += [
-            f"**Good only near the motions it was trained on**: {plain(estimator.caution)}.",
+            f"**Accurate only near its training data**: {plain(estimator.caution)}.",
             "",
         ]
     if pictured(model).is_file():
-        lines += [f"![{name}, running free](../../pictures/models/{model}.png)", ""]
-        lines += [f"*{caption(model)}, running free on it. Nothing here was measured.*", ""]
+        lines += [f"![{name}, free-run simulation](../../pictures/models/{model}.png)", ""]
+        lines += [f"*{caption(model)}, and its free-run simulation.*", ""]
     lines += [
         "## How to fit it",
         "",
@@ -144,14 +148,14 @@ def page(model: str, name: str, group: str, cost: Mapping[str, list[str]]) -> li
         *parameters(described(block)),
         "## Settings",
         "",
-        "In commands `--set NAME=VALUE`, in Python an argument.",
+        "Use `--set NAME=VALUE` in commands, or an argument in Python.",
         "",
         *settings_table(estimator),
-        "## How it is identified",
+        "## Identification",
         "",
         plain(inspect.getdoc(sys.modules[estimator.__module__]) or ""),
         "",
-        "## In words",
+        "## Description",
         "",
     ]
     for kind in dict.fromkeys(leaf.kind for leaf in leaves(described(block))):
@@ -160,8 +164,8 @@ def page(model: str, name: str, group: str, cost: Mapping[str, list[str]]) -> li
         if kind in cost:
             median, most, first, ram, _, flash, _ = cost[kind]
             lines += [
-                f"On a microcontroller (Cortex-M4F, single precision, a small example): "
-                f"{median} instructions a step, at most {most}, the first {first}; "
+                f"Cost on a microcontroller (Cortex-M4F, single precision, a small example): "
+                f"{median} instructions per step, at most {most}, {first} in the first step; "
                 f"{ram} bytes of RAM, {flash} of flash.",
                 "",
             ]
@@ -175,8 +179,8 @@ def mapped(block: Any) -> str:
         return ", ".join(f"{one.name} [{one.unit or '–'}]" for one in channels)
 
     driven = [one for one in block.inputs if one.name not in block.scheduling]
-    told = [one for one in block.inputs if one.name in block.scheduling]
-    given = f" ; told {listed(told)}" if told else ""
+    scheduling = [one for one in block.inputs if one.name in block.scheduling]
+    given = f"; scheduling {listed(scheduling)}" if scheduling else ""
     return f"{listed(driven)}{given} → {listed(block.outputs)}"
 
 
@@ -195,13 +199,13 @@ def described(block: Any) -> Any:
 def inverse(block: Any) -> str:
     """Return in words whether a model has an inverse."""
     if compensates(block):
-        return "is itself a compensator"
+        return "the model is itself a compensator"
     if block.undoing:
-        return "yes, explicit: the equations give the pressure as they stand"
+        return "yes, explicit: the equations are solved for the pressure"
     try:
         found = block.inverse()
     except MckibbenError as error:
-        return f"none here: {plain(str(error))}"
+        return f"none in this example: {plain(str(error))}"
     made_of = dict.fromkeys(leaf.title for leaf in leaves(found))
     return f"yes: {', '.join(f'`{title}`' for title in made_of)}"
 
@@ -280,7 +284,7 @@ def paper(one: Written, level: int = 3) -> list[str]:
             yield from walk(inner, depth + 1)
 
     lines += list(walk(one, 0))
-    return lines or ["Those of its parts.", ""]
+    return lines or ["See its parts.", ""]
 
 
 def parameters(block: Any) -> list[str]:
@@ -311,7 +315,7 @@ def parameters(block: Any) -> list[str]:
     if not rows:
         return ["None.", ""]
     return [
-        f"{len(numbered)} numbers in the example, which is of no real muscle.",
+        f"The example has {len(numbered)} parameters; it is not a real muscle.",
         "",
-        *table(["symbol", "name", "what it is", "unit", "how many", "in the example"], rows),
+        *table(["symbol", "name", "meaning", "unit", "number", "value in the example"], rows),
     ]

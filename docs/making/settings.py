@@ -64,4 +64,4 @@ def settings_table(estimator: Any) -> list[str]:
         for one in fields(estimator)
         if one.default is not MISSING
     ]
-    return table(["setting", "default", "may be", "what it is"], rows)
+    return table(["setting", "default", "allowed values", "meaning"], rows)

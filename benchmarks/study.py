@@ -84,9 +84,7 @@ def main() -> None:
         quiet = told(name, [study(*words) for _ in range(given.runs)], f"target {target:.0f} s")
         with busy(BUSY_LOOPS):
             loaded = [study(*words) for _ in range(given.runs)]
-        ratio = (
-            told(f"{name}, {BUSY_LOOPS} busy loops beside", loaded, "target 2.5 x quiet") / quiet
-        )
+        ratio = told(f"{name}, {BUSY_LOOPS} busy loops", loaded, "target 2.5 x quiet") / quiet
         print(f"{'':>32}  {ratio:.1f} x quiet")
     if given.cold:
         with tempfile.TemporaryDirectory() as cache:

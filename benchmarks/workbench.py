@@ -1,4 +1,4 @@
-"""How quick the workbench is: its first paint, clicks beside two fits, and the first result of a fit.
+"""Response times of the workbench: first paint, clicks during two fits, first result of a fit.
 
     python benchmarks/workbench.py
 
@@ -46,7 +46,7 @@ TABS = (
 
 def told(what: str, seconds: Sequence[float], target: str) -> None:
     middle, worst = statistics.median(seconds), max(seconds)
-    print(f"{what}: median {middle:.2f} s, at most {worst:.2f} s (asked: {target})", flush=True)
+    print(f"{what}: median {middle:.2f} s, at most {worst:.2f} s (target: {target})", flush=True)
 
 
 @contextmanager
@@ -104,8 +104,8 @@ def main() -> None:
             fitted(page, "bouc-wen", "balance")
             clicks = [page.evaluate(CLICK, list(TABS[k % 4])) / 1e3 for k in range(20)]
             busy = page.get_by_test_id("running").count()
-            beside = "beside two fits" if busy else "beside two fits, which had ended"
-            told(f"a click on a tab, {beside}", clicks, "0.2 s, at most 0.5 s")
+            during = "during two fits" if busy else "after two fits"
+            told(f"a click on a tab {during}", clicks, "0.2 s, at most 0.5 s")
         browser.close()
 
 

@@ -1,4 +1,4 @@
-"""Draw the picture of architecture.md: the package's folders and modules in their layers.
+"""Draw the figure of architecture.md: folders and modules of the package in layers.
 
     python docs/architecture.py docs/pictures/architecture.png
 
@@ -21,7 +21,7 @@ sys.path.insert(0, str(ROOT))
 from tests.contracts.test_imports import LAYERS  # noqa: E402
 
 WIDTH, CHARACTERS = 30.0, 150
-"""Of a layer, in units of its height and in characters of small text."""
+"""Width of a layer, in units of its height and in characters of small text."""
 
 
 def subject(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Write a notebook for each tutorial: the pages in docs/tutorials are their one source.
+"""Convert each tutorial in docs/tutorials to a notebook.
 
 python docs/notebooks.py -o notebooks
 """
@@ -18,7 +18,7 @@ from mckibben.system.atomic import replacing
 PAGES = Path(__file__).parent / "tutorials"
 
 FENCE = re.compile(r"^```(bash|python)\n(.*?)^```\n", flags=re.M | re.S)
-"""A block that is run; others, of C or of output, stay text."""
+"""A block that is run; others, such as C code or output, remain text."""
 
 LINK = re.compile(r"(\]\()(?!https?:|#)([^)\s#]+)")
 
@@ -31,7 +31,7 @@ def pages() -> list[Path]:
 
 
 def cells(page: Path) -> Iterator[tuple[str, str]]:
-    """Give what a tutorial's notebook is made of: ``"markdown"`` or ``"code"``, and its text."""
+    """Yield the cells of a tutorial: ``"markdown"`` or ``"code"``, and the text."""
     text = page.read_text(encoding="utf-8")
     begun = "examples/" not in text
     end = 0
@@ -50,7 +50,7 @@ def cells(page: Path) -> Iterator[tuple[str, str]]:
 
 
 def notebook(page: Path, folder: Path) -> dict[str, Any]:
-    """Return a tutorial as a notebook for a folder, from which its links lead to where they led."""
+    """Return a tutorial as a notebook for a folder, with adjusted links."""
 
     def led(found: re.Match[str]) -> str:
         target = os.path.relpath((page.parent / found[2]).resolve(), folder.resolve())
@@ -84,7 +84,7 @@ def write(folder: Path) -> list[Path]:
 
 
 def main() -> None:
-    """Write the notebooks, and say where."""
+    """Write the notebooks."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("-o", "--out", type=Path, default=Path("notebooks"), help="folder")
     folder = parser.parse_args().out

@@ -1,4 +1,4 @@
-"""The page of commands, made from the command line itself: what each does, and its options."""
+"""The page of commands, generated from the command line: description and options of each."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def options(command: click.Command, context: click.Context) -> list[str]:
 
 
 def escaped(name: str) -> str:
-    """Return an option as a cell of a table holds it."""
+    """Return an option, escaped for a table."""
     return name.replace("|", r"\|")
 
 

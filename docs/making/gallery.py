@@ -1,4 +1,4 @@
-"""The gallery: every script with the picture that it makes."""
+"""The gallery: every script with its figure."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from making.pages import DOCS, MADE, write
 
 
 def write_gallery() -> None:
-    """Run every script of the gallery that changed, and show its picture beside its text."""
+    """Run every changed script of the gallery, and write the page of figures and scripts."""
     lines = [
         "# Gallery",
         "",
@@ -29,7 +29,7 @@ def write_gallery() -> None:
 
 
 def drawn(script: Path, text: str, picture: Path) -> None:
-    """Make a script's picture, unless it is there from the same script."""
+    """Draw a script's figure, unless it exists for the same script."""
     picture.parent.mkdir(parents=True, exist_ok=True)
     stamp = picture.with_suffix(".stamp")
     token = hashlib.sha256(text.encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""The page of the glossary, made from the definitions that reports and the workbench show."""
+"""The page of the glossary, from the definitions that reports and the workbench show."""
 
 from __future__ import annotations
 

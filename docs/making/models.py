@@ -34,17 +34,17 @@ def named() -> dict[str, tuple[str, str]]:
 
 
 def example(model: str) -> Path:
-    """Return where a model's fitted example is."""
+    """Return the path of a model's fitted example."""
     return DOCS / "models" / "fitted" / f"{model}.json"
 
 
 def pictured(model: str) -> Path:
-    """Return where the picture of a model's loops is; an example that was not fitted has none."""
+    """Return the path of the figure of a model's loops; examples that are not fitted have none."""
     return DOCS / "pictures" / "models" / f"{model}.png"
 
 
 def caption(model: str) -> str:
-    """Return what the model in the picture was fitted to (docs/models/fits.py)."""
+    """Return the caption: the data that the model was fitted to (docs/models/fits.py)."""
     if getattr(declared(model), "made_for", None) == ("force", "displacement"):
         return (
             "A model fitted to a simulation of the Bouc-Wen benchmark with its published parameters "
@@ -67,7 +67,7 @@ def leaves(block: Any) -> list[Any]:
 
 
 def summary(model: str) -> str:
-    """Return what a model is, in a sentence."""
+    """Return a model's description in one sentence."""
     return (inspect.getdoc(registry.load("estimators", model)) or "").splitlines()[0]
 
 
@@ -185,19 +185,19 @@ def mapped(block: Any) -> str:
 
 
 def compensates(block: Any) -> bool:
-    """Return whether a model leads to what drives a muscle: then it is what an inverse is for others."""
+    """Return whether a model's outputs are pressures, so that it is itself a compensator."""
     return all(one.name.startswith("pressure") for one in block.outputs) and not any(
         one.name.startswith("voltage") for one in block.inputs
     )
 
 
 def described(block: Any) -> Any:
-    """Return the block whose equations are a model's: `balance` is written as the pressure needed."""
+    """Return the block whose equations are shown: for `balance`, those solved for the pressure."""
     return block.forward if block.undoing else block
 
 
 def inverse(block: Any) -> str:
-    """Return in words whether a model has an inverse."""
+    """Return a description of a model's inverse."""
     if compensates(block):
         return "the model is itself a compensator"
     if block.undoing:
@@ -211,7 +211,7 @@ def inverse(block: Any) -> str:
 
 
 def source(block: Any) -> list[str]:
-    """Return what a model's files name as their sources, each title once."""
+    """Return the sources named in a model's files, each title once."""
     found = []
     for kind in dict.fromkeys(leaf.kind for leaf in leaves(described(block))):
         text = inspect.getdoc(sys.modules[registry.load("blocks", kind).__module__]) or ""

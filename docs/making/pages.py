@@ -1,4 +1,4 @@
-"""Where pages are made, and how they are written."""
+"""Folder and formatting of generated pages."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ SYMBOL = re.compile(
     rf"(?<!\w)((?:[A-Za-z]|{GREEK})(?:[_^](?:\{{[^{{}}]*\}}|-?[A-Za-z0-9]{{1,2}}(?![A-Za-z0-9])))+"
     r"(?:\[\w\](?:_\w)?)?)"
 )
-"""A letter with indices or powers, and what it is taken of: w_{t-1}, x^2, F_{r_i}[u]_t."""
+"""A letter with indices or powers, and its argument: w_{t-1}, x^2, F_{r_i}[u]_t."""
 
 DOCS = Path(__file__).parents[1]
 MADE = DOCS / "_generated"
 
 
 def write(path: Path, text: str) -> None:
-    """Write a page, unless it is there as it should be: Sphinx then need not read it again."""
+    """Write a page if it changed, so that Sphinx does not read unchanged pages again."""
     path.parent.mkdir(parents=True, exist_ok=True)
     if not path.is_file() or path.read_text(encoding="utf-8") != text:
         path.write_text(text, encoding="utf-8")
 
 
 def plain(text: str) -> str:
-    """Return text as Markdown that shows it as it is, paragraphs kept; what is between ` stays code.
+    """Return text escaped for Markdown, with paragraphs and inline code preserved.
 
     Symbols with an index or a power, as docstrings write them, are set as mathematics.
     """
@@ -65,7 +65,7 @@ def inline(latex: str) -> str:
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return a table as Markdown; nothing where it has no rows."""
+    """Return a table as Markdown; empty if it has no rows."""
     if not rows:
         return []
     lines = [heads, ["---"] * len(heads), *rows]

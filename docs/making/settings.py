@@ -1,4 +1,4 @@
-"""Settings of an estimator in words: what each may be."""
+"""Settings of an estimator, with their allowed values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WORDS = {
 
 
 def allowed(hint: Any) -> str:
-    """Return what a setting may be, in words."""
+    """Return the allowed values of a setting, in words."""
     if get_origin(hint) is Annotated:
         of, *limits = get_args(hint)
         return " ".join(
@@ -51,7 +51,7 @@ def limited(limit: Any) -> str:
 
 
 def settings_table(estimator: Any) -> list[str]:
-    """Return the settings of an estimator: default, what they may be, and what they mean."""
+    """Return the settings of an estimator: default, allowed values, meaning."""
     cls = getattr(estimator, "of", estimator)
     hints, said = get_type_hints(cls, include_extras=True), meanings(cls)
     rows = [

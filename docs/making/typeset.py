@@ -1,4 +1,4 @@
-"""Mathematics as MathML, which browsers set themselves: no script, no font, nothing from elsewhere."""
+"""Mathematics as MathML, which browsers display without scripts or fonts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def inline(writer: Any, node: Any) -> None:
 
 
 def displayed(writer: Any, node: Any) -> None:
-    """Write a formula on lines of its own, which scroll where they are wider than the page."""
+    """Write a displayed formula, which scrolls if it is wider than the page."""
     writer.body.append(f'<div class="equation">{_set(node, "block")}</div>')
     from docutils.nodes import SkipNode
 
@@ -36,6 +36,6 @@ def _set(node: Any, display: Any) -> str:
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Tell Sphinx of it."""
+    """Register the extension with Sphinx."""
     app.add_html_math_renderer("mathml", (inline, None), (displayed, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

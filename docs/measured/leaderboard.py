@@ -13,11 +13,11 @@ from mckibben.numerals import numeral
 HERE = Path(__file__).parent
 
 TABLES = "<!-- tables -->\n"
-"""Where the page's introduction ends."""
+"""End of the page's introduction."""
 
 
 def table(lines: pd.DataFrame) -> str:
-    """Return the table of a task, the least error first."""
+    """Return the table of a task, sorted by error."""
     unit = lines["unit"].iloc[0]
     rows = [
         f"| model | free-run error [{unit}] | of range [%] | width reproduced [%] | settings |",
@@ -31,7 +31,7 @@ def table(lines: pd.DataFrame) -> str:
 
 
 def main() -> None:
-    """Write the page anew, its introduction as it is."""
+    """Rewrite the tables of the page, and leave its introduction."""
     page = HERE / "leaderboard.md"
     lines = pd.read_csv(HERE / "leaderboard.csv").fillna({"task": "", "how": ""})
     parts = [page.read_text(encoding="utf-8").partition(TABLES)[0] + TABLES]

@@ -45,7 +45,7 @@ HELD = {
 """Rest lengths [mm], names of files, titles."""
 
 HELD_UNTOLD = ["friction", "relaxation", "damping", "wall"]
-"""What muscles that do not move show of, but do not tell apart."""
+"""Traits that muscles at rest cannot identify separately."""
 
 LEVELS = "dmsp10-250"
 
@@ -53,7 +53,7 @@ HELD_SOURCE = "Muscle_Sensory of Agile-and-Adaptive-Robotics, BPA_Static_Charact
 LEVELS_SOURCE = "pam_lqi_pid of tbazina, lqr_steady_state_points.csv"
 
 FURTHER = 1.1
-"""Times the largest displacement known up to which traits are told."""
+"""Factor of the largest displacement up to which traits are given."""
 
 OWN_DATA = "numbers fitted by this package to its own virtual rig: free, as the package is"
 NO_LICENCE = "numbers fitted here; the recordings have no licence and are not distributed"
@@ -65,7 +65,7 @@ SHEET_10 = {
     "max_pressure_bar": 8.0,
     "max_contraction": 0.25,
 }
-"""Of the maker's catalogue."""
+"""From the manufacturer's catalogue."""
 
 
 def wandering(rng: np.random.Generator, n: int, low: float, high: float, longest: float) -> Any:
@@ -78,7 +78,7 @@ def wandering(rng: np.random.Generator, n: int, low: float, high: float, longest
 
 
 def bench(name: str) -> tuple[MovingEnd, Sheet]:
-    """Return the bench with a rig's muscle on it, and what a data sheet would say of that."""
+    """Return a test bench with a rig's muscle, and its data sheet."""
     rig: Any = mckibben.load_rig(name)
     muscle: Physics = rig.muscle.model_copy(update={"push": 0.0})
     sheet = Sheet(
@@ -112,7 +112,7 @@ def bench(name: str) -> tuple[MovingEnd, Sheet]:
 
 
 def driven(stand: MovingEnd, sheet: Sheet) -> list[Recording]:
-    """Return what it does under random pressures and pulls."""
+    """Return recordings under random pressures and pulls."""
     made = []
     for number, pulled in enumerate((0.5, 0.5, 0.02)):
         rng = np.random.default_rng([SEED, number])
@@ -156,7 +156,7 @@ def identified(
 
 
 def trait_errors(found: BalanceEstimator, balance: Any, sheet: Sheet, held: bool) -> Any:
-    """Return standard errors of traits, by the balance's; inf of what the recordings do not tell.
+    """Return standard errors of traits from those of the balance; inf if not identified.
 
     Without a measured force, area and elasticity are told in their ratio only.
     """
@@ -185,7 +185,7 @@ def trait_errors(found: BalanceEstimator, balance: Any, sheet: Sheet, held: bool
 
 
 def about(title: str, source: str, licence: str, *, virtual: bool = False) -> dict[str, Any]:
-    """Return what is said of a muscle."""
+    """Return the description of a muscle."""
     return {"title": title, "source": source, "licence": licence, "virtual": virtual}
 
 

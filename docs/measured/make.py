@@ -19,7 +19,7 @@ ROOT = HERE.parent.parent
 
 
 def main() -> None:
-    """Run one after another; what is finished of the first is kept when stopped."""
+    """Run all scripts in turn; finished parts of the first are stored if it is interrupted."""
     folder, *peers = sys.argv[1:]
     command = Path(sys.executable).with_name("mckibben")
     subprocess.run([command, "measured", folder, "-o", HERE], check=True)

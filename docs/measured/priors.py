@@ -37,7 +37,7 @@ SEEDS, TESTS = range(5), range(100, 103)
 
 
 def random_motion(stand: MovingEnd, sheet: Sheet, seed: int, seconds: float) -> Recording:
-    """Return a muscle under random pressures, which begin at rest at their lowest."""
+    """Return a recording under random pressures, which begin at rest at the lowest."""
     time = np.arange(round(seconds / STEP) + 1) * STEP
     low, high = LOW * sheet.max_pressure_bar, HIGH * sheet.max_pressure_bar
     wave = random_wave(time, FASTEST, high, low, seed=seed)
@@ -48,7 +48,7 @@ def random_motion(stand: MovingEnd, sheet: Sheet, seed: int, seconds: float) -> 
 
 
 def free(name: str, seeds: Iterable[int]) -> None:
-    """Print errors of a rig's muscle on random motion that no model saw."""
+    """Print errors of a rig's muscle on random test motions."""
     stand, sheet = bench(name)
     tests = [random_motion(stand, sheet, seed, TEST) for seed in TESTS]
     library = [muscle for muscle in muscles.list() if muscle.name != name]
@@ -77,7 +77,7 @@ def free(name: str, seeds: Iterable[int]) -> None:
 
 
 def left_out() -> None:
-    """Print how likely muscles are by the others, for settings of the process."""
+    """Print the likelihood of each muscle given the others, for settings of the process."""
     tested = ("mas20-hanging", "dmsp20-300")
     listed = [muscle for muscle in muscles.list() if muscle.name not in tested]
     for smooth in (0.01, 1.0, 2.0):
@@ -91,7 +91,7 @@ def left_out() -> None:
 
 
 def likelihood(muscle: muscles.Muscle, listed: list[muscles.Muscle]) -> float:
-    """Return the logarithm of a muscle's likelihood by the others, but for the wall's stretch."""
+    """Return the log-likelihood of a muscle given the others, without the wall's stretch."""
     prior = of_muscles([other for other in listed if other is not muscle], muscle.sheet)
     found = 0.0
     for name, place in PLACES.items():

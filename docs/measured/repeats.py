@@ -1,4 +1,4 @@
-"""Forces at held lengths beside the spread of repeats: python docs/measured/repeats.py FOLDER.
+"""Forces at constant length, compared with the spread of repetitions: python docs/measured/repeats.py FOLDER.
 
 Of each length of festo_isometric_20mm: by how much the three inflations differ pairwise, at the same
 pressure on the same branch; what a balance fitted to the first two of all lengths is off by on the
@@ -41,7 +41,7 @@ def rms(values: Array) -> float:
 
 
 def main() -> None:
-    """Print a line a length."""
+    """Print one line per length."""
     warnings.simplefilter("ignore")
     (held,) = (one for one in sets_in(Path(sys.argv[1])) if one.name == "festo_isometric_20mm")
     whole = held.recordings()

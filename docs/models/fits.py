@@ -50,7 +50,7 @@ SETTINGS: dict[str, dict[str, object]] = {
     "tsfnn": {"particles": 6, "iterations": 8},
     **dict.fromkeys(("coupled-pi", "sdchm", "sdchm-published"), SHORT),
 }
-"""What is set other than by default, to be quick."""
+"""Settings that differ from the defaults, for speed."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def activated() -> list[Recording]:
 
 @cache
 def benchmark() -> list[Recording]:
-    """Return what the system of the Bouc-Wen benchmark does (Noel and Schoukens, 2016), as printed."""
+    """Return a simulation of the Bouc-Wen benchmark (Noel and Schoukens, 2016)."""
     system = BoucWenOscillator(2.0, 0.01, 50.0, 50.0, 0.8, -1.1)
     clock = np.arange(1500) / 750.0
     force = multisine(clock, 1.0, 20.0, 120.0, -120.0, "random", seed=0)
@@ -117,18 +117,18 @@ TASKS: dict[str, Callable[[], Task]] = {
     "air": lambda: Task(recorded("mpi-narmax"), ("voltage",), ("pressure",)),
     "arm": lambda: Task(recorded("sdchm"), MUSCLES, MOVED, ("pressure_extensor",)),
 }
-"""What models are fitted to, recorded when asked for: a model gets the first that suits it."""
+"""Tasks, recorded on demand: a model is fitted to the first that applies."""
 
 PREFERRED = {
     **dict.fromkeys(("coupled-memory", "coupled-pi", "tsfnn", "sdchm", "sdchm-published"), "arm"),
     "mpi-narmax": "load",
     "air": "air",
 }
-"""Tasks that tell more of a model than the first that suits it."""
+"""Tasks that show more of a model than the first that applies."""
 
 
 def fit(name: str) -> str:
-    """Fit a model to the first task that it has a place on, and write model and picture."""
+    """Fit a model to the first task that applies, and write model and figure."""
     estimator = registry.load("estimators", name)
     reasons = []
     for key in [PREFERRED[name]] if name in PREFERRED else TASKS:
@@ -149,7 +149,7 @@ def fit(name: str) -> str:
 
 
 def redraw(name: str) -> str:
-    """Draw a model that was fitted before, on the first task between whose channels it leads."""
+    """Draw a saved model on the first task with its channels."""
     if not (PICTURES / f"{name}.png").is_file():
         return "has no picture"
     block = load(MODELS / f"{name}.json")
@@ -165,7 +165,7 @@ def redraw(name: str) -> str:
 
 
 def draw(name: str, task: Task) -> None:
-    """Draw a saved model, running free on the recording that moves its first input most."""
+    """Draw the free run of a saved model on the recording with the largest motion of its first input."""
     picture = PICTURES / f"{name}.png"
     moving = max(task.recordings, key=lambda recording: np.ptp(recording[task.inputs[0]]))
     write_figure(load(MODELS / f"{name}.json"), picture, task.picture, recording=moving)
@@ -173,12 +173,12 @@ def draw(name: str, task: Task) -> None:
 
 
 def told(task: Task) -> str:
-    """Return between which channels a task is."""
+    """Return the channels of a task."""
     return f"{', '.join(task.inputs)} to {', '.join(task.outputs)}"
 
 
 def smaller(picture: Path) -> None:
-    """Keep a picture in few colours and at a page's width."""
+    """Reduce a figure to few colours and the width of a page."""
     from PIL import Image
 
     with Image.open(picture) as opened:
@@ -188,7 +188,7 @@ def smaller(picture: Path) -> None:
 
 
 def main() -> None:
-    """Fit the models asked for, or draw them."""
+    """Fit or draw the requested models."""
     MODELS.mkdir(exist_ok=True)
     PICTURES.mkdir(exist_ok=True)
     warnings.simplefilter("ignore")

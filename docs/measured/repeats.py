@@ -1,9 +1,9 @@
-"""Forces at constant length, compared with the spread of repetitions: python docs/measured/repeats.py FOLDER.
+"""Forces at constant length and the spread of repetitions: python docs/measured/repeats.py FOLDER.
 
-Of each length of festo_isometric_20mm: by how much the three inflations differ pairwise, at the same
-pressure on the same branch; what a balance fitted to the first two of all lengths is off by on the
-third; and mean loops (venting less inflating) of the three and of the model, with what is missed of the
-third. All RMS but those means [N]; a muscle's lengths together last.
+For each length of festo_isometric_20mm: the pairwise differences of the three inflations at equal pressure
+on the same branch; the error of a balance fitted to the first two inflations of all lengths on the third;
+and mean loops (venting minus inflating) of the three and of the model, with the error on the third. All
+values are RMS [N] except these means; the last line is over all lengths of a muscle.
 """
 
 from __future__ import annotations

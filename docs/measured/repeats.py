@@ -1,9 +1,10 @@
 """Forces at constant length and the spread of repetitions: python docs/measured/repeats.py FOLDER.
 
-For each length of festo_isometric_20mm: the pairwise differences of the three inflations at equal pressure
-on the same branch; the error of a balance fitted to the first two inflations of all lengths on the third;
-and mean loops (venting minus inflating) of the three and of the model, with the error on the third. All
-values are RMS [N] except these means; the last line is over all lengths of a muscle.
+For each length of festo_isometric_20mm: the pairwise differences of the three inflations at equal
+pressure on the same branch; the error of a balance fitted to the first two inflations of all
+lengths on the third; and mean loops (venting minus inflating) of the three and of the model, with
+the error on the third. All values are RMS [N] except these means; the last line is over all lengths
+of a muscle.
 """
 
 from __future__ import annotations

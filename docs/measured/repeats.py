@@ -47,7 +47,8 @@ def main() -> None:
     (held,) = (one for one in sets_in(Path(sys.argv[1])) if one.name == "festo_isometric_20mm")
     whole = held.recordings()
     print(
-        "muscle, length: repeats apart | model off, same pressures | loops 1, 2, 3, model | missed"
+        "muscle, length: differences of repetitions | model error, same pressures | loops 1, 2, 3, "
+        "model | error"
     )
     for muscle in ("12cm", "30cm"):
         runs = [run for run in whole if muscle in run.name]

@@ -300,8 +300,9 @@ def main() -> None:
     warnings.simplefilter("ignore")
     peers = [one for one in PEERS if one.name in given.models or not given.models]
     for one in chosen_in(given.folder, given.only):
-        lines = [pd.read_csv(BOARD, keep_default_na=False)] if BOARD.exists() else []
-        before = {(*key,): how for board in lines for *key, how in board[[*KEY, "how"]].to_numpy()}
+        board = pd.read_csv(BOARD).fillna({"task": "", "how": ""}) if BOARD.exists() else None
+        lines = [] if board is None else [board]
+        before = {(*key,): how for table in lines for *key, how in table[[*KEY, "how"]].to_numpy()}
         frames: dict[str, list[pd.DataFrame]] = {}
         how: dict[tuple[str, str], str] = {}
         failed = set[tuple[str, str]]()
@@ -331,7 +332,7 @@ def main() -> None:
             scored["how"] = [how[name, task] for task in scored["task"]]
             lines.append(scored)
         board = pd.concat(lines).drop_duplicates(KEY, keep="last")
-        board.to_csv(BOARD, index=False, float_format="%.5g")
+        board.sort_values(["set", "task", "rmse"]).to_csv(BOARD, index=False, float_format="%.4g")
 
 
 if __name__ == "__main__":

@@ -71,10 +71,6 @@ CALLS: dict[str, Call] = {
     "rig show": call_of("rail"),
     "rig run": call_of(f"{RIG} --signal constant:value=1 --duration 1 -o out.csv", RIG),
     "rig record": call_of("field-models --jobs 1 -o out", own="decaying-triangle.csv"),
-    "rig new": call_of(
-        "--diameter 20 --length 200 --max-pressure 6 --max-force 1500 --max-contraction 0.25"
-        " out.toml"
-    ),
 }
 
 

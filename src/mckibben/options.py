@@ -368,7 +368,7 @@ class TrackOptions:
     rig: Annotated[Any, Option("Virtual rig to test it on; see rig list.", "NAME|FILE")] = None
     plant: Annotated[
         Path | Any | None,
-        Option("Model of your own muscle to test it on (JSON); a band adds scatter.", "MODEL"),
+        Option("Model of your own muscle to test it on (JSON).", "MODEL"),
     ] = None
     limits: Annotated[
         Mapping[str, tuple[float | None, ...]],

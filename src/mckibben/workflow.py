@@ -330,7 +330,7 @@ def track(
     from mckibben.control import track as close
     from mckibben.control.identified import beyond_known
     from mckibben.control.roles import asked, offered
-    from mckibben.control.suiting import doubts_of_feedback
+    from mckibben.control.suiting import caveats
     from mckibben.control.twin import COMMAND
     from mckibben.files import write
 
@@ -383,7 +383,7 @@ def track(
     notes = (
         *beyond_known(block, wanted),
         *without.notes,
-        *doubts_of_feedback(chosen.controller, plant),
+        *caveats(block, plant, chosen.controller),
     )
     plain = chosen.controller, chosen.rig is not None, chosen.seed
     return Tracking(tracked, without, plant, *plain, law, wanted, notes, file, controller_file)

@@ -24,9 +24,6 @@ from mckibben.control.twin import Twin
 from mckibben.errors import ModelError
 from mckibben.system.progress import Tell, one_by_one, telling
 
-NEVER = 1e9
-"""Time longer than any tuning [s]."""
-
 STEPS = (0.1, 0.2, 0.4)
 """Steps of pressure, relative to its range; larger ones are used only if smaller ones cause no
 motion.
@@ -80,8 +77,6 @@ def tune_pid(
     followed = [channel.name for channel in measured]
     driven = [channel.name for channel in untuned.given]
     starts = resting(plant, scheduled)
-    if isinstance(plant, Twin):  # what differs from run to run is no gain
-        starts["scatter_after"] = NEVER
     rig = plant.changed({"sample_time": sample_time, **starts})
     limits = [rig.limits(name) for name in driven]
     middle = {

@@ -6,6 +6,7 @@ makes its flags from them, and forms their controls.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -109,10 +110,12 @@ def setting(text: str) -> tuple[str, Any]:
     >>> setting("n-operators=4"), setting("initial=rest")
     (('n_operators', 4), ('initial', 'rest'))
     """
-    from mckibben.estimators.core.settings import setting_value
-
     name, value = pair(text)
-    return name.replace("-", "_"), setting_value(value)
+    try:
+        found = json.loads(value)
+    except (ValueError, RecursionError):
+        found = None if value.lower() == "none" else value
+    return name.replace("-", "_"), tuple(found) if isinstance(found, list) else found
 
 
 def number(text: str) -> tuple[str, float]:

@@ -315,6 +315,7 @@ def plant_of(workspace: Workspace, plant: str) -> Any:
 
 def plants(workspace: Workspace, name: str) -> dict[str, str]:
     """Return what a compensator can be tried on, in words; its own model comes last."""
+    from mckibben.report.columns import diverged
     from mckibben.rigs import rig_names
 
     block = workspace.model(name)
@@ -328,7 +329,8 @@ def plants(workspace: Workspace, name: str) -> dict[str, str]:
             return inputs <= {*there.inputs} and outputs <= {*there.outputs} and not driven
         return False
 
-    models = workspace.models()
+    unstable = {row["name"] for row in workspace.results() if diverged(row)}
+    models = [one for one in workspace.models() if one not in unstable]
     found = {f"model {x}": f"{x} (another model)" for x in models if x != name}
     found |= {f"rig {rig}": f"{rig} (virtual rig, another muscle)" for rig in rig_names()}
     found[f"model {name}"] = f"{name} (itself: proves nothing)"

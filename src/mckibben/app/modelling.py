@@ -150,7 +150,6 @@ def fit(
     inputs: list[str],
     outputs: list[str],
     load: str = "",
-    settings: Json | None = None,
     allow_shared: bool = False,
     seed: int = 0,
 ) -> str:
@@ -159,8 +158,7 @@ def fit(
     plan = plan_of(
         *(train, test),
         inputs=inputs, outputs=outputs, load=load or None, models=[model],
-        settings={model: settings or {}}, seed=seed,
-        allow_shared=allow_shared, allow_early=True,  # with a note
+        seed=seed, allow_shared=allow_shared, allow_early=True,  # with a note
     )  # fmt: skip
     plan = replace(plan, items={model: plan.items[model]})  # without those of each load alone
     *_, last = ranked(
@@ -170,7 +168,6 @@ def fit(
     if row.reason is not None or row.block is None:
         raise ModelError((row.reason or "it gave no model: try other settings").rstrip("."))
     about: Json = {"model": model, "input": board.input, "output": board.output, "load": load}
-    about["settings"] = settings or {}
     olds = {name: workspace.read("results", name) or {} for name in workspace.names("results")}
     same = (n for n, old in olds.items() if all(old.get(key) == about[key] for key in about))
     name = next(same, None) or workspace.new_name("models", model)
@@ -242,12 +239,8 @@ def stored_items(items: Iterable[Item]) -> list[Json]:
 
 
 def restored(found: Mapping[str, Any]) -> list[Item]:
-    """Return what `stored_items` made; of earlier versions, which had others, their sentences."""
-    items = found.get("items", found.get("shown"))
-    if items is None:
-        said = found.get("verdict"), *(found.get("sentences") or found.get("notes") or ())
-        return [Text([str(one) for one in said if one])]
+    """Return what `stored_items` wrote."""
     try:
-        return [KINDS[one["kind"]](**one) for one in items]
+        return [KINDS[one["kind"]](**one) for one in found["items"]]
     except (KeyError, TypeError):
         raise DataError("its file is damaged", remedy="do it again") from None

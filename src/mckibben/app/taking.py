@@ -55,11 +55,11 @@ def report(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Js
     from mckibben.report import write_report
     from mckibben.workflow import study
 
-    models, settings = fitted(workspace)
+    models = fitted(workspace)
     if not models:
         raise DataError("no model is fitted to these recordings", remedy="fit one under Models")
     given = {"inputs": of["inputs"], "outputs": of["outputs"], "load": of["load"] or None}
-    given |= {"models": models, "settings": settings, "jobs": 1, "allow_early": True} | options
+    given |= {"models": models, "jobs": 1, "allow_early": True} | options
     train, test = workspace.with_role("train"), workspace.with_role("test")
     found = study(train, test, **given, progress=tell)
     write_report(found, workspace.path("takeaway", file), title=options.get("title", ""))
@@ -191,23 +191,21 @@ THINGS = {
 # -- the script -------------------------------------------------------------------------------------
 
 
-def fitted(workspace: Workspace) -> tuple[list[str], Json]:
-    """Return the kinds of models that were fitted to the recordings as they are, with settings."""
+def fitted(workspace: Workspace) -> list[str]:
+    """Return the kinds of models that were fitted to the recordings as they are."""
     rows = [row for row in workspace.results() if row["current"] and row.get("model")]
-    settings = {row["model"]: row["settings"] for row in reversed(rows) if row.get("settings")}
-    return list(dict.fromkeys(row["model"] for row in rows)), settings
+    return list(dict.fromkeys(row["model"] for row in rows))
 
 
 def script(workspace: Workspace, of: Json) -> str:
     """Return a Python script: read, compare, save, invert, export."""
-    models, settings = fitted(workspace)
+    models = fitted(workspace)
     lines = ['"""What was done in the workbench; run it in its folder."""', ""]
     lines += ["import mckibben", "from mckibben import workflow", ""]
     for role in ("train", "test"):
         runs = [f"    {one.code()}," for one in workspace.entries() if one.role == role]
         lines += [f"{role} = [", *runs, "]"]
     given = {key: of[key] for key in ("inputs", "outputs", "load") if of[key]} | {"models": models}
-    given |= {"settings": settings} if settings else {}
     lines += ["board = mckibben.compare(", "    train,", "    test,"]
     lines += [*(f"    {key}={value!r}," for key, value in given.items()), ")", "print(board)"]
     for chosen in (row["model"] for row in workspace.results() if row["name"] == of["model"]):

@@ -156,9 +156,6 @@ class Workspace:
     def entry(self, name: str) -> Entry:
         """Return a recording's description; `DataError` if it is missing or damaged."""
         found = self.read("recordings", name) or {}
-        before = found.get("base") or found.get("file")  # of an earlier version: what was read
-        if before:
-            found |= {"kind": "recordings", "upload": before, "part": 0, "reading": {}}
         try:
             return Entry.model_validate(found | {"name": name})
         except ValidationError:
@@ -181,7 +178,7 @@ class Workspace:
 
     def raw_path(self, entry: Entry) -> Path:
         """Return the raw file of a recording."""
-        return self.path(entry.kind, entry.upload)
+        return self.path("uploads", entry.upload)
 
     def _parts(self, path: Path, reading: Reading) -> list[Recording]:
         return self.cached(path, reading.model_dump_json(), lambda: understand(path, reading)[0])

@@ -50,6 +50,7 @@ def build(state: State) -> None:
         with ui.element("div").style("display: none"):
             files = _upload(state)
         start(state)
+        arriving(state)
         with ui.element("div").classes("columns"):
             with ui.element("div").classes("stack"):
                 listed(state)
@@ -94,6 +95,15 @@ def start(state: State) -> None:
             mark(button, "example")
             _virtual(state)
         _upload(state)
+
+
+@view
+def arriving(state: State) -> None:
+    """Show which files are being read."""
+    if names := state.chosen.get("data.reading"):
+        with widgets.card(), widgets.row():
+            ui.spinner()
+            mark(ui.label(f"Reading {', '.join(names)}"), "reading")
 
 
 @view
@@ -160,11 +170,15 @@ async def _received(state: State, event: events.UploadEventArguments) -> None:
     """Keep a file, and read it as it is; where that does not work, ask."""
     with state.workspace.receiving(event.file.name, event.file.size()) as (part, path):
         await event.file.save(part)
-    unread = _unread(state)
+    unread, reading = _unread(state), state.chosen.setdefault("data.reading", [])
+    reading.append(path.name)
+    arriving.refresh()
     try:
         state.recording, *_ = await asyncio.to_thread(state.workspace.add, path.name)
     except MckibbenError as error:
         unread[path.name] = error
+    finally:
+        reading.remove(path.name)
     state.changed()
     if [*unread] == [path.name]:
         await _ask(state, path.name)
@@ -268,13 +282,9 @@ def _sides(state: State, known: list[str]) -> None:
     workspace = state.workspace
     if not known:
         widgets.error_box(
-            "The recordings in use have no channel in common. Join those of one run, set one of them to "
-            "unused, or correct how it is read"
+            "The recordings in use have no channel in common. Set one of them to unused, or correct how "
+            "it is read"
         )
-        if several := together.pairs(workspace):
-            text = f"Join {' and '.join(several[0])}" + " …" * (len(several) > 1)
-            join = partial(_changed, state, together.join, workspace)
-            mark(widgets.button(text, join, "merge"), "join")
         return
     if times := together.sample_times(workspace):
         slow = f"{times[1]:.4g}"
@@ -315,7 +325,7 @@ def _recording(state: State, entry: Entry) -> None:
     ui.label(importing.summary(recording)).classes("muted")
     _part(state, entry, recording)
     _steps(state, entry, recording)
-    if notes := dict.fromkeys([*recording.notes, *entry.notes]):
+    if notes := dict.fromkeys(recording.notes):
         with widgets.details("Notes of the reading"):
             for note in notes:
                 ui.label(said(note)).classes("muted")

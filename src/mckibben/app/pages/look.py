@@ -25,7 +25,6 @@ from mckibben.recording import Recording
 from mckibben.report import results
 from mckibben.report.builder import Text
 from mckibben.report.figures import draw
-from mckibben.report.subjects import loop_by
 
 TITLE = "Look"
 ICON = "insights"
@@ -148,26 +147,14 @@ def _coupling(state: State, found: Coupling, pair: Pair) -> None:
 def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
     (given, wanted), kind = pair, state.chosen.get("look.view", "loop")
     shared = [name for name in runs[0].channels if all(name in run for run in runs)]
-    spans = {name: np.ptp(np.concatenate([run[name] for run in runs])) for name in shared}
-    free = [name for name in shared if name not in pair and spans[name] > 0]
-    by = state.chosen.get("look.by", "")
     named = [n for n in (*sides.inputs, *sides.outputs, *(sides.scheduling or ())) if n in shared]
     channels = [*dict.fromkeys([given, wanted, *(named if len(named) <= MOST else ())])]
     with widgets.row(classes="spread"):
         ui.label(f"{wanted} over {given}").classes("subtitle")
-        with widgets.row():
-            if kind == "loop" and free:
-                options = {"": "Colour by recording or time"}
-                options |= {name: f"Colour by {name}" for name in free}
-                colour = ui.select(options, value=by if by in free else "").props("dense outlined")
-                widgets.labelled(colour, "Colour")
-                colour.on_value_change(lambda event: _choose(state, "look.by", event.value))
-            toggle = ui.toggle(VIEWS, value=kind).props("no-caps unelevated dense")
-            toggle.on_value_change(lambda event: _choose(state, "look.view", event.value))
+        toggle = ui.toggle(VIEWS, value=kind).props("no-caps unelevated dense")
+        toggle.on_value_change(lambda event: _choose(state, "look.view", event.value))
     if kind == "time":
         drawing = draw(runs, "time", channels=channels)
-    elif by in free:
-        drawing = loop_by(runs, given, wanted, by)
     else:
         drawing = draw(runs, "loop", input=given, output=wanted)
     for plot in widgets.plot(drawing, height=360 if kind == "loop" else 130 + 90 * len(channels)):

@@ -46,7 +46,7 @@ ENDED = 6
 """Fits that did not work that are shown."""
 
 FIRST = ("chosen", "test")
-"""Columns of the leaderboard; the others are behind a fold-out."""
+"""Columns of the leaderboard; the report has all."""
 
 OTHER_DATA = (
     "Those marked “other data” were fitted or tested on recordings that have changed since, so that "
@@ -71,7 +71,9 @@ def build(state: State) -> None:
                 board(state)
             with ui.element("div").classes("stack"):
                 closer(state)
-        figures(state)
+        widgets.next_step(
+            "One is good enough? Let it follow a reference.", "Compensate", "/compensate"
+        )
 
 
 def _compared(state: State) -> tuple[Channels, list[Json]]:
@@ -199,26 +201,6 @@ def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:
     notes += [f"* {CAREFUL}."] * any(caution(row["model"]) for row in rows)
     notes += [OTHER_DATA] * (not all(row["current"] for row in rows))
     ui.label(typeset_within(said(" ".join(notes)))).classes("muted")
-
-
-@parts.steady("models", "results")
-def figures(state: State) -> None:
-    """Show all figures of all models behind a fold-out, and what comes next."""
-    sides, rows = _compared(state)
-    if not rows:
-        return
-    found = columns_of(rows, rows[0]["unit"], sides.outputs, rows[0]["chosen_by"])
-    with widgets.details("All figures of all models"):
-        texts = [
-            [f"{typeset(one.text(row))} {one.flag(row)}".strip() for one in found] for row in rows
-        ]
-        lines = [[row["name"], *line] for row, line in zip(rows, texts, strict=True)]
-        widgets.table(["Model", *(one.label for one in found)], lines)
-        ui.label(
-            "Width reproduced: 100 % where rising and falling branches are as far apart as measured. "
-            "Inverse: exact by a formula, solved in every step, or none."
-        ).classes("muted")
-    widgets.next_step("One is good enough? Let it follow a reference.", "Compensate", "/compensate")
 
 
 # -- the model that is chosen ----------------------------------------------------------------------

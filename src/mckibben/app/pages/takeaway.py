@@ -112,7 +112,7 @@ def _button(state: State, key: str, thing: Thing) -> None:
 @view
 def script(state: State) -> None:
     """Show the script that does it all again."""
-    if not taking.fitted(state.workspace)[0]:
+    if not taking.fitted(state.workspace):
         return
     text = taking.script(state.workspace, _of(state))
     with widgets.card("All of it as a script"):

@@ -481,14 +481,6 @@ class PlanOptions:
     """Options of `plan`: driven channels, duration and limits."""
 
     rig: Annotated[Any, Option("Rig that is driven: channels and limits.", "NAME|FILE")] = None
-    muscle: Annotated[
-        str | None, Option("Without recordings: a muscle, or a data sheet.", "NAME|FILE")
-    ] = None
-    model: Annotated[
-        Any,
-        Option("Model whose standard errors are planned: its name or file (.json).",
-               "NAME|FILE"),
-    ] = None  # fmt: skip
     minutes: Annotated[float, Option("How long to record.", "X")] = 3.0
     limits: Annotated[
         Mapping[str, tuple[float | None, ...]],

@@ -527,10 +527,7 @@ def plan(
 
     chosen, reading = _chosen(PlanOptions, options, reading, given)
     arguments = {one.name: getattr(chosen, one.name) for one in fields(chosen)}
-    read = _paths(data, chosen.rig, chosen.muscle, chosen.model)
-    file = _claim(out, read, force, recording=True)
-    if str(chosen.model).endswith(".json"):
-        arguments["model"] = saved(chosen.model)
+    file = _claim(out, _paths(data, chosen.rig), force, recording=True)
     found = make(read_files(data, None, reading), **arguments)
     if file is not None:
         write(found.recording, file)

@@ -540,11 +540,7 @@ class MJCFOptions:
     """Options of `export` to MJCF."""
 
     rest_length: Annotated[
-        float | None, Option("Distance of the sites where the displacement is 0.", "MM")
-    ] = None
-    sheet: Annotated[
-        str | None,
-        Option("Muscle of the library or data sheet (.toml) with the rest length.", "NAME|FILE"),
+        float | None, Option("Distance of the sites where the displacement is 0; needed.", "MM")
     ] = None
     site_from: Annotated[
         str | None,
@@ -552,8 +548,8 @@ class MJCFOptions:
     ] = None
     site_to: Annotated[str | None, Option("Site that it pulls.", "SITE")] = None
     example: Annotated[
-        Literal["hanging", "joint", "arm"],
-        Option("Without sites: a load on a muscle, a joint between two, or a plate on three."),
+        Literal["hanging", "joint"],
+        Option("Without sites: a load on a muscle, or a joint between two."),
     ] = "hanging"
     lag: Annotated[float, Option("Time constant from command to pressure.", "SECONDS")] = 0.0
     name: Annotated[str | None, Option("Name of the actuator. Default: of the file.", "NAME")] = (

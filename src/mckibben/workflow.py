@@ -117,6 +117,10 @@ def fit(
         runs, checks = (_residuals(base, estimator, some) for some in (runs, checks))
     used = estimator.data(runs)
     check_shared({"fit": runs}, *([one.name for one in of] for of in (used.inputs, used.outputs)))
+    channels = [one.name for one in (*used.inputs, *used.outputs)]
+    if chosen.target is not None and not any(name.startswith("force") for name in channels):
+        problem = f"a model for {chosen.target} is fitted to a measured force"
+        raise DataError(problem, channel="force", remedy="give recordings with one")
     with telling(progress, f"fitting {model}") as tell:
         estimator.fit(runs, validation=checks, progress=tell)
     price = None
@@ -613,13 +617,13 @@ def _export_mjcf(model: Any, out: Path, chosen: MJCFOptions) -> Exported:
     """Write a muscle as MJCF."""
     from mckibben.export.mjcf import Sites, export_mjcf
     from mckibben.export.naming import name_from
-    from mckibben.muscles import prior_of
 
-    rest, sheet, ends = chosen.rest_length, chosen.sheet, (chosen.site_from, chosen.site_to)
-    if (rest is None) == (sheet is None):
-        problem = "of rest length and data sheet, one is needed"
-        remedy = "give `rest_length` or `sheet`"
-        raise ModelError(problem, parameter="rest_length", remedy=remedy)
+    ends = chosen.site_from, chosen.site_to
+    if chosen.rest_length is None:
+        raise ModelError("it is needed", parameter="rest_length", remedy="give it, in mm")
+    if None not in ends and chosen.example != "hanging":
+        problem = "a muscle between sites of your own model has no example"
+        raise ModelError(problem, parameter="example", remedy="leave it out, or the sites")
     if sum(end is None for end in ends) == 1:
         remedy = "give both, or neither"
         raise ModelError("one site is missing", parameter="site_from", remedy=remedy)
@@ -627,7 +631,7 @@ def _export_mjcf(model: Any, out: Path, chosen: MJCFOptions) -> Exported:
     export_mjcf(
         model,
         out,
-        rest_length=prior_of(str(sheet)).sheet.rest_length_mm if rest is None else rest,
+        rest_length=chosen.rest_length,
         name=name,
         sites=None if None in ends else Sites(*map(str, ends)),
         example=chosen.example,

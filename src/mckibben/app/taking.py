@@ -179,7 +179,7 @@ THINGS = {
     "mjcf": Thing(
         "MuJoCo", "A muscle as plain XML, of a balance fitted within what MJCF carries.",
         *(code, "{stem}.xml", MJCFOptions),
-        ("rest_length", "sheet", "site_from", "site_to", "example", "lag"),
+        ("rest_length", "site_from", "site_to", "example", "lag"),
     ),
     "recordings": Thing(
         "Recordings", "As they are after cuts and filters, by role, with units.",

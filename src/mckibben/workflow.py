@@ -117,7 +117,7 @@ def fit(
         runs, checks = (_residuals(base, estimator, some) for some in (runs, checks))
     used = estimator.data(runs)
     check_shared({"fit": runs}, *([one.name for one in of] for of in (used.inputs, used.outputs)))
-    channels = [one.name for one in (*used.inputs, *used.outputs)]
+    channels = [one.name for one in (*used.inputs, *used.outputs, *used.scheduled)]
     if chosen.target is not None and not any(name.startswith("force") for name in channels):
         problem = f"a model for {chosen.target} is fitted to a measured force"
         raise DataError(problem, channel="force", remedy="give recordings with one")

@@ -78,7 +78,7 @@ STEPS = (
         "models",
         "Models: the leaderboard",
         "Fits run in the background, one process each. The best stands first, beside the chosen model "
-        "in tabs: loop, time, residual, parameters, band, check.",
+        "in tabs: loop, time, residual, parameters, check.",
         ("fit",),
         "closer-loop",
     ),

@@ -564,8 +564,4 @@ class MJCFOptions:
 class FMUOptions(ExportOptions):
     """Options of `export` to an FMU."""
 
-    platforms: Annotated[
-        str | tuple[str, ...],
-        Option("linux, windows, macos; all that can be built here, or none.", "all|none|NAME,...",
-               parse=names),
-    ] = "all"  # fmt: skip
+    library: Annotated[bool, Option("Include the library for this machine.")] = True

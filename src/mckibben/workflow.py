@@ -605,8 +605,7 @@ def export(
             str(emulate(block, sample_time=chosen.sample_time)) if chosen.emulate else None,
         ]
     elif target == "fmu":
-        named = {"all": None, "none": ()}.get(chosen.platforms, chosen.platforms)
-        export_fmu(block, out, name=name, platforms=named, **common)
+        export_fmu(block, out, name=name, library=chosen.library, **common)
     else:
         name = chosen.name or name.lower()
         export_ros2(block, out, name=name, **common)

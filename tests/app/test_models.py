@@ -10,7 +10,6 @@ import pytest
 from mckibben.app import modelling
 from mckibben.app.modelling import comparable, offered, sides_of
 from mckibben.app.workspace import Workspace
-from mckibben.blocks.bands import Banded
 from mckibben.errors import DataError
 from tests.app.browsing import NARROW, SLOW, seen, visited, workbench
 from tests.app.simulated import with_example
@@ -56,7 +55,6 @@ def test_jobs_write_results_that_compare(workspace: Workspace) -> None:
     assert len(comparable(workspace, sides)) == 2
 
     modelling.check(workspace, silent, name="pi")
-    modelling.calibrate(workspace, silent, name="pi")
     row = next(row for row in comparable(workspace, sides) if row["name"] == "pi")
     assert row["check"]["on"] == "test"
     assert {one.kind for one in modelling.restored(row["check"]) if one} >= {
@@ -64,7 +62,6 @@ def test_jobs_write_results_that_compare(workspace: Workspace) -> None:
         "table",
         "figure",
     }
-    assert isinstance(workspace.model("pi", "banded"), Banded)
     modelling.fit(workspace, silent, model="pi", **GIVEN)
     assert "check" not in (workspace.read("results", "pi") or {})
 
@@ -72,8 +69,6 @@ def test_jobs_write_results_that_compare(workspace: Workspace) -> None:
     assert next(iter(modelling.parts(workspace, sides))) == test
     workspace.change(test, role="unused")
     assert not any(row["current"] for row in comparable(workspace, sides))
-    with pytest.raises(DataError):
-        modelling.calibrate(workspace, silent, name="pi")
     (part,) = modelling.parts(workspace, sides).values()
     assert part[1] is not None  # its last part is held out
     assert comparable(workspace, sides_of(workspace, ["displacement"], ["pressure"])) == []
@@ -122,10 +117,6 @@ def test_models_are_chosen_fitted_and_seen_closer_in_two_windows(
             seen(page, f"closer-{tab}")
         page.get_by_test_id("tab-parameters").click()
         seen(page, "parameters")
-        page.get_by_test_id("tab-band").click()
-        if names[2] not in workspace.names("banded"):
-            seen(page, "calibrate").click()
-        seen(page, "closer-band")
         page.get_by_test_id("tab-check").click()
         seen(page, "check").click()
         seen(other, "verdict")

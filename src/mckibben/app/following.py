@@ -42,7 +42,6 @@ KINDS = {
 
 USES = {
     "model": "The model itself, as fitted",
-    "banded": "The model with its band",
     **KINDS,
     "force": "Its estimate of force",
 }
@@ -72,8 +71,8 @@ def made(workspace: Workspace, name: str, use: str, settings: Mapping[str, Any])
     from mckibben.blocks.inverse import drives
     from mckibben.workflow import invert
 
-    if use in ("model", "banded"):
-        return workspace.model(name, "models" if use == "model" else "banded")
+    if use == "model":
+        return workspace.model(name)
     block, given = workspace.model(name), dict(settings)
     if use == "force":
         given = {"wanted": "force"}
@@ -104,10 +103,7 @@ def uses(workspace: Workspace, name: str) -> dict[str, str]:
             return bool(made(workspace, name, use, {}))
         return use == "model"
 
-    tried = [use for use in USES if use != "banded"]
-    known = {*of_model(workspace, name, "uses", lambda: [*filter(able, tried)])}
-    if workspace.path("banded", f"{name}.json").is_file():
-        known.add("banded")
+    known = of_model(workspace, name, "uses", lambda: [*filter(able, USES)])
     return {use: words for use, words in USES.items() if use in known}
 
 
@@ -296,7 +292,7 @@ def read_run(workspace: Workspace, file: str) -> Recording:
 
 
 def plant_of(workspace: Workspace, plant: str) -> Any:
-    """Return ``rig NAME``, or ``model NAME`` with its band, if any; unknown limits were recorded."""
+    """Return ``rig NAME``, or ``model NAME``; unknown limits are those recorded."""
     from mckibben.control import Twin
     from mckibben.control.identified import known_ranges
     from mckibben.rigs import load_rig
@@ -304,8 +300,7 @@ def plant_of(workspace: Workspace, plant: str) -> Any:
     kind, _, name = plant.partition(" ")
     if kind == "rig":
         return load_rig(name)
-    banded = workspace.path("banded", f"{name}.json").is_file()
-    model, limits = workspace.model(name, "banded" if banded else "models"), {}
+    model, limits = workspace.model(name), {}
     for channel in {c.name for c in model.inputs}.difference(known_ranges(model)):
         values = recorded(workspace, channel)
         if np.ptp(values):

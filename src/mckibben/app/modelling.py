@@ -1,4 +1,4 @@
-"""What is modelled, the models on offer for it, and the jobs that fit, check, calibrate and plan."""
+"""What is modelled, the models on offer for it, and the jobs that fit, check and plan."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from mckibben.comparison.choosing import recommended
 from mckibben.comparison.planning import objections, plan_of
 from mckibben.comparison.ranking import ranked
 from mckibben.comparison.splits import split_of, tested_from
-from mckibben.diagnosis.bands import calibration
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.catalogue import Need, declared, full_name, needs
 from mckibben.estimators.core.data import training_data
@@ -176,21 +175,10 @@ def fit(
     told = {key: whole[key] for key in copied}
     told["constant"] = None if board.constant is None else board.constant.to_dict()
     told["notes"] = [*board.notes, *row.diagnostics.get("notes", ())]
-    workspace.save_model(name, row.block, row.to_dict() | about | told | {"data": data}, row.banded)
+    workspace.save_model(name, row.block, row.to_dict() | about | told | {"data": data})
     by = "fit" if row.validation_rmse is None else board.chosen_by
     errors = [f"{numeral(x, 3)} {board.unit}".strip() for x in (row.chosen_by, row.test_error)]
     return f"{words.CHOICES[by][0]} {errors[0]}, test RMSE {errors[1]}"
-
-
-def calibrate(workspace: Workspace, tell: Tell, *, name: str) -> str:
-    """Give a model the band that its errors on the test recordings ask for."""
-    train, tests = workspace.train_and_test()
-    if not tests:
-        problem = "a band is calibrated on recordings that the model was not fitted to"
-        raise DataError(problem, remedy="give a recording the role Test")
-    banded, found = calibration(workspace.model(name), tests, "auto", train, tell)
-    banded.save(workspace.path("banded", f"{name}.json"))
-    return _add(workspace, name, "calibration", results.calibration(found), "test")
 
 
 def check(workspace: Workspace, tell: Tell, *, name: str) -> str:

@@ -170,7 +170,7 @@ THINGS = {
     ),
     "fmu": Thing(
         "FMU", "For Simulink and other tools; it is compiled here, up to a minute.",
-        *(code, "{stem}.fmu", FMUOptions, ("name", "sample_time", "platforms")),
+        *(code, "{stem}.fmu", FMUOptions, ("name", "sample_time", "library")),
     ),
     "ros2": Thing(
         "ROS 2", "A controller of ros2_control, to be built by colcon.",

@@ -15,12 +15,12 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.recording import PROVENANCE, Recording
 from mckibben.rigs.commands import Commands
-from mckibben.rigs.files import CHANGES, changes
+from mckibben.rigs.files import CHANGES, REMEDY, changes
 from mckibben.rigs.parameters import AGEING, Air, Muscle, Range, Section, Sensor, parameter
-from mckibben.rigs.refusals import refused
 from mckibben.rigs.system import Demands, State, System, Traces
 from mckibben.signals.checking import generator
 from mckibben.system.showing import DrawsItself
+from mckibben.system.validation import invalid
 
 
 class Rig(DrawsItself, Section, ABC):
@@ -157,7 +157,7 @@ class Rig(DrawsItself, Section, ABC):
         try:
             return type(self).model_validate(fields)
         except ValidationError as error:
-            raise refused(error, type(self), f"rig {self.name}") from None
+            raise invalid(error, f"rig {self.name}", REMEDY) from None
 
     def aged(self, factors: Mapping[str, float]) -> Self:
         """Return the rig with aged muscles in its current state.

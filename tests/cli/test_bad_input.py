@@ -95,9 +95,8 @@ BAD = [
     # Plans
     (f"{PLAN} --limits pressure=4:1", "pressure"),
     (f"{PLAN} --limits pressure", "CHANNEL=LOW:HIGH"),
-    (f"{PLAN} --limits force=0:5", "force"),
+    (f"{PLAN} --limits torque=0:5", "torque"),
     (f"{PLAN} --minutes 0.01", "--minutes"),
-    (f"{PLAN} --rig rail", "voltage"),
     # Rigs
     ("track nowhere.json --rig soft-arm --reference run.csv", "nowhere.json"),
     ("track inverse.json --rig soft-arm --reference run.csv", "'soft-arm'"),

@@ -93,7 +93,7 @@ STEPS = (
     Step(
         "take",
         "Take away",
-        "Report, figures, model, C99, FMU, ROS 2, recordings; and all that was done as a script.",
+        "Report, model, C99, FMU, ROS 2, recordings; and all that was done as a script.",
         ("tab-take",),
         "things",
     ),

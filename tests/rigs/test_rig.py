@@ -103,7 +103,7 @@ def test_wrong_inputs_and_actions_are_refused() -> None:
     with pytest.raises(DataError):  # before it is reset
         rig.step([1.0, 0.0])
     rig.reset()
-    with pytest.raises(DataError, match=r"\(1,\)"):
+    with pytest.raises(DataError, match=r"\[1.0\]"):
         rig.step([1.0])
     with pytest.raises(DataError, match="force"):
         rig.step([1.0, np.nan])

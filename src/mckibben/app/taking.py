@@ -10,23 +10,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any, Literal
+from typing import Any
 
 from mckibben.app.following import made, pace
 from mckibben.app.jobs import Tell
 from mckibben.app.modelling import Json
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
-from mckibben.options import COptions, ExportOptions, FMUOptions, MJCFOptions, Option, StudyOptions
-
-FIGURES = {
-    "loops": "Measured and modelled loops",
-    "fit": "Measured and modelled over time",
-    "residuals": "Residuals",
-    "weights": "Weights over thresholds",
-    "loop": "Loops of the recordings",
-    "time": "Recordings over time",
-}
+from mckibben.options import COptions, ExportOptions, FMUOptions, MJCFOptions, StudyOptions
 
 FLAGS = {
     "inverse": "",
@@ -36,15 +27,6 @@ FLAGS = {
     "force": ', wanted="force"',
 }
 """What makes a compensator of a model in a script."""
-
-
-@dataclass(frozen=True)
-class FigureOptions:
-    """Options of a figure."""
-
-    figure: Annotated[Literal["loops", "fit", "residuals", "weights", "loop", "time"],
-                      Option("What is drawn, of the test recordings.")] = "loops"  # fmt: skip
-    format: Annotated[Literal["pdf", "svg", "png"], Option("Of the file.")] = "pdf"
 
 
 # -- jobs -------------------------------------------------------------------------------------------
@@ -63,21 +45,6 @@ def report(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Js
     train, test = workspace.with_role("train"), workspace.with_role("test")
     found = study(train, test, **given, progress=tell)
     write_report(found, workspace.path("takeaway", file), title=options.get("title", ""))
-    return f"{file} is written"
-
-
-def figure(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json) -> str:
-    """Draw the test recordings, or else those for training, for print."""
-    from mckibben.report.figures import write_figure
-
-    runs = workspace.with_role("test") or workspace.with_role("train")
-    if not runs:
-        raise DataError("there is no recording to draw", remedy="add one under Data")
-    kind, path = options.get("figure", FigureOptions.figure), workspace.path("takeaway", file)
-    if kind in ("loop", "time"):
-        write_figure(runs, path, kind, input=of["inputs"][0], output=of["outputs"][0])
-    else:
-        write_figure(workspace.model(of["model"]), path, kind, recording=runs)
     return f"{file} is written"
 
 
@@ -141,7 +108,7 @@ def _zip(path: Path, fill: Callable[[Path], Any]) -> None:
 class Thing:
     """Something to take away: what it is and what for, the job, and its options that are asked for.
 
-    The name of its file has options in braces, and ``{stem}`` where it is of a model.
+    The name of its file has ``{stem}`` where it is of a model.
     """
 
     title: str
@@ -157,10 +124,6 @@ THINGS = {
         "Report",
         "What the muscle does, the models, their test and inverse: one page that opens anywhere.",
         *(report, "report.html", StudyOptions, ("title",)),
-    ),
-    "figure": Thing(
-        "Figure", "For print: measured and modelled.",
-        *(figure, "{stem}-{figure}.{format}", FigureOptions, ("figure", "format")),
     ),
     "json": Thing("JSON", "For this library again: mckibben.load(file).", code, "{stem}.json"),
     "c": Thing(

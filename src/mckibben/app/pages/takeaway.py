@@ -74,7 +74,7 @@ def _options(state: State, key: str, thing: Thing) -> None:
     def ask(kind: type) -> None:
         with widgets.dialog(f"{thing.title}: options") as window:
             with widgets.row(classes="fields"):
-                forms.fields(kind, thing.fields, values, taking.FIGURES)
+                forms.fields(kind, thing.fields, values)
             with widgets.row(classes="spread"):
                 ui.space()
                 widgets.button("Done", window.close)
@@ -90,9 +90,8 @@ def _button(state: State, key: str, thing: Thing) -> None:
     async def take() -> None:
         values, of = state.chosen[f"takeaway.{key}"], _of(state)
         options = forms.given(thing.kind, values) if thing.kind else {}
-        plain = vars(thing.kind()) if thing.kind else {}
         stem = state.model if of["use"] == "model" else f"{state.model}-{of['use']}"
-        wish, _, ending = thing.file.format_map({"stem": stem, **plain, **options}).rpartition(".")
+        wish, _, ending = thing.file.format(stem=stem).rpartition(".")
         file = f"{state.workspace.new_name('takeaway', wish, '.' + ending)}.{ending}"
         path = state.workspace.path("takeaway", file)
         path.unlink()  # only its name was reserved; exports replace what they wrote alone

@@ -53,8 +53,8 @@ STEPS = (
     Step(
         "data",
         "Data",
-        "Every recording with its channels and role. *How it is read* shows what was understood of the "
-        "file, to be corrected: columns, units, rate, sign, calibration, lines, encoding. Drag across "
+        "Every recording with its channels and role. *Import settings* shows how the file was read, "
+        "and corrects it: columns, units, rate, sign, calibration, lines, encoding. Drag across "
         "the plot to cut; every step can be undone.",
         ("example",),
         "over-time",

@@ -1,7 +1,7 @@
-"""What models of a folder can be used as, the motions they are asked for, and the jobs that try them.
+"""Uses of models, desired motions, and the jobs that run loops and review logs.
 
-A motion is points of time and value for every channel that a compensator is asked for. What loops and
-reviews of logs gave is in ``runs`` and ``reviews``: numbers as JSON, samples as CSV beside them.
+A motion is points of time and value for every reference channel. Results are in ``runs`` and
+``reviews``: numbers as JSON, samples as CSV.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ DRAWN = 2000
 """Most points of a curve of a review."""
 
 
-# -- what a model is used as ------------------------------------------------------------------------
+# -- uses of a model ------------------------------------------------------------------------
 
 
 def made(workspace: Workspace, name: str, use: str, settings: Mapping[str, Any]) -> Block:
@@ -135,7 +135,7 @@ def asked_for(workspace: Workspace, name: str) -> tuple[dict[str, Channel], dict
     return channels, held
 
 
-# -- what the recordings say of a motion --------------------------------------------------------------
+# -- ranges and pace of the recordings --------------------------------------------------------------
 
 
 def pace(workspace: Workspace, name: str) -> tuple[float, float]:
@@ -328,7 +328,7 @@ def plants(workspace: Workspace, name: str) -> dict[str, str]:
     models = [one for one in workspace.models() if one not in unstable]
     found = {f"model {x}": f"{x} (another model)" for x in models if x != name}
     found |= {f"rig {rig}": f"{rig} (virtual rig, another muscle)" for rig in rig_names()}
-    found[f"model {name}"] = f"{name} (itself: proves nothing)"
+    found[f"model {name}"] = f"{name} (the same model: exact by construction)"
     key = f"plants {models} {workspace.channels()}"
     fitting = of_model(workspace, name, key, lambda: [*filter(fits, found)])
     return {plant: found[plant] for plant in fitting}

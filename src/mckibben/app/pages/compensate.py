@@ -1,4 +1,4 @@
-"""Compensate: a motion that is wanted, what undoes the hysteresis, and how well the two are followed."""
+"""Compensate: a desired motion, a compensator, and its tracking error."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ async def build(state: State) -> None:
     with mark(ui.element("div").classes("page"), "page-compensate"):
         widgets.heading(
             "Compensate",
-            "Inverses of models: what to command for a wanted motion, and how well it works.",
+            "Inverses of models: commands for a desired motion, and the tracking error.",
         )
         spinner = ui.spinner()
         await run.io_bound(_prepare, state)
@@ -103,7 +103,7 @@ def _empty(state: State, tab: str) -> None:
     else:
         title = "A compensator is the inverse of a model"
         text = (
-            "Its inverse says what to command so that the muscle moves as wanted. Fit a model that "
+            "It computes the commands for a desired motion. Fit a model that "
             "has one, such as gpi for one muscle, or balance or sdchm for several."
         )
     with widgets.card(), widgets.empty("moving", title, text):
@@ -262,18 +262,18 @@ async def _start(state: State, name: str) -> None:
         trying.start(state, following.loop, title, asked | more)
 
 
-# -- what came of it ----------------------------------------------------------------------------------
+# -- results ----------------------------------------------------------------------------------
 
 
 @parts.steady("runs", jobs=["loop"])
 def followed(state: State) -> None:
-    """Show the motion, what came of it, and the errors of all runs of the model."""
+    """Show the motion, the chosen run, and the errors of all runs of the model."""
     wish, runs, reference = _wish(state), _runs(state), _reference(state)
     reach = following.reach(state.workspace, _able(state))
     of_it = [run for run, one in runs.items() if one["reference"] == wish["stored"]]
     chosen = state.chosen.get("compensate.run")
     chosen = chosen if chosen in of_it else next(iter(of_it), "")
-    with widgets.card("What is wanted, and what came of it" if chosen else "What is wanted"):
+    with widgets.card("Desired and measured motion" if chosen else "Desired motion"):
         _plot(state, reference, reach, runs[chosen] | {"name": chosen} if chosen else None)
         if doubt := modelling.against(modelling.comparable(state.workspace, state.sides)):
             widgets.error_box(doubt)
@@ -289,7 +289,7 @@ def followed(state: State) -> None:
         if runs:
             _errors(state, runs, chosen)
         else:
-            text = "Run shows the errors beside no compensation, and the commands, here."
+            text = "Run shows the errors with and without compensation, and the commands."
             mark(ui.label(text).classes("muted"), "nothing-yet")
         if chosen:
             with widgets.details(f"More of {_title(runs[chosen])}"):

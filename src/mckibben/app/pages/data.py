@@ -113,7 +113,7 @@ def listed(state: State) -> None:
         with widgets.card("Recordings"):
             _recordings(state, state.workspace.entries())
         if state.workspace.used():
-            with widgets.card("What drives, what moves"):
+            with widgets.card("Inputs and outputs"):
                 _sides(state, state.workspace.channels())
 
 
@@ -126,7 +126,7 @@ def shown(state: State) -> None:
             with widgets.card():
                 _recording(state, entry)
     if state.inputs and state.outputs:
-        text = "Channels and roles are right? See what the muscle does."
+        text = "Channels and roles are right? Characterize the muscle."
         widgets.next_step(text, "Look", "/look")
 
 
@@ -245,7 +245,7 @@ def _recordings(state: State, entries: list[Entry]) -> None:
         first, *others = unread  # mostly, they are alike
         widgets.error_box(unread[first])
         with widgets.row():
-            widgets.button("How is it read?", partial(_ask, state, first))
+            widgets.button("Import settings", partial(_ask, state, first))
             widgets.button("Discard", partial(discard, first))
         if others:
             ui.label(f"Not read yet either: {', '.join(others)}").classes("muted")
@@ -293,7 +293,7 @@ def _sides(state: State, known: list[str]) -> None:
             alike = partial(_changed, state, together.resample, workspace, times[1])
             mark(widgets.button(f"Resample to {slow} s", alike), "one-rate")
     if state.outputs == ["force"] and "pressure" in known and "pressure" not in state.inputs:
-        ui.label("Models of a force are given the pressure, too.").classes("muted")
+        ui.label("Models of a force also use the pressure.").classes("muted")
     rest = [name for name in known if name not in (*state.inputs, *state.outputs)]
 
     def choose(side: str, event: Any) -> None:
@@ -326,7 +326,7 @@ def _recording(state: State, entry: Entry) -> None:
     _part(state, entry, recording)
     _steps(state, entry, recording)
     if notes := dict.fromkeys(recording.notes):
-        with widgets.details("Notes of the reading"):
+        with widgets.details("Import notes"):
             for note in notes:
                 ui.label(said(note)).classes("muted")
 
@@ -352,7 +352,7 @@ def _actions(state: State, entry: Entry) -> None:
     picked = ui.toggle(ROLES, value=entry.role).props("dense no-caps unelevated")
     role = widgets.guarded(lambda e: act(partial(workspace.change, name, role=e.value)))
     mark(picked.props("toggle-color=primary").on_value_change(role), "role")
-    mark(widgets.button("How it is read", lambda: _correct(state, entry), "tune"), "correct")
+    mark(widgets.button("Import settings", lambda: _correct(state, entry), "tune"), "correct")
     widgets.icon_button("edit", "Rename", rename)
     mark(widgets.icon_button("delete_outline", "Remove", remove), "remove")
 

@@ -44,7 +44,7 @@ def build(state: State) -> None:
     """Build the page."""
     with mark(ui.element("div").classes("page"), "page-look"):
         with widgets.row(classes="spread"):
-            text = "What the muscle does, and what the recordings do not show yet."
+            text = "Characterization of the muscle, and data gaps of the recordings."
             widgets.heading("Look", text)
             if state.workspace.names("recordings"):
                 choose = partial(ui.navigate.to, "/models")
@@ -75,11 +75,11 @@ def content(state: State) -> None:
         with ui.element("div").classes("stack"):
             with widgets.card("Recordings"):
                 _recordings(state, used, shown)
-            with widgets.card("What the muscle does" + f": {pair[1]}" * (len(sides.outputs) > 1)):
+            with widgets.card("Characterization" + f": {pair[1]}" * (len(sides.outputs) > 1)):
                 _words(state, runs, sides, pair)
         with ui.element("div").classes("stack"):
             if len(every) > 1:
-                with widgets.card("What moves what"):
+                with widgets.card("Effects of inputs on outputs"):
                     _coupling(state, found, pair)
             with widgets.card():
                 _figure(state, [used[name] for name in shown], sides, pair)
@@ -138,9 +138,8 @@ def _coupling(state: State, found: Coupling, pair: Pair) -> None:
         rows.append([wanted, *cells, f"{100 * max(share, 0):.0f} %"])
     mark(widgets.table(["", *found.inputs, "Explained"], rows), "coupling")
     ui.label(
-        "What each input over its whole range does to an output, by one straight line through all "
-        "inputs. The rest, up to 100 %, is bent, remembers, or takes time. Choose a number to see its "
-        "loop."
+        "Effect of each input over its whole range on an output, by linear regression on all inputs. "
+        "The rest, up to 100 %, is nonlinear, hysteretic or dynamic. Choose a number to see its loop."
     ).classes("muted")
 
 
@@ -164,7 +163,7 @@ def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) ->
 
 
 def _words(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
-    """Show what the muscle does: a few sentences, and all numbers behind a fold-out."""
+    """Show the characterization: a few sentences, and all numbers behind a fold-out."""
     beside = tuple(n for n in (*sides.inputs, *(sides.scheduling or ())) if n != pair[0])
     key = "characterization", state.workspace.digest(), pair, beside
     make = partial(characterize, runs, *pair, beside=beside)
@@ -176,7 +175,7 @@ def _gaps(state: State, sides: Channels, pair: Pair) -> None:
     """Show what the recordings cannot identify."""
     train, test = state.workspace.train_and_test()
     inputs = sides.inputs if len(sides.inputs) > 1 else (pair[0],)
-    none = [Text(["Nothing is missing: the recordings show all that models ask for."])]
+    none = [Text(["The recordings have no data gaps."])]
     key = "gaps", state.workspace.digest(), inputs, sides.outputs
     make = partial(data_gaps, train or test, inputs, sides.outputs, tests=test if train else ())
     with mark(ui.element("div"), "gaps"):
@@ -195,7 +194,7 @@ def _planned(state: State) -> None:
         with mark(ui.element("div").classes("stack"), "planned"):
             ui.label("Planned").classes("subtitle")
             widgets.items([one for one in items if isinstance(one, Text)])
-            with widgets.details("Its steps, and what they tell"):
+            with widgets.details("Its steps, and the gaps they close"):
                 widgets.items([one for one in items if not isinstance(one, Text)])
     with widgets.row():
         text = "Plan another" if made else "Plan the next recording"

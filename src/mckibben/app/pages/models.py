@@ -69,7 +69,7 @@ def build(state: State) -> None:
             with ui.element("div").classes("stack"):
                 closer(state)
         widgets.next_step(
-            "One is good enough? Let it follow a reference.", "Compensate", "/compensate"
+            "Let the inverse of a model follow a reference.", "Compensate", "/compensate"
         )
 
 
@@ -324,9 +324,8 @@ def _parameters(found: ModelDescription) -> None:
 
 
 CHECK = (
-    "Is the model right?",
-    "What it leaves over is tested for what it may have missed: speed, load, creep, hysteresis, lags "
-    "and drift.",
+    "Validate the model",
+    "Residuals are tested for dependence on speed, load, creep, hysteresis, lags and drift.",
 )
 
 

@@ -23,7 +23,7 @@ ICON = "inventory_2"
 def build(state: State) -> None:
     """Build the page."""
     with mark(ui.element("div").classes("page"), "page-takeaway"):
-        widgets.heading("Take away", "What was found, for a paper, a controller or a colleague.")
+        widgets.heading("Take away", "Results as files, for a paper, a controller or a colleague.")
         page(state)
         script(state)
         widgets.next_step("Run it on your rig, then review its log.", "Compensate", "/compensate")

@@ -23,11 +23,11 @@ from mckibben import Block, Recording
 from mckibben.blocks.adaptive import Adaptive, adaptive
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.control import track
-from mckibben.control.drifting import Drift, Drifting
 from mckibben.export.c.emulation import emulate
 from mckibben.measured.sets import sets_in
 from mckibben.registry import load
 from mckibben.rigs import load_rig
+from mckibben.rigs.drifting import Drifting
 from mckibben.signals import decaying_triangle
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ CHANGES: dict[str, dict[str, float]] = {
 
 def drifting(change: str, start: float = 0.0) -> Drifting:
     """Return the rig, changed at a time [s]."""
-    return Drifting(RIG, [Drift(group, f, start) for group, f in CHANGES[change].items()])
+    return Drifting(RIG, CHANGES[change], start)
 
 
 def rms(errors: Array) -> float:

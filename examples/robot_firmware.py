@@ -28,10 +28,10 @@ from matplotlib.figure import Figure
 
 import mckibben
 from mckibben.blocks.adaptive import Adaptive, adaptive
-from mckibben.control.drifting import Drift, Drifting
 from mckibben.export import Serving, state_of
 from mckibben.export.c.emulation import serial_device
 from mckibben.link import Link
+from mckibben.rigs.drifting import Drifting
 from mckibben.signals import random_wave
 from mckibben.stream import FixedRate
 
@@ -49,8 +49,7 @@ WITHIN, PRESSURES = (-20.0, 60.0), (0.0, 6.0)
 def drifting(duration: float) -> Drifting:
     """Return the robot, which begins to drift halfway."""
     rig = mckibben.load_rig(RIG).changed({"sample_time": PERIOD})
-    half = 0.5 * duration
-    return Drifting(rig, [Drift(group, factor, half) for group, factor in CHANGES.items()])
+    return Drifting(rig, CHANGES, start=0.5 * duration)
 
 
 def robot(pipe: Connection, duration: float) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from mckibben import PI, DataError, ModelError
-from mckibben.blocks.bands import Band, Banded
 from mckibben.control import Twin
 from mckibben.rigs import load_rig, rig_names
 
@@ -101,13 +100,9 @@ def test_a_twin_of_ones_own_muscle_is_an_environment() -> None:
 
         return np.array([float(info["error"][0]) for _, _, info in episode(env, act, seed)])
 
-    bare, scattering = Twin(PI.example()), Twin(Banded(PI.example(), Band.example()))
-    check_env(environments.Tracking(plant=scattering, duration=1.0), skip_render_check=True)
-    assert np.abs(errors(bare, 1)[20:]).max() < 1e-6  # once the start is forgotten
-    first, again, other = (errors(scattering, seed) for seed in (1, 1, 2))
-    np.testing.assert_array_equal(first, again)
-    assert not np.array_equal(first, other)
-    assert first.std() > 0.05
+    twin = Twin(PI.example())
+    check_env(environments.Tracking(plant=twin, duration=1.0), skip_render_check=True)
+    assert np.abs(errors(twin, 1)[20:]).max() < 1e-6  # once the start is forgotten
 
 
 def test_a_model_or_its_file_is_a_plant(tmp_path: Path) -> None:

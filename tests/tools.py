@@ -27,7 +27,6 @@ PACKAGES = {
     "octave-cli": "octave",
     "qemu-system-arm": "qemu-system-arm",
     "sha256sum": "coreutils",
-    "x86_64-w64-mingw32-gcc": "gcc-mingw-w64-x86-64-win32",
 }
 """Packages of Debian that bring each of them."""
 

@@ -60,8 +60,8 @@ USES = {
     ),
     "rigs": Use(
         "Virtual rigs and environments",
-        "mckibben: Rig load_rig check_rig; "
-        "mckibben.rigs: rig_names describe rig_from_data_sheet save_rig record; "
+        "mckibben: Rig load_rig; "
+        "mckibben.rigs: rig_names describe save_rig record; "
         "mckibben.environments: Tracking; mckibben.vector_environment: JointTracking",
     ),
     "muscles": Use(

@@ -19,7 +19,7 @@ import pandas as pd
 
 import mckibben
 from mckibben.recording import Recording
-from mckibben.rigs import Rig, rig_from_data_sheet
+from mckibben.rigs import Rig, load_rig
 
 LEVEL_TIME = 4.0
 STEP_TIME = 0.6
@@ -42,15 +42,7 @@ RMSE in per cent of the displacement range.
 
 def rig() -> Rig:
     """Return a rig of the measured muscle, from its data sheet."""
-    return rig_from_data_sheet(
-        name="dmsp-10-250",
-        diameter=10.0,
-        length=250.0,
-        max_pressure=8.0,
-        max_force=630.0,
-        max_contraction=0.25,
-        loop_width=0.16,
-    )
+    return load_rig(Path(__file__).with_name("dmsp-10-250.toml"))
 
 
 def repeated(plant: Rig, pressures: np.ndarray, hold: float, n_mean: int) -> np.ndarray:

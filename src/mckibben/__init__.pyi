@@ -40,7 +40,6 @@ from .files import write as write
 from .recording import Recording as Recording
 from .report import write_report as write_report
 from .rigs import Rig as Rig
-from .rigs import check_rig as check_rig
 from .rigs import load_rig as load_rig
 from .version import __version__ as __version__
 from .workflow import check as check

@@ -98,9 +98,9 @@ class Tracking(gymnasium.Env[Vector, Vector]):
     render_mode : {None, "rgb_array"}
         With the second, `render` draws the episode so far.
     plant : Twin, Block or path, optional
-        A fitted model instead of a rig: itself, its file, or a `mckibben.control.Twin`, where what is no
-        pressure stays as that holds it. With a band it scatters, otherwise in every episode; ``spread``
-        is of rigs alone, and ``settings`` are those of `Twin.changed`.
+        A fitted model instead of a rig: itself, its file, or a `mckibben.control.Twin`, which holds
+        inputs other than pressures. ``spread`` applies to rigs alone, and ``settings`` are those of
+        `Twin.changed`.
 
     Raises
     ------
@@ -135,7 +135,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
                 control_time = max(0.02, chosen.sample_time)
             self._spreading = chosen if spread else None
         else:
-            _require(not spread, "spread", spread, "0 with a plant, which has its own scatter")
+            _require(not spread, "spread", spread, "0 with a plant")
             _require(not load, "load", load, "0 with a plant, and held={'force': ...} to the plant")
             chosen = plant = _twin(plant)
             control_time = chosen.sample_time if control_time is None else control_time
@@ -318,13 +318,15 @@ class Tracking(gymnasium.Env[Vector, Vector]):
 
     def _ideal(self, plant: Rig | Twin, waves: Mapping[str, Array]) -> Array:
         from mckibben.recording import Recording
+        from mckibben.rigs import Rig
 
         channels = dict(waves)
         if self._load:
             n = len(next(iter(waves.values())))
             channels["force"] = np.full(n, self._load)
         given: Recording = Recording(channels, plant.sample_time)
-        return plant.run(given, ideal=True).matrix([plant.outputs[i] for i in self._moves])
+        ran = plant.run(given, ideal=True) if isinstance(plant, Rig) else plant.run(given)
+        return ran.matrix([plant.outputs[i] for i in self._moves])
 
 
 def register() -> None:

@@ -6,6 +6,7 @@ makes its flags from them, and forms their controls.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -109,10 +110,12 @@ def setting(text: str) -> tuple[str, Any]:
     >>> setting("n-operators=4"), setting("initial=rest")
     (('n_operators', 4), ('initial', 'rest'))
     """
-    from mckibben.estimators.core.settings import setting_value
-
     name, value = pair(text)
-    return name.replace("-", "_"), setting_value(value)
+    try:
+        found = json.loads(value)
+    except (ValueError, RecursionError):
+        found = None if value.lower() == "none" else value
+    return name.replace("-", "_"), tuple(found) if isinstance(found, list) else found
 
 
 def number(text: str) -> tuple[str, float]:
@@ -368,7 +371,7 @@ class TrackOptions:
     rig: Annotated[Any, Option("Virtual rig to test it on; see rig list.", "NAME|FILE")] = None
     plant: Annotated[
         Path | Any | None,
-        Option("Model of your own muscle to test it on (JSON); a band adds scatter.", "MODEL"),
+        Option("Model of your own muscle to test it on (JSON).", "MODEL"),
     ] = None
     limits: Annotated[
         Mapping[str, tuple[float | None, ...]],
@@ -478,14 +481,6 @@ class PlanOptions:
     """Options of `plan`: driven channels, duration and limits."""
 
     rig: Annotated[Any, Option("Rig that is driven: channels and limits.", "NAME|FILE")] = None
-    muscle: Annotated[
-        str | None, Option("Without recordings: a muscle, or a data sheet.", "NAME|FILE")
-    ] = None
-    model: Annotated[
-        Any,
-        Option("Model whose standard errors are planned: its name or file (.json).",
-               "NAME|FILE"),
-    ] = None  # fmt: skip
     minutes: Annotated[float, Option("How long to record.", "X")] = 3.0
     limits: Annotated[
         Mapping[str, tuple[float | None, ...]],
@@ -545,11 +540,7 @@ class MJCFOptions:
     """Options of `export` to MJCF."""
 
     rest_length: Annotated[
-        float | None, Option("Distance of the sites where the displacement is 0.", "MM")
-    ] = None
-    sheet: Annotated[
-        str | None,
-        Option("Muscle of the library or data sheet (.toml) with the rest length.", "NAME|FILE"),
+        float | None, Option("Distance of the sites where the displacement is 0; needed.", "MM")
     ] = None
     site_from: Annotated[
         str | None,
@@ -557,8 +548,8 @@ class MJCFOptions:
     ] = None
     site_to: Annotated[str | None, Option("Site that it pulls.", "SITE")] = None
     example: Annotated[
-        Literal["hanging", "joint", "arm"],
-        Option("Without sites: a load on a muscle, a joint between two, or a plate on three."),
+        Literal["hanging", "joint"],
+        Option("Without sites: a load on a muscle, or a joint between two."),
     ] = "hanging"
     lag: Annotated[float, Option("Time constant from command to pressure.", "SECONDS")] = 0.0
     name: Annotated[str | None, Option("Name of the actuator. Default: of the file.", "NAME")] = (
@@ -573,8 +564,4 @@ class MJCFOptions:
 class FMUOptions(ExportOptions):
     """Options of `export` to an FMU."""
 
-    platforms: Annotated[
-        str | tuple[str, ...],
-        Option("linux, windows, macos; all that can be built here, or none.", "all|none|NAME,...",
-               parse=names),
-    ] = "all"  # fmt: skip
+    library: Annotated[bool, Option("Include the library for this machine.")] = True

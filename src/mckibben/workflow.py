@@ -117,6 +117,10 @@ def fit(
         runs, checks = (_residuals(base, estimator, some) for some in (runs, checks))
     used = estimator.data(runs)
     check_shared({"fit": runs}, *([one.name for one in of] for of in (used.inputs, used.outputs)))
+    channels = [one.name for one in (*used.inputs, *used.outputs, *used.scheduled)]
+    if chosen.target is not None and not any(name.startswith("force") for name in channels):
+        problem = f"a model for {chosen.target} is fitted to a measured force"
+        raise DataError(problem, channel="force", remedy="give recordings with one")
     with telling(progress, f"fitting {model}") as tell:
         estimator.fit(runs, validation=checks, progress=tell)
     price = None
@@ -330,7 +334,7 @@ def track(
     from mckibben.control import track as close
     from mckibben.control.identified import beyond_known
     from mckibben.control.roles import asked, offered
-    from mckibben.control.suiting import doubts_of_feedback
+    from mckibben.control.suiting import caveats
     from mckibben.control.twin import COMMAND
     from mckibben.files import write
 
@@ -383,7 +387,7 @@ def track(
     notes = (
         *beyond_known(block, wanted),
         *without.notes,
-        *doubts_of_feedback(chosen.controller, plant),
+        *caveats(block, plant, chosen.controller),
     )
     plain = chosen.controller, chosen.rig is not None, chosen.seed
     return Tracking(tracked, without, plant, *plain, law, wanted, notes, file, controller_file)
@@ -527,10 +531,7 @@ def plan(
 
     chosen, reading = _chosen(PlanOptions, options, reading, given)
     arguments = {one.name: getattr(chosen, one.name) for one in fields(chosen)}
-    read = _paths(data, chosen.rig, chosen.muscle, chosen.model)
-    file = _claim(out, read, force, recording=True)
-    if str(chosen.model).endswith(".json"):
-        arguments["model"] = saved(chosen.model)
+    file = _claim(out, _paths(data, chosen.rig), force, recording=True)
     found = make(read_files(data, None, reading), **arguments)
     if file is not None:
         write(found.recording, file)
@@ -604,8 +605,7 @@ def export(
             str(emulate(block, sample_time=chosen.sample_time)) if chosen.emulate else None,
         ]
     elif target == "fmu":
-        named = {"all": None, "none": ()}.get(chosen.platforms, chosen.platforms)
-        export_fmu(block, out, name=name, platforms=named, **common)
+        export_fmu(block, out, name=name, library=chosen.library, **common)
     else:
         name = chosen.name or name.lower()
         export_ros2(block, out, name=name, **common)
@@ -616,13 +616,13 @@ def _export_mjcf(model: Any, out: Path, chosen: MJCFOptions) -> Exported:
     """Write a muscle as MJCF."""
     from mckibben.export.mjcf import Sites, export_mjcf
     from mckibben.export.naming import name_from
-    from mckibben.muscles import prior_of
 
-    rest, sheet, ends = chosen.rest_length, chosen.sheet, (chosen.site_from, chosen.site_to)
-    if (rest is None) == (sheet is None):
-        problem = "of rest length and data sheet, one is needed"
-        remedy = "give `rest_length` or `sheet`"
-        raise ModelError(problem, parameter="rest_length", remedy=remedy)
+    ends = chosen.site_from, chosen.site_to
+    if chosen.rest_length is None:
+        raise ModelError("it is needed", parameter="rest_length", remedy="give it, in mm")
+    if None not in ends and chosen.example != "hanging":
+        problem = "a muscle between sites of your own model has no example"
+        raise ModelError(problem, parameter="example", remedy="leave it out, or the sites")
     if sum(end is None for end in ends) == 1:
         remedy = "give both, or neither"
         raise ModelError("one site is missing", parameter="site_from", remedy=remedy)
@@ -630,7 +630,7 @@ def _export_mjcf(model: Any, out: Path, chosen: MJCFOptions) -> Exported:
     export_mjcf(
         model,
         out,
-        rest_length=prior_of(str(sheet)).sheet.rest_length_mm if rest is None else rest,
+        rest_length=chosen.rest_length,
         name=name,
         sites=None if None in ends else Sites(*map(str, ends)),
         example=chosen.example,

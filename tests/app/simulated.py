@@ -29,7 +29,7 @@ def with_example(folder: Path, *models: str) -> Workspace:
         workspace.add(path.name, role=role)
     for model in models:
         found = workflow.fit(model, workspace.with_role("train"))
-        row = {"status": "ok", "model": model, "data": workspace.digest(), "settings": {}}
+        row = {"status": "ok", "model": model, "data": workspace.digest()}
         workspace.save_model(model, found.model, row)
     return workspace
 

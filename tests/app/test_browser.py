@@ -81,7 +81,7 @@ def test_a_file_that_is_not_understood_is_corrected(
         upload(page, "another.csv", table(gap=True))
         page.get_by_text("Not read yet either: another.csv").wait_for(timeout=SLOW)
         gone(page, "importing")
-        page.get_by_text("How is it read?").click()
+        page.get_by_role("button", name="Import settings").first.click()
         dialog = seen(page, "importing")
         assert not seen(page, "import").is_enabled()
         dialog.locator(".q-select").filter(has_text="Gaps").click()

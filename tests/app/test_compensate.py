@@ -151,9 +151,6 @@ def test_a_motion_is_followed_in_chromium_and_the_commands_taken(
         seen(page, "nothing-yet")
         assert page.evaluate("document.documentElement.scrollHeight") <= 1350
         page.get_by_test_id("field-other").fill("15")
-        seen(page, "edit-points").click()
-        page.get_by_label("displacement of point 2", exact=True).fill("6.5")
-        seen(page, "use-points").click()
         seen(page, "run").click()
         runs = seen(page, "runs").locator("tbody tr")
         page.wait_for_function(

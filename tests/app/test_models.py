@@ -10,7 +10,6 @@ import pytest
 from mckibben.app import modelling
 from mckibben.app.modelling import comparable, offered, sides_of
 from mckibben.app.workspace import Workspace
-from mckibben.blocks.bands import Banded
 from mckibben.errors import DataError
 from tests.app.browsing import NARROW, SLOW, seen, visited, workbench
 from tests.app.simulated import with_example
@@ -46,18 +45,16 @@ def test_jobs_write_results_that_compare(workspace: Workspace) -> None:
     sides = sides_of(workspace, ["pressure"], ["displacement"])
     modelling.fit(workspace, silent, model="pi", **GIVEN)
     modelling.fit(workspace, silent, model="gpi", **GIVEN)
-    modelling.fit(workspace, silent, model="gpi", settings={"n_operators": 3}, **GIVEN)
     rows = comparable(workspace, sides)
-    assert {row["name"] for row in rows} == {"pi", "gpi", "gpi-2"}
+    assert {row["name"] for row in rows} == {"pi", "gpi"}
     errors = [row["validation_rmse"] for row in rows]
     assert errors == sorted(errors)
     assert errors[-1] < rows[0]["constant"]["validation_rmse"]
     assert modelling.against(rows) == ""
     modelling.fit(workspace, silent, model="gpi", **GIVEN)  # takes the place of the first
-    assert len(comparable(workspace, sides)) == 3
+    assert len(comparable(workspace, sides)) == 2
 
     modelling.check(workspace, silent, name="pi")
-    modelling.calibrate(workspace, silent, name="pi")
     row = next(row for row in comparable(workspace, sides) if row["name"] == "pi")
     assert row["check"]["on"] == "test"
     assert {one.kind for one in modelling.restored(row["check"]) if one} >= {
@@ -65,7 +62,6 @@ def test_jobs_write_results_that_compare(workspace: Workspace) -> None:
         "table",
         "figure",
     }
-    assert isinstance(workspace.model("pi", "banded"), Banded)
     modelling.fit(workspace, silent, model="pi", **GIVEN)
     assert "check" not in (workspace.read("results", "pi") or {})
 
@@ -73,8 +69,6 @@ def test_jobs_write_results_that_compare(workspace: Workspace) -> None:
     assert next(iter(modelling.parts(workspace, sides))) == test
     workspace.change(test, role="unused")
     assert not any(row["current"] for row in comparable(workspace, sides))
-    with pytest.raises(DataError):
-        modelling.calibrate(workspace, silent, name="pi")
     (part,) = modelling.parts(workspace, sides).values()
     assert part[1] is not None  # its last part is held out
     assert comparable(workspace, sides_of(workspace, ["displacement"], ["pressure"])) == []
@@ -106,16 +100,12 @@ def test_models_are_chosen_fitted_and_seen_closer_in_two_windows(
         page.get_by_text("Fit 0 models").wait_for(timeout=SLOW)
         for model in ("pi", "gpi", "mpi"):
             seen(page, f"model-{model}").click()
-        seen(page, "settings-gpi").click()
-        seen(page, "set-n_operators").fill("4")
-        page.keyboard.press("Tab")
         seen(page, "fit").click()
         for one in (page, other):
             board = seen(one, "leaderboard")
             board.locator("tr.choosable").nth(2).wait_for(timeout=SLOW)
         names = [row["name"] for row in workspace.results()]
         assert {*names} == {"pi", "gpi", "mpi"}
-        assert (workspace.read("results", "gpi") or {})["settings"] == {"n_operators": 4}
         page.locator("tr.choosable").nth(1).click()
         for one in (page, other):
             one.get_by_test_id("closer").get_by_text(f"· {names[1]}").wait_for(timeout=SLOW)
@@ -127,10 +117,6 @@ def test_models_are_chosen_fitted_and_seen_closer_in_two_windows(
             seen(page, f"closer-{tab}")
         page.get_by_test_id("tab-parameters").click()
         seen(page, "parameters")
-        page.get_by_test_id("tab-band").click()
-        if names[2] not in workspace.names("banded"):
-            seen(page, "calibrate").click()
-        seen(page, "closer-band")
         page.get_by_test_id("tab-check").click()
         seen(page, "check").click()
         seen(other, "verdict")

@@ -35,7 +35,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     return with_example(tmp_path_factory.mktemp("bench"), "pi")
 
 
-def test_code_figures_and_recordings_are_written(workspace: Workspace) -> None:
+def test_code_and_recordings_are_written(workspace: Workspace) -> None:
     def take(work: Any, file: str, **options: Any) -> None:
         work(workspace, silent, file=file, options=options, of=OF)
 
@@ -46,8 +46,6 @@ def test_code_figures_and_recordings_are_written(workspace: Workspace) -> None:
     MUSCLE.save(workspace.path("models", "muscle.json"))
     of = OF | {"model": "muscle", "use": "model"}
     taking.code(workspace, silent, file="m.xml", options={"rest_length": 200.0}, of=of)
-    for kind in ("loops", "time"):
-        take(taking.figure, f"{kind}.svg", figure=kind)
     workspace.path("models", "muscle.json").unlink()
     folder = workspace.folder / "takeaway"
     assert '<general name="m"' in (folder / "m.xml").read_text()
@@ -56,7 +54,6 @@ def test_code_figures_and_recordings_are_written(workspace: Workspace) -> None:
     assert any(name.endswith("package.xml") for name in held["b-ros2.zip"])
     assert {name.partition("/")[0] for name in held["r.zip"]} == {"train", "test"}
     assert [c.name for c in mckibben.load(folder / "c.json").outputs] == ["pressure"]
-    assert all(b"</svg>" in (folder / f"{kind}.svg").read_bytes() for kind in ("loops", "time"))
 
 
 def test_the_script_repeats_the_work(workspace: Workspace) -> None:

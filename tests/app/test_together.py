@@ -14,27 +14,6 @@ from mckibben.app.state import State
 from mckibben.app.workspace import Workspace
 
 
-def test_files_of_single_signals_become_one_recording(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
-    given = {
-        "pressure": np.linspace(0.0, 49.0, 50),
-        "displacement": np.linspace(0.0, 49.0, 50) ** 2,
-    }
-    for run in ("a", "b"):
-        for name, values in given.items():
-            one = Recording({name: values}, 0.1)
-            workspace.add_recording(one, name=f"{name}-{run}", role="test")
-    assert len(together.pairs(workspace)) == 2
-    joined = together.join(workspace)
-    assert [one.name for one in workspace.entries()] == sorted(joined)
-    for name in joined:
-        found = workspace.recording(name)
-        assert workspace.entry(name).role == "test"
-        for channel, values in given.items():
-            assert found[channel] == pytest.approx(values)
-    assert together.pairs(workspace) == []
-
-
 def test_other_rates_are_brought_to_one(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path)
     for step in (0.1, 0.11):

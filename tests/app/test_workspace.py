@@ -1,8 +1,7 @@
-"""The folder: recordings as raw files with steps, and what earlier versions wrote."""
+"""The folder: recordings as raw files with steps."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +10,6 @@ import pytest
 from mckibben.app.steps import LARGEST, Reading, Step
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
-from mckibben.files import write
-from mckibben.recording import Recording
 
 N = 200
 
@@ -116,37 +113,6 @@ class TestRecordings:
         (folder / "out.json").write_text('{"role": "train", "upload": "../../secret.csv"}')
         assert list(workspace.used()) == [name]
         assert workspace.channels() == ["pressure", "displacement"]
-
-    def test_a_folder_of_an_earlier_version_opens(self, workspace: Workspace) -> None:
-        samples = {"pressure": np.linspace(1, 3, N), "displacement": np.linspace(0, 20, N)}
-        read = Recording(samples, 0.02, {"pressure": "bar", "displacement": "mm"})
-        folder = workspace.folder
-        write(read, folder / "recordings" / "old.csv")
-        write(read.slice(10, 60), folder / "recordings" / "old.2.csv")
-        described = {
-            "role": "test",
-            "origin": "file old.csv",
-            "call": "mckibben.read('/elsewhere/uploads/old.csv')",
-            "file": "old.2.csv",
-            "base": "old.csv",
-            "notes": ["an earlier note"],
-            "upload": "old.csv",
-            "part": 0,
-            "reading": {"calibration": {"pressure": [2.0, 0.5]}},
-            "steps": [{"do": "slice", "start": 10, "stop": 60}],
-        }
-        (folder / "recordings" / "old.json").write_text(json.dumps(described))
-        plain = described | {"file": "old.csv", "base": "", "upload": "", "steps": []}
-        (folder / "recordings" / "plain.json").write_text(json.dumps(plain))
-        (folder / "history" / "recordings.json").write_text('{"done": [], "undone": []}')
-        found = workspace.recording("old")
-        part = read.slice(10, 60)
-        assert all(np.array_equal(found[one], part[one]) for one in part.channels)
-        assert (found.start_time, found.units) == (part.start_time, part.units)
-        assert workspace.entry("old").role == "test"
-        assert len(workspace.recording("plain")) == N
-        workspace.undo("old")
-        assert len(workspace.recording("old")) == N
 
 
 class TestFiles:

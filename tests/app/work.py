@@ -41,5 +41,5 @@ def fit(workspace: Workspace, tell: Tell, *, name: str, model: str) -> str:
     (row,) = board.rows
     assert row.block is not None
     sides = {"input": board.input, "output": board.output, "unit": board.unit, "data": data}
-    workspace.save_model(name, row.block, row.to_dict() | sides, row.banded)
+    workspace.save_model(name, row.block, row.to_dict() | sides)
     return "fitted"

@@ -54,7 +54,7 @@ CALLS: dict[str, Call] = {
     "calibrate": call_of(f"{MODEL} {RUN} two.csv -o out.json", MODEL, RUN),
     "invert": call_of(f"{MODEL} --predictive -o out.json", MODEL),
     "track": call_of(f"{INVERSE} --rig {RIG} --reference {RUN} -o out.csv", INVERSE, RUN, RIG),
-    "plan": call_of(f"{RUN} --model pi.json --minutes 0.5 -o out.csv", RUN, "pi.json"),
+    "plan": call_of(f"{RUN} --minutes 0.5 -o out.csv", RUN),
     "plot": call_of(f"{RUN} --model {MODEL} -o out.png", RUN, MODEL),
     "reproduce": call_of("multistate --quick --jobs 1"),
     "info": call_of(RUN),
@@ -64,17 +64,13 @@ CALLS: dict[str, Call] = {
     "link": call_of("absent-port"),
     "example": call_of("out", own="decaying-triangle.csv"),
     "export c": call_of(f"{MODEL} -o out", MODEL, own="README.md"),
-    "export fmu": call_of(f"{MODEL} --platforms none -o out.fmu", MODEL),
+    "export fmu": call_of(f"{MODEL} --no-library -o out.fmu", MODEL),
     "export mjcf": call_of("muscle.json --rest-length 200 -o out.xml", "muscle.json"),
     "export ros2": call_of(f"{INVERSE} -o out", INVERSE, own="README.md"),
     "rig list": call_of(""),
     "rig show": call_of("rail"),
     "rig run": call_of(f"{RIG} --signal constant:value=1 --duration 1 -o out.csv", RIG),
     "rig record": call_of("field-models --jobs 1 -o out", own="decaying-triangle.csv"),
-    "rig new": call_of(
-        "--diameter 20 --length 200 --max-pressure 6 --max-force 1500 --max-contraction 0.25"
-        " out.toml"
-    ),
 }
 
 

@@ -45,7 +45,7 @@ def folder(stock: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
 
 
 FIT = "fit pi run.csv -o out.json"
-PLAN = "plan run.csv --model pi.json -o out.csv"
+PLAN = "plan run.csv -o out.csv"
 RIG = "rig run rail -o out.csv"
 
 BAD = [
@@ -95,10 +95,8 @@ BAD = [
     # Plans
     (f"{PLAN} --limits pressure=4:1", "pressure"),
     (f"{PLAN} --limits pressure", "CHANNEL=LOW:HIGH"),
-    (f"{PLAN} --limits force=0:5", "force"),
+    (f"{PLAN} --limits torque=0:5", "torque"),
     (f"{PLAN} --minutes 0.01", "--minutes"),
-    (f"{PLAN} --rig rail", "voltage"),
-    (f"{PLAN} --muscle rail", "--muscle"),
     # Rigs
     ("track nowhere.json --rig soft-arm --reference run.csv", "nowhere.json"),
     ("track inverse.json --rig soft-arm --reference run.csv", "'soft-arm'"),

@@ -144,6 +144,6 @@ def bare(source: str) -> str:
 def test_hostile_names_make_a_valid_unit(cli: Cli, tmp_path: Path) -> None:
     validation = pytest.importorskip("fmpy.validation")
     out, model = tmp_path / "out.fmu", hostile(" ".join(HOSTILE), tmp_path)
-    options = ["--platforms", "none", "--name", "muscle"]
+    options = ["--no-library", "--name", "muscle"]
     done(cli, "export", "fmu", model, "-o", out, *options)
     assert validation.validate_fmu(str(out)) == []

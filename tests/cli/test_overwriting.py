@@ -85,10 +85,6 @@ def test_a_file_of_somebody_s_needs_force_and_ours_does_not(
     done = cli(*words, "--force")
     assert done.code == 0, done.err
     assert out.read_bytes() != b"mine\n"
-    if command == "rig new":
-        assert cli(*words).code == 2  # whoever wrote it
-        assert cli(*words, "--force").code == 0
-        return
     assert cli(*words).code == 0
     if out.suffix not in (".json", ".png"):  # what is edited is still a model, or a figure
         changed = out.read_bytes()[:-1]
@@ -110,7 +106,7 @@ def test_a_file_of_somebody_s_in_a_folder_stays(cli: Cli, folder: Path, command:
     assert left == {CALLS[command].own: b"mine"}
 
 
-@pytest.mark.parametrize("command", [name for name in FILES if name != "rig new"])
+@pytest.mark.parametrize("command", FILES)
 def test_a_full_disk_is_reported_with_the_file_and_costs_nothing(
     cli: Cli, folder: Path, command: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

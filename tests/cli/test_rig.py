@@ -5,9 +5,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
-
-from mckibben import read
 from mckibben.rigs import load_rig
 from tests.cli.conftest import Cli
 
@@ -50,14 +47,3 @@ def test_record_writes_runs_and_what_each_is_for(cli: Cli, tmp_path: Path) -> No
     assert other.code == 2
     assert "protocol.json" in other.err
     assert first.stat().st_mtime_ns == stamp
-
-
-def test_new_makes_a_rig_from_a_data_sheet(cli: Cli, tmp_path: Path) -> None:
-    file = tmp_path / "my muscle.toml"
-    sheet = ["--diameter", 20, "--length", 200, "--max-pressure", 6, "--max-force", 1500]
-    result = cli("rig", "new", file, *sheet, "--max-contraction", 0.25)
-    assert result.code == 0, result.err
-    assert load_rig(file).name == "my-muscle"
-    out = tmp_path / "run.csv"
-    assert cli("rig", "run", file, "--signal", "sine:period=2", "-o", out).code == 0
-    assert np.ptp(read(out)[0]["displacement"]) > 30

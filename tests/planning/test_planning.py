@@ -1,4 +1,4 @@
-"""Plans keep to their limits, close the data gaps, and tell standard errors as large as they are."""
+"""Plans stay within limits, close the data gaps, and start and end at rest."""
 
 from __future__ import annotations
 
@@ -74,42 +74,9 @@ def test_a_plan_closes_every_gap_that_motion_can(plant: str) -> None:
     )
 
 
-def test_standard_errors_are_the_spread_of_estimates() -> None:
-    """Least squares of a model of its own motion spreads as its slopes say (Gauss-Markov)."""
-    block, noise = PI.example(), 0.05
-    recorded = run_of(block, slow_sine(8.0), 0, noise)
-    told = plan(recorded, model=block, minutes=1.0, limits=GIVEN, seed=1)
-    values, columns = block.pack(), []
-    runs = (recorded.select(["pressure"]), told.recording)
-    for place in range(values.size):
-        moved = values.copy()
-        moved[place] += (change := 1e-6 * abs(values[place]))
-        other = block.unpack(moved)
-        pairs = [(other.simulate(r), block.simulate(r)) for r in runs]
-        columns.append(np.concatenate([a["displacement"] - b["displacement"] for a, b in pairs]))
-        columns[-1] /= change or 1.0
-    slopes = np.column_stack(columns)
-    free = np.abs(slopes).max(axis=0) > 0
-    rng = np.random.default_rng(0)
-    away = noise * rng.standard_normal((len(slopes), 300))
-    spread = np.linalg.lstsq(slopes[:, free], away, rcond=None)[0].std(axis=1)
-    relative = spread / np.abs(values[free])
-    said = [one.after for one in told.parameters]
-    for own, wanted in zip(said, relative, strict=True):
-        assert own == pytest.approx(wanted, rel=0.25)
-
-
-def test_an_exact_fit_has_no_errors(play: Block) -> None:
-    found = plan(run_of(play, slow_sine(8.0), 0, 0.0), model=play, minutes=0.75, limits=GIVEN)
-    assert all((one.now or 0.0) < 1e-6 for one in found.parameters)
-
-
-@pytest.mark.parametrize("given", [{"rig": "mas20-hanging"}, {"muscle": "dmsp20-150"}])
-def test_without_recordings_errors_are_those_of_a_likely_muscle(given: dict[str, Any]) -> None:
-    found = plan(**given, minutes=2.0)
+def test_a_plan_without_recordings_has_all_kinds_of_motion() -> None:
+    found = plan(rig="mas20-hanging", minutes=2.0)
     assert {step.what for step in found.steps} >= {"random", "repeats", "holds"}
-    assert any(one.after is not None for one in found.parameters)
-    assert all(one.now is None for one in found.parameters)
 
 
 def test_limits_are_read_and_narrowed() -> None:
@@ -124,8 +91,7 @@ def test_limits_are_read_and_narrowed() -> None:
 def test_what_goes_beyond_recordings_is_told(play: Block) -> None:
     recorded = run_of(play, slow_sine(8.0, 0.5, 2.0), 0)
     wide, narrow = (
-        plan(recorded, model=play, minutes=0.75, limits={"pressure": (0.5, high)})
-        for high in (4.0, 2.0)
+        plan(recorded, minutes=0.75, limits={"pressure": (0.5, high)}) for high in (4.0, 2.0)
     )
     assert (wide.extrapolated, narrow.extrapolated) == (("pressure",), ())
     assert len(plan_sentences(wide)) == len(plan_sentences(narrow)) + 1
@@ -142,13 +108,12 @@ def test_what_goes_beyond_recordings_is_told(play: Block) -> None:
         ({"minutes": 0.01}, "minutes"),
         ({"minutes": float("nan")}, "nan"),
         ({"rig": "rail"}, "voltage"),
-        ({"muscle": "rail"}, "muscle"),
         ({"sample_time": None}, "rate"),
     ],
 )
 def test_the_impossible_is_refused(play: Block, how: dict[str, Any], said: str) -> None:
     recorded = run_of(play, slow_sine(8.0), 0)
-    given: dict[str, Any] = {"minutes": 1.0, "model": play} | how
+    given: dict[str, Any] = {"minutes": 1.0} | how
     if "sample_time" in given:
         recorded = replace(recorded, sample_time=given.pop("sample_time"))
     with pytest.raises((DataError, ModelError), match=said):

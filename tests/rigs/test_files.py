@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from mckibben import DataError
-from mckibben.rigs import describe, load_rig, rig_from_data_sheet, save_rig
-from mckibben.rigs.data_sheet import _loop_width
+from mckibben.rigs import describe, load_rig, save_rig
 from mckibben.system.ordinary import DESCRIPTION
 
 GOOD = describe(load_rig("mas20-hanging"))
@@ -80,35 +79,3 @@ def test_names_of_no_rig_are_refused(tmp_path: Path) -> None:
             load_rig(wrong)
     with pytest.raises(DataError, match=r"\.toml"):
         save_rig(load_rig("rail"), tmp_path / "rail.json")
-
-
-SHEET = {
-    "diameter": 20.0,
-    "length": 300.0,
-    "max_pressure": 6.0,
-    "max_force": 1500.0,
-    "max_contraction": 0.25,
-}
-
-
-def test_a_data_sheet_makes_a_rig_with_its_numbers() -> None:
-    rig = rig_from_data_sheet(name="dmsp-20", payload=5.0, loop_width=0.2, **SHEET)
-    assert _loop_width(rig) == pytest.approx(0.2, abs=0.005)
-    muscle = rig.muscle.record()[0]
-    at_rest = 0.1 * 6.0 * muscle["area"] * (muscle["a"] - muscle["b"])
-    assert at_rest == pytest.approx(1500.0)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"diameter": -1.0},
-        {"max_force": 20.0},
-        {"max_contraction": 0.5},
-        {"loop_width": 0.9},
-        {"length": float("nan")},
-    ],
-)
-def test_numbers_that_no_muscle_has_are_refused(change: dict[str, float]) -> None:
-    with pytest.raises(DataError):
-        rig_from_data_sheet(name="mine", **(SHEET | change))

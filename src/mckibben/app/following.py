@@ -1,7 +1,7 @@
-"""What models of a folder can be used as, the motions they are asked for, and the jobs that try them.
+"""Uses of models, desired motions, and the jobs that run loops and review logs.
 
-A motion is points of time and value for every channel that a compensator is asked for. What loops and
-reviews of logs gave is in ``runs`` and ``reviews``: numbers as JSON, samples as CSV beside them.
+A motion is points of time and value for every reference channel. Results are in ``runs`` and
+``reviews``: numbers as JSON, samples as CSV.
 """
 
 from __future__ import annotations
@@ -42,7 +42,6 @@ KINDS = {
 
 USES = {
     "model": "The model itself, as fitted",
-    "banded": "The model with its band",
     **KINDS,
     "force": "Its estimate of force",
 }
@@ -64,7 +63,7 @@ DRAWN = 2000
 """Most points of a curve of a review."""
 
 
-# -- what a model is used as ------------------------------------------------------------------------
+# -- uses of a model ------------------------------------------------------------------------
 
 
 def made(workspace: Workspace, name: str, use: str, settings: Mapping[str, Any]) -> Block:
@@ -72,8 +71,8 @@ def made(workspace: Workspace, name: str, use: str, settings: Mapping[str, Any])
     from mckibben.blocks.inverse import drives
     from mckibben.workflow import invert
 
-    if use in ("model", "banded"):
-        return workspace.model(name, "models" if use == "model" else "banded")
+    if use == "model":
+        return workspace.model(name)
     block, given = workspace.model(name), dict(settings)
     if use == "force":
         given = {"wanted": "force"}
@@ -104,10 +103,7 @@ def uses(workspace: Workspace, name: str) -> dict[str, str]:
             return bool(made(workspace, name, use, {}))
         return use == "model"
 
-    tried = [use for use in USES if use != "banded"]
-    known = {*of_model(workspace, name, "uses", lambda: [*filter(able, tried)])}
-    if workspace.path("banded", f"{name}.json").is_file():
-        known.add("banded")
+    known = of_model(workspace, name, "uses", lambda: [*filter(able, USES)])
     return {use: words for use, words in USES.items() if use in known}
 
 
@@ -139,7 +135,7 @@ def asked_for(workspace: Workspace, name: str) -> tuple[dict[str, Channel], dict
     return channels, held
 
 
-# -- what the recordings say of a motion --------------------------------------------------------------
+# -- ranges and pace of the recordings --------------------------------------------------------------
 
 
 def pace(workspace: Workspace, name: str) -> tuple[float, float]:
@@ -296,7 +292,7 @@ def read_run(workspace: Workspace, file: str) -> Recording:
 
 
 def plant_of(workspace: Workspace, plant: str) -> Any:
-    """Return ``rig NAME``, or ``model NAME`` with its band, if any; unknown limits were recorded."""
+    """Return ``rig NAME``, or ``model NAME``; unknown limits are those recorded."""
     from mckibben.control import Twin
     from mckibben.control.identified import known_ranges
     from mckibben.rigs import load_rig
@@ -304,8 +300,7 @@ def plant_of(workspace: Workspace, plant: str) -> Any:
     kind, _, name = plant.partition(" ")
     if kind == "rig":
         return load_rig(name)
-    banded = workspace.path("banded", f"{name}.json").is_file()
-    model, limits = workspace.model(name, "banded" if banded else "models"), {}
+    model, limits = workspace.model(name), {}
     for channel in {c.name for c in model.inputs}.difference(known_ranges(model)):
         values = recorded(workspace, channel)
         if np.ptp(values):
@@ -315,6 +310,7 @@ def plant_of(workspace: Workspace, plant: str) -> Any:
 
 def plants(workspace: Workspace, name: str) -> dict[str, str]:
     """Return what a compensator can be tried on, in words; its own model comes last."""
+    from mckibben.report.columns import diverged
     from mckibben.rigs import rig_names
 
     block = workspace.model(name)
@@ -328,10 +324,11 @@ def plants(workspace: Workspace, name: str) -> dict[str, str]:
             return inputs <= {*there.inputs} and outputs <= {*there.outputs} and not driven
         return False
 
-    models = workspace.models()
+    unstable = {row["name"] for row in workspace.results() if diverged(row)}
+    models = [one for one in workspace.models() if one not in unstable]
     found = {f"model {x}": f"{x} (another model)" for x in models if x != name}
     found |= {f"rig {rig}": f"{rig} (virtual rig, another muscle)" for rig in rig_names()}
-    found[f"model {name}"] = f"{name} (itself: proves nothing)"
+    found[f"model {name}"] = f"{name} (the same model: exact by construction)"
     key = f"plants {models} {workspace.channels()}"
     fitting = of_model(workspace, name, key, lambda: [*filter(fits, found)])
     return {plant: found[plant] for plant in fitting}

@@ -13,13 +13,8 @@ from mckibben.errors import DataError
 from mckibben.options import Option, parsed
 
 
-def fields(
-    kind: type, names: Iterable[str], values: dict[str, Any], words: Mapping[str, str] | None = None
-) -> None:
-    """Make controls of some fields of a dataclass, bound to values of their names; see `given`.
-
-    ``words`` say what can be chosen.
-    """
+def fields(kind: type, names: Iterable[str], values: dict[str, Any]) -> None:
+    """Make controls of some fields of a dataclass, bound to values of their names; see `given`."""
     hints, defaults = get_type_hints(kind, include_extras=True), kind()
     for name in names:
         of, option = _option(hints[name])
@@ -30,9 +25,7 @@ def fields(
         if of is bool:
             made: Any = ui.switch(option.help.rstrip("."))
         elif get_origin(of) is Literal:
-            made = ui.select(
-                {one: (words or {}).get(one, one) for one in get_args(of)}, label=label
-            )
+            made = ui.select(list(get_args(of)), label=label)
         elif {int, float} & {of, *get_args(of)} and not option.parse:
             made = ui.number(label)
         else:

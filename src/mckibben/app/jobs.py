@@ -78,8 +78,6 @@ class Jobs:
         for name in workspace.names("jobs"):
             with suppress(ValidationError):
                 job = Job.model_validate((workspace.read("jobs", name) or {}) | {"name": name})
-                before = (job.given.get(key) for key in ("title", "name"))  # of earlier versions
-                job.title = next(filter(None, [job.title, *before]), job.kind)
                 if job.active:
                     self._now(job, INTERRUPTED, "the workbench was closed before it was done")
                 self.jobs[name] = job

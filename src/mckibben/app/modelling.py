@@ -1,4 +1,4 @@
-"""What is modelled, the models on offer for it, and the jobs that fit, check, calibrate and plan."""
+"""What is modelled, the models on offer for it, and the jobs that fit, check and plan."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from mckibben.comparison.choosing import recommended
 from mckibben.comparison.planning import objections, plan_of
 from mckibben.comparison.ranking import ranked
 from mckibben.comparison.splits import split_of, tested_from
-from mckibben.diagnosis.bands import calibration
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.catalogue import Need, declared, full_name, needs
 from mckibben.estimators.core.data import training_data
@@ -150,7 +149,6 @@ def fit(
     inputs: list[str],
     outputs: list[str],
     load: str = "",
-    settings: Json | None = None,
     allow_shared: bool = False,
     seed: int = 0,
 ) -> str:
@@ -159,8 +157,7 @@ def fit(
     plan = plan_of(
         *(train, test),
         inputs=inputs, outputs=outputs, load=load or None, models=[model],
-        settings={model: settings or {}}, seed=seed,
-        allow_shared=allow_shared, allow_early=True,  # with a note
+        seed=seed, allow_shared=allow_shared, allow_early=True,  # with a note
     )  # fmt: skip
     plan = replace(plan, items={model: plan.items[model]})  # without those of each load alone
     *_, last = ranked(
@@ -170,7 +167,6 @@ def fit(
     if row.reason is not None or row.block is None:
         raise ModelError((row.reason or "it gave no model: try other settings").rstrip("."))
     about: Json = {"model": model, "input": board.input, "output": board.output, "load": load}
-    about["settings"] = settings or {}
     olds = {name: workspace.read("results", name) or {} for name in workspace.names("results")}
     same = (n for n, old in olds.items() if all(old.get(key) == about[key] for key in about))
     name = next(same, None) or workspace.new_name("models", model)
@@ -179,21 +175,10 @@ def fit(
     told = {key: whole[key] for key in copied}
     told["constant"] = None if board.constant is None else board.constant.to_dict()
     told["notes"] = [*board.notes, *row.diagnostics.get("notes", ())]
-    workspace.save_model(name, row.block, row.to_dict() | about | told | {"data": data}, row.banded)
+    workspace.save_model(name, row.block, row.to_dict() | about | told | {"data": data})
     by = "fit" if row.validation_rmse is None else board.chosen_by
     errors = [f"{numeral(x, 3)} {board.unit}".strip() for x in (row.chosen_by, row.test_error)]
     return f"{words.CHOICES[by][0]} {errors[0]}, test RMSE {errors[1]}"
-
-
-def calibrate(workspace: Workspace, tell: Tell, *, name: str) -> str:
-    """Give a model the band that its errors on the test recordings ask for."""
-    train, tests = workspace.train_and_test()
-    if not tests:
-        problem = "a band is calibrated on recordings that the model was not fitted to"
-        raise DataError(problem, remedy="give a recording the role Test")
-    banded, found = calibration(workspace.model(name), tests, "auto", train, tell)
-    banded.save(workspace.path("banded", f"{name}.json"))
-    return _add(workspace, name, "calibration", results.calibration(found), "test")
 
 
 def check(workspace: Workspace, tell: Tell, *, name: str) -> str:
@@ -242,12 +227,8 @@ def stored_items(items: Iterable[Item]) -> list[Json]:
 
 
 def restored(found: Mapping[str, Any]) -> list[Item]:
-    """Return what `stored_items` made; of earlier versions, which had others, their sentences."""
-    items = found.get("items", found.get("shown"))
-    if items is None:
-        said = found.get("verdict"), *(found.get("sentences") or found.get("notes") or ())
-        return [Text([str(one) for one in said if one])]
+    """Return what `stored_items` wrote."""
     try:
-        return [KINDS[one["kind"]](**one) for one in items]
+        return [KINDS[one["kind"]](**one) for one in found["items"]]
     except (KeyError, TypeError):
         raise DataError("its file is damaged", remedy="do it again") from None

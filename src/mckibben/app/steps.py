@@ -101,24 +101,19 @@ class Step(Plain):
 
 
 class Entry(Plain):
-    """A recording of the folder: recording number ``part`` of the raw file ``upload``.
-
-    That is among the uploads; earlier versions had some among the recordings, and notes here.
-    """
+    """A recording of the folder: recording number ``part`` of the raw file ``upload``."""
 
     name: str = ""
     role: Role
-    kind: Literal["uploads", "recordings"] = "uploads"
     upload: str = ""
     part: int = 0
-    notes: list[str] = []
     reading: Reading = Reading()
     steps: list[Step] = []
 
     def code(self) -> str:
         """Return the Python that reads it and repeats its steps, in the folder."""
         words = [f"{name}={value!r}" for name, value in self.reading.options().items()]
-        given = ", ".join([repr(f"{self.kind}/{self.upload}"), "informative=False", *words])
+        given = ", ".join([repr(f"uploads/{self.upload}"), "informative=False", *words])
         found = f"mckibben.read({given})[{self.part}]"
         for step in self.steps:
             found = step.code(found)

@@ -10,23 +10,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any, Literal
+from typing import Any
 
 from mckibben.app.following import made, pace
 from mckibben.app.jobs import Tell
 from mckibben.app.modelling import Json
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
-from mckibben.options import COptions, ExportOptions, FMUOptions, MJCFOptions, Option, StudyOptions
-
-FIGURES = {
-    "loops": "Measured and modelled loops",
-    "fit": "Measured and modelled over time",
-    "residuals": "Residuals",
-    "weights": "Weights over thresholds",
-    "loop": "Loops of the recordings",
-    "time": "Recordings over time",
-}
+from mckibben.options import COptions, ExportOptions, FMUOptions, MJCFOptions, StudyOptions
 
 FLAGS = {
     "inverse": "",
@@ -38,15 +29,6 @@ FLAGS = {
 """What makes a compensator of a model in a script."""
 
 
-@dataclass(frozen=True)
-class FigureOptions:
-    """Options of a figure."""
-
-    figure: Annotated[Literal["loops", "fit", "residuals", "weights", "loop", "time"],
-                      Option("What is drawn, of the test recordings.")] = "loops"  # fmt: skip
-    format: Annotated[Literal["pdf", "svg", "png"], Option("Of the file.")] = "pdf"
-
-
 # -- jobs -------------------------------------------------------------------------------------------
 
 
@@ -55,29 +37,14 @@ def report(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Js
     from mckibben.report import write_report
     from mckibben.workflow import study
 
-    models, settings = fitted(workspace)
+    models = fitted(workspace)
     if not models:
         raise DataError("no model is fitted to these recordings", remedy="fit one under Models")
     given = {"inputs": of["inputs"], "outputs": of["outputs"], "load": of["load"] or None}
-    given |= {"models": models, "settings": settings, "jobs": 1, "allow_early": True} | options
+    given |= {"models": models, "jobs": 1, "allow_early": True} | options
     train, test = workspace.with_role("train"), workspace.with_role("test")
     found = study(train, test, **given, progress=tell)
     write_report(found, workspace.path("takeaway", file), title=options.get("title", ""))
-    return f"{file} is written"
-
-
-def figure(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json) -> str:
-    """Draw the test recordings, or else those for training, for print."""
-    from mckibben.report.figures import write_figure
-
-    runs = workspace.with_role("test") or workspace.with_role("train")
-    if not runs:
-        raise DataError("there is no recording to draw", remedy="add one under Data")
-    kind, path = options.get("figure", FigureOptions.figure), workspace.path("takeaway", file)
-    if kind in ("loop", "time"):
-        write_figure(runs, path, kind, input=of["inputs"][0], output=of["outputs"][0])
-    else:
-        write_figure(workspace.model(of["model"]), path, kind, recording=runs)
     return f"{file} is written"
 
 
@@ -141,7 +108,7 @@ def _zip(path: Path, fill: Callable[[Path], Any]) -> None:
 class Thing:
     """Something to take away: what it is and what for, the job, and its options that are asked for.
 
-    The name of its file has options in braces, and ``{stem}`` where it is of a model.
+    The name of its file has ``{stem}`` where it is of a model.
     """
 
     title: str
@@ -158,10 +125,6 @@ THINGS = {
         "What the muscle does, the models, their test and inverse: one page that opens anywhere.",
         *(report, "report.html", StudyOptions, ("title",)),
     ),
-    "figure": Thing(
-        "Figure", "For print: measured and modelled.",
-        *(figure, "{stem}-{figure}.{format}", FigureOptions, ("figure", "format")),
-    ),
     "json": Thing("JSON", "For this library again: mckibben.load(file).", code, "{stem}.json"),
     "c": Thing(
         "C99", "For a microcontroller or a PC: compiles as it is, with a self-test.",
@@ -170,7 +133,7 @@ THINGS = {
     ),
     "fmu": Thing(
         "FMU", "For Simulink and other tools; it is compiled here, up to a minute.",
-        *(code, "{stem}.fmu", FMUOptions, ("name", "sample_time", "platforms")),
+        *(code, "{stem}.fmu", FMUOptions, ("name", "sample_time", "library")),
     ),
     "ros2": Thing(
         "ROS 2", "A controller of ros2_control, to be built by colcon.",
@@ -179,7 +142,7 @@ THINGS = {
     "mjcf": Thing(
         "MuJoCo", "A muscle as plain XML, of a balance fitted within what MJCF carries.",
         *(code, "{stem}.xml", MJCFOptions),
-        ("rest_length", "sheet", "site_from", "site_to", "example", "lag"),
+        ("rest_length", "site_from", "site_to", "example", "lag"),
     ),
     "recordings": Thing(
         "Recordings", "As they are after cuts and filters, by role, with units.",
@@ -191,23 +154,21 @@ THINGS = {
 # -- the script -------------------------------------------------------------------------------------
 
 
-def fitted(workspace: Workspace) -> tuple[list[str], Json]:
-    """Return the kinds of models that were fitted to the recordings as they are, with settings."""
+def fitted(workspace: Workspace) -> list[str]:
+    """Return the kinds of models that were fitted to the recordings as they are."""
     rows = [row for row in workspace.results() if row["current"] and row.get("model")]
-    settings = {row["model"]: row["settings"] for row in reversed(rows) if row.get("settings")}
-    return list(dict.fromkeys(row["model"] for row in rows)), settings
+    return list(dict.fromkeys(row["model"] for row in rows))
 
 
 def script(workspace: Workspace, of: Json) -> str:
     """Return a Python script: read, compare, save, invert, export."""
-    models, settings = fitted(workspace)
+    models = fitted(workspace)
     lines = ['"""What was done in the workbench; run it in its folder."""', ""]
     lines += ["import mckibben", "from mckibben import workflow", ""]
     for role in ("train", "test"):
         runs = [f"    {one.code()}," for one in workspace.entries() if one.role == role]
         lines += [f"{role} = [", *runs, "]"]
     given = {key: of[key] for key in ("inputs", "outputs", "load") if of[key]} | {"models": models}
-    given |= {"settings": settings} if settings else {}
     lines += ["board = mckibben.compare(", "    train,", "    test,"]
     lines += [*(f"    {key}={value!r}," for key, value in given.items()), ")", "print(board)"]
     for chosen in (row["model"] for row in workspace.results() if row["name"] == of["model"]):

@@ -36,7 +36,6 @@ FIELDS = ("approach", "encoding", "gaps", "load", "preview", "rest_length", "sam
 """Those whose control is a field of the same name."""
 
 PLACES = {
-    "calibrate": "the tab Band under Models",
     "check": "the tab Check under Models",
     "compare": "“Fit models”",
     "fit": "“Fit models”",

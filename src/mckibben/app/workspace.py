@@ -1,7 +1,7 @@
 """The folder of a workbench: plain files that any editor opens, and nothing else.
 
 ``uploads`` has raw files as they came, ``recordings`` how each is read, its role and steps, ``history``
-those removed; ``models``, ``banded`` (the same with bands) and ``results`` what was fitted; ``runs`` and
+those removed; ``models`` and ``results`` what was fitted; ``runs`` and
 ``reviews`` closed loops; ``jobs`` how jobs went, and ``takeaway`` what they write for the user.
 
 Files are written whole or not at all, names from a browser are made safe, and no path leaves the folder.
@@ -34,7 +34,7 @@ if TYPE_CHECKING:  # loaded when first used, so that the page is there at once
     from mckibben.recording import Recording
 
 KINDS = (
-    *("uploads", "recordings", "history", "models", "banded", "results", "jobs", "runs"),
+    *("uploads", "recordings", "history", "models", "results", "jobs", "runs"),
     *("takeaway", "reviews"),
 )
 
@@ -156,9 +156,6 @@ class Workspace:
     def entry(self, name: str) -> Entry:
         """Return a recording's description; `DataError` if it is missing or damaged."""
         found = self.read("recordings", name) or {}
-        before = found.get("base") or found.get("file")  # of an earlier version: what was read
-        if before:
-            found |= {"kind": "recordings", "upload": before, "part": 0, "reading": {}}
         try:
             return Entry.model_validate(found | {"name": name})
         except ValidationError:
@@ -181,7 +178,7 @@ class Workspace:
 
     def raw_path(self, entry: Entry) -> Path:
         """Return the raw file of a recording."""
-        return self.path(entry.kind, entry.upload)
+        return self.path("uploads", entry.upload)
 
     def _parts(self, path: Path, reading: Reading) -> list[Recording]:
         return self.cached(path, reading.model_dump_json(), lambda: understand(path, reading)[0])
@@ -306,11 +303,11 @@ class Workspace:
 
     # -- models and what came of them ------------------------------------------------------------
 
-    def model(self, name: str, kind: str = "models") -> Block:
-        """Return a model; or with its band, from ``"banded"``. `ModelError` if it is damaged."""
+    def model(self, name: str) -> Block:
+        """Return a model. `ModelError` if it is damaged."""
         from mckibben.blocks.saving import load
 
-        path = self.path(kind, f"{name}.json")
+        path = self.path("models", f"{name}.json")
         return self.cached(path, "", lambda: load(path))
 
     def models(self) -> list[str]:
@@ -318,14 +315,9 @@ class Workspace:
         ranked = [row["name"] for row in self.results()]
         return [*ranked, *(name for name in self.names("models") if name not in ranked)]
 
-    def save_model(
-        self, name: str, model: Block, result: Mapping[str, Any], banded: Block | None = None
-    ) -> None:
+    def save_model(self, name: str, model: Block, result: Mapping[str, Any]) -> None:
         """Write a model with what came of its fit: a row of a leaderboard, its channels and `digest`."""
         model.save(self.path("models", f"{name}.json"))
-        self.delete("banded", name)
-        if banded is not None:
-            banded.save(self.path("banded", f"{name}.json"))
         self.write("results", name, result)
 
     def results(self) -> list[dict[str, Any]]:

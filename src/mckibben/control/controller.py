@@ -44,13 +44,13 @@ class Controller(ABC):
         Parameters
         ----------
         reference : array
-            What `Offer.followed` should be at the next step [mm, rad or N].
+            Reference of `Offer.followed` at the next step [mm, rad or N].
         measured : array
-            What `Offer.measured` just was.
+            Latest measurements, `Offer.measured`.
         scheduled : array
-            What schedules the model, `Offer.scheduled`: an extensor's pressure, a load.
+            Scheduling inputs, `Offer.scheduled`, such as an extensor's pressure or a load.
         ahead : (array, array)
-            Reference and schedule as far ahead as `preview` and `samples_ahead` say, for compensators.
+            Reference and schedule, `preview` and `samples_ahead` later, for compensators.
         """
 
     @property
@@ -70,8 +70,8 @@ class BlockController(Controller):
     Parameters
     ----------
     block : Block
-        From references, what is measured of them (inputs named ``..._measured``) if it asks for that,
-        and what schedules it, to pressures. What it does not ask for is passed over.
+        From references, measurements (inputs named ``..._measured``) and scheduling inputs to
+        pressures. Other signals of the loop are ignored.
     """
 
     block: Block
@@ -82,33 +82,40 @@ class BlockController(Controller):
 
     @property
     def n_clipped(self) -> int:
-        """That of the compensator."""
+        """Number of samples clipped by the compensator."""
         return self._stream.block.n_clipped(self._stream.state)
 
     def connect(self, offer: Offer) -> None:
         whole = self.block
         self._compensator, self._pid = whole, None
-        if isinstance(whole, FeedforwardFeedback):  # which may be given references of two times
+        if isinstance(
+            whole, FeedforwardFeedback
+        ):  # both parts may take references of different times
             self._compensator, self._pid = whole.compensator, whole.feedback
         self._inputs = offer.inputs(self._compensator)
         self._commands = offer.commands(whole)
         if self._pid is not None:
             bases = tuple(Channel(f"{c.name}{BASE}", c.unit) for c in self._compensator.outputs)
-            self._beside = offer.inputs(self._pid, bases)
+            self._pid_inputs = offer.inputs(self._pid, bases)
 
     def reset(self, sample_time: float) -> None:
         self._stream = self._compensator.stream(sample_time)
         self._feedback = None if self._pid is None else self._pid.stream(sample_time)
-        feels = any(channel.name.endswith(MEASURED) for channel in self._compensator.inputs)
-        # what is measured answers the reference of the last step, or before by a dead time that the
-        # block knows; a plan takes what schedules as it is now
-        self._foresees, self._plans = self.preview > 0.0 or not feels, self.samples_ahead > 0
+        measures = any(channel.name.endswith(MEASURED) for channel in self._compensator.inputs)
+        # measurements belong to the reference of the last step, or a dead time before it; predictive
+        # compensators take the current scheduling inputs
+        self._uses_preview, self._predicts = (
+            self.preview > 0.0 or not measures,
+            self.samples_ahead > 0,
+        )
 
     def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
-        wanted, beside = ahead if self._foresees else (reference, scheduled)
-        beside = scheduled if self._plans else beside
-        found = self._stream.step(self._inputs(np.concatenate((wanted, beside, measured))))
+        reference_ahead, schedule = ahead if self._uses_preview else (reference, scheduled)
+        schedule = scheduled if self._predicts else schedule
+        found = self._stream.step(
+            self._inputs(np.concatenate((reference_ahead, schedule, measured)))
+        )
         if self._feedback is not None:
             given = np.concatenate((reference, scheduled, measured, found))
-            found = self._feedback.step(self._beside(given))
+            found = self._feedback.step(self._pid_inputs(given))
         return self._commands(found)

@@ -20,11 +20,11 @@ class EstimatedLoad(Controller):
     Parameters
     ----------
     controller : Controller
-        What the load schedules.
+        Controller scheduled by the load.
     estimate : Block
-        From what is measured to the load.
+        From measurements to the load.
     filter_time : float
-        Of the estimate [s]; without it, estimate and controller excite one another.
+        Time constant of the estimate [s], which avoids oscillation of the loop.
     """
 
     controller: Controller
@@ -39,7 +39,7 @@ class EstimatedLoad(Controller):
 
     @property
     def n_clipped(self) -> int:
-        """That of the controller's compensator."""
+        """Number of samples clipped by the controller's compensator."""
         return self.controller.n_clipped
 
     def connect(self, offer: Offer) -> None:
@@ -57,7 +57,7 @@ class EstimatedLoad(Controller):
         """Return the controller's commands, with the current load estimate for the next step."""
         found = self._stream.step(self._inputs(measured))
         self._load = self._load + self._share * (found - self._load)
-        now, then = (np.concatenate((self._load, beside)) for beside in (scheduled, ahead[1]))
+        now, then = (np.concatenate((self._load, others)) for others in (scheduled, ahead[1]))
         return self.controller.step(reference, measured, now, (ahead[0], then))
 
     def applied(self, pressures: Array) -> None:

@@ -20,14 +20,14 @@ from mckibben.recording import Recording
 BEYOND = 0.05
 """Share of a range beyond which a value counts as outside; noise is smaller."""
 
-Asked = list[tuple[Channel, Array, tuple[float, float]]]
+Checked = list[tuple[Channel, Array, tuple[float, float]]]
 
 
 def known_ranges(model: Block) -> dict[str, tuple[float, float]]:
     """Return the lowest and highest identified value of a model's inputs, by name.
 
-    Of its own input range, or its inverse's; of what a balance was scheduled and loaded by; or else of
-    what its band saw. Inputs of which nothing is known are absent.
+    Sources are its input range or its inverse's, ranges stored in a balance, and those of its band.
+    Inputs without a known range are absent.
 
     Examples
     --------
@@ -65,23 +65,23 @@ def known_ranges(model: Block) -> dict[str, tuple[float, float]]:
 def beyond_known(model: Block, recording: Recording) -> list[str]:
     """Return warnings about parts of a recording outside the identified range.
 
-    Of a balance, what schedules and loads it; and what drives it: displacements of a compensator,
-    pressures otherwise. Other inverses tell of what they clip as they run.
+    For a balance: scheduling inputs, loads, and displacements of a compensator or pressures of a model.
+    Other inverses count the samples that they clip.
     """
     placed = balance_in(model)
     if placed is not None:
-        asked = _of_balance(placed, model, recording)
+        checked = _of_balance(placed, model, recording)
     elif model.undoing:
-        asked = []
+        checked = []
     else:
         known = known_ranges(model)
-        asked = [
+        checked = [
             (channel, recording[channel.name], known[channel.name])
             for channel in model.inputs
             if channel.name in known and channel.name in recording
         ]
     notes = []
-    for channel, values, (low, high) in asked:
+    for channel, values, (low, high) in checked:
         reach = BEYOND * (high - low)
         if values.min() < low - reach or values.max() > high + reach:
             ends = " to ".join(numeral(float(end), 3) for end in (values.min(), values.max()))
@@ -92,18 +92,18 @@ def beyond_known(model: Block, recording: Recording) -> list[str]:
     return notes
 
 
-def _of_balance(placed: Placed, model: Block, recording: Recording) -> Asked:
+def _of_balance(placed: Placed, model: Block, recording: Recording) -> Checked:
     balance = placed.balance
     driven = [channel for channel in model.inputs if channel.name not in model.scheduling]
     found = recording.matrix([channel.name for channel in driven])
     for part in placed.before:
         found = run_many([part], np.ascontiguousarray(found), sample_time=recording.sample_time)[0]
-    asked: Asked = [
+    checked: Checked = [
         (channel, recording[channel.name], (low, high))
         for channel, (low, high) in zip(balance.scheduled, balance.known, strict=False)
     ]
     for place, channel in enumerate(driven):
         known = balance.pressure_range if placed.solved else balance.known_coordinates[place]
         if known is not None:
-            asked.append((channel, found[:, place], (known[0], known[1])))
-    return asked
+            checked.append((channel, found[:, place], (known[0], known[1])))
+    return checked

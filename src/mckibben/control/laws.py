@@ -1,7 +1,7 @@
 """Control laws by name, each made from a compensator and feedback.
 
-A law is a function of a compensator and of what tunes feedback, called where the law has any; the first
-line of its docstring is what it is called to a person. Laws are registered in the group ``controllers``.
+A law is a function of a compensator and of a function that returns tuned feedback. The first line of its
+docstring is its title. Laws are registered in the group ``controllers``.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def control_law(name: str, compensator: Block, tuned: Tuned) -> Block | Controll
     name : str
         Of the law: ``feedforward``, ``feedforward-pid``, ``observer``, ``pid``.
     compensator : Block
-        From displacements, and what schedules it, to pressures.
+        From displacements and scheduling inputs to pressures.
     tuned : callable
         Returns feedback; see `mckibben.control.tune_pid`.
 

@@ -18,7 +18,6 @@ from mckibben.control.controller import BlockController, Controller
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.control.preview import samples_ahead
 from mckibben.control.roles import Plant, asked, offered, resting, roles
-from mckibben.control.twin import Twin
 from mckibben.errors import ModelError, require
 from mckibben.recording import Recording, sample_time_of
 from mckibben.signals.checking import generator
@@ -59,15 +58,10 @@ class Tracked(DrawsItself):
         Of everything followed, after the approach [mm or N].
     clipped : int
         Steps in which pressure or its rate was at a limit, or the reference out of reach.
-    clipping_cost : float
-        RMSE over those steps less RMSE over the others [mm or N]; 0 where there are none.
     step_time : (float, float)
         Median and 99.9th percentile of the controller's own time a step [s].
     beyond : mapping of str to Beyond
         Where the reference is out of reach of what the compensator undoes, by what is followed.
-    scatter : mapping of str to float
-        Root mean square of what a twin with a band drew over that time [mm or N]; it draws nothing in
-        the approach.
     """
 
     face: ClassVar[str] = "tracked"
@@ -76,10 +70,8 @@ class Tracked(DrawsItself):
     rmse: Mapping[str, float]
     largest: Mapping[str, float]
     clipped: int
-    clipping_cost: float
     step_time: tuple[float, float]
     beyond: Mapping[str, Beyond] = field(default_factory=dict)
-    scatter: Mapping[str, float] = field(default_factory=dict)
 
 
 MOST_STEPS = 10**7
@@ -168,9 +160,6 @@ def track(
     followed, beside = ([c.name for c in some] for some in (offer.followed, offer.scheduled))
     starts = resting(plant, {name: float(reference[name][0]) for name in held})
     settings: dict[str, float] = {"sample_time": step, **starts}
-    scatters = isinstance(plant, Twin) and plant.scatters
-    if scatters:
-        settings["scatter_after"] = approach
     changed = plant.changed(settings)
     lead = round(approach / step)
     path = reference.matrix(followed)
@@ -199,13 +188,10 @@ def track(
     seen, commands = np.empty((n, len(measured))), np.empty((n, len(driven)))
     clipped, times = np.zeros(n, dtype=bool), np.empty(n)
     own = np.zeros(n + 1, dtype=int)
-    drawn = np.zeros_like(seen)
     last: Array | None = None
     with telling(progress, "tracking") as tell:
         for t in range(n):
             seen[t] = measured
-            if isinstance(changed, Twin):
-                drawn[t] = changed.drawn
             late = [*late[1:], measured]
             felt = late[0].copy()
             felt[at_y] += noise * rng.standard_normal(len(at_y))
@@ -241,10 +227,9 @@ def track(
     out = {
         name: outside(due[:, followed.index(name)], *reached[name]) & clipped for name in reached
     }
-    part, at_limit = errors[scored], clipped[scored]
+    part = errors[scored]
     parts = dict(zip(followed, part.T, strict=True))
     far = {name: beyond(parts[name], out[name][scored], *reached[name]) for name in reached}
-    sizes = np.sqrt(np.mean(drawn[scored] ** 2, axis=0))[at_y].tolist() if scatters else []
     references = {f"reference_{c.name}": c.unit for c in offer.followed}
     sent = {f"command_{c.name}": c.unit for c in offer.driven}
     channels = dict(zip((*references, *sent), (*due.T, *commands.T), strict=True))
@@ -254,11 +239,9 @@ def track(
         Recording(channels, step, references | sent, -lead * step, {"plant": changed.name}),
         dict(zip(followed, np.sqrt(np.mean(part**2, axis=0)).tolist(), strict=True)),
         dict(zip(followed, np.abs(part).max(axis=0).tolist(), strict=True)),
-        int(at_limit.sum()),
-        _cost(part, at_limit),
+        int(clipped[scored].sum()),
         (float(np.median(times)), float(np.quantile(times, 0.999))),
         {name: found for name, found in far.items() if found is not None},
-        dict(zip(followed, sizes, strict=False)),
     )
 
 
@@ -276,13 +259,6 @@ def _check(
     for name, (value, most, unit) in ranges.items():
         require(0 <= value <= most, name, value, f"0 to {most:g} {unit}")
     require(slew is None or 0 < slew < np.inf, "slew", slew, "a positive number, in bar/s")
-
-
-def _cost(errors: Array, at_limit: NDArray[np.bool_]) -> float:
-    if not at_limit.any() or at_limit.all():
-        return 0.0
-    clipped, free = (float(np.sqrt(np.mean(errors[rows] ** 2))) for rows in (at_limit, ~at_limit))
-    return clipped - free
 
 
 def ends(

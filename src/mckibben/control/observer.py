@@ -56,7 +56,7 @@ class DisturbanceObserver(Controller):
 
     def reset(self, sample_time: float) -> None:
         self._ahead = self.compensator.stream(sample_time)
-        self._beside = self._model.stream(sample_time)
+        self._model_stream = self._model.stream(sample_time)
         self._share = 1.0 - np.exp(-sample_time / self.filter_time)
         self._disturbance = np.zeros(self.compensator.n_driven)
         self._expected: Array | None = None
@@ -65,8 +65,8 @@ class DisturbanceObserver(Controller):
     def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
         """Return the compensator's commands for the reference without the disturbance."""
         if self._expected is not None:
-            surprise = self._measured(measured) - self._expected
-            self._disturbance += self._share * (surprise - self._disturbance)
+            residual = self._measured(measured) - self._expected
+            self._disturbance += self._share * (residual - self._disturbance)
         self._scheduled = scheduled
         wanted = self._inputs(np.concatenate((*ahead, measured)))
         wanted[: self._disturbance.size] -= self._disturbance
@@ -75,4 +75,4 @@ class DisturbanceObserver(Controller):
     def applied(self, pressures: Array) -> None:
         """Advance the model by the applied commands."""
         taken = self._taken(np.concatenate((pressures, self._scheduled)))
-        self._expected = self._modelled(self._beside.step(taken))
+        self._expected = self._modelled(self._model_stream.step(taken))

@@ -1,7 +1,7 @@
 """Inner pressure loop, as in regulators with a pressure sensor.
 
-Compensators are identified on measured pressures; between command and pressure lie valves that fill and
-vent at rates of their own. How large a gain they bear nobody says: it is halved where it swings.
+Compensators are identified on measured pressures, which lag behind commands as valves fill and vent. The
+stable range of gains is unknown: a gain is halved when its pressure oscillates.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class PressureLoop:
     Parameters
     ----------
     gain : float
-        Proportional, to begin with; that of a muscle is halved whenever its pressure swings. None in
-        steps so long that pressure has settled within them: it would swing for ever.
+        Initial proportional gain; halved for a muscle whose pressure oscillates. Zero for steps
+        longer than `QUICK`, in which pressure settles.
     integral : float
         [1/s]; less in long steps.
     low, high : array
@@ -51,7 +51,7 @@ class PressureLoop:
         self._sum = np.zeros_like(self.low)
         self._gains = np.full_like(self.low, self.gain if self.sample_time <= QUICK else 0.0)
         self._share = min(self.integral * self.sample_time, STEADY)
-        # on which side pressure was off last, and between what is asked for since
+        # sign of the last pressure error, and range of commands since
         self._side = np.zeros_like(self.low)
         self._least, self._most = np.full_like(self.low, np.inf), np.full_like(self.low, -np.inf)
 

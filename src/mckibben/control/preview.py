@@ -1,9 +1,8 @@
 """Preview of references, to compensate dead time.
 
-What a compensator gives cannot act before the dead time of the air has passed. Where it is given its
-reference that much ahead, as a robot knows that plans its motion, what comes of it is on time: offline
-the reference is shifted by `previewed`; sample by sample `Stream.step` is given the reference of
-`dead_time_undone` later; loops hand it over so (`mckibben.control.track`).
+Commands act after the dead time of the air. With a planned motion, the compensator can be given the
+reference that much ahead: offline, `previewed` shifts the reference; sample by sample, `Stream.step`
+gets the reference of `dead_time_undone` later; `mckibben.control.track` does so by default.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ MOST_PREVIEW = 1e4
 def dead_time_undone(compensator: Block) -> float:
     """Return the dead time of the inverted model [s], which is the preview needed.
 
-    That of a compensator alone where there is feedback on top; 0 where nothing is known to be undone.
+    With feedback, that of the compensator; 0 if the inverted model is unknown.
 
     Examples
     --------

@@ -39,7 +39,7 @@ class Plant(Protocol):
         """Channels that it measures."""
 
     def reset(self, seed: int = 0) -> Array:
-        """Bring it to rest, and return the first measurement."""
+        """Reset to rest, and return the first measurement."""
 
     def step(self, action: ArrayLike | Mapping[str, float]) -> Array:
         """Hold commands for one sample time and return the next measurement."""
@@ -60,15 +60,15 @@ def rest_length_of(plant: Plant) -> float | None:
 def asked(plant: Plant, reference: Recording, compensator: Block | None = None) -> Recording:
     """Return a reference in the channels of a plant, converted by the rest length if necessary.
 
-    Pressures recorded with it, which a compensator is to give, are left out.
+    Recorded channels that are outputs of the compensator are left out.
     """
     if compensator is not None:
         outputs = [channel.name for channel in compensator.outputs]
-        given = {*outputs, *map(plain, outputs)}
-        kept = [name for name in reference.channels if name not in given]
-        # one of pressures alone stays as it is, so that whoever follows it finds what is missing
-        if 0 < len(kept) < len(reference.channels):
-            reference = reference.select(kept)
+        commanded = {*outputs, *map(plain, outputs)}
+        others = [name for name in reference.channels if name not in commanded]
+        # a reference of pressures alone is unchanged: following it raises an error
+        if 0 < len(others) < len(reference.channels):
+            reference = reference.select(others)
     if (length := rest_length_of(plant)) is not None:
         reference = reference.with_meta(rest_length=length)
     return reference.with_derived([*plant.outputs, *plant.inputs])
@@ -86,7 +86,7 @@ def offered(plant: Plant, reference: Recording) -> Offer:
     Raises
     ------
     DataError
-        If the reference has nothing that the plant measures, or it in another unit.
+        If the plant measures no channel of the reference, or in another unit.
     """
     followed = followed_by(plant, reference)
     driven, _ = roles(plant, reference)
@@ -110,7 +110,7 @@ def followed_by(plant: Plant, reference: Recording) -> list[str]:
     Raises
     ------
     DataError
-        If there are none.
+        If there is none.
     """
     measured_too = [name for name in plant.outputs if name in reference]
     followed = [name for name in measured_too if name.startswith(MOVED)]
@@ -145,7 +145,7 @@ def resting(plant: Plant, held: Mapping[str, float]) -> dict[str, float]:
     found = {}
     for name, value in held.items():
         found[f"start.{name}"] = value
-        if isinstance(plant, Twin):  # is told what was recorded, whatever it is
+        if isinstance(plant, Twin):  # takes any recorded value
             continue
         limits = plant.limits(name)
         near, beyond = min(max(value, limits.low), limits.high), NOISE * (limits.high - limits.low)
@@ -154,7 +154,7 @@ def resting(plant: Plant, held: Mapping[str, float]) -> dict[str, float]:
                 f"the reference begins at {value:g}, and {plant.name!r} takes {limits.low:g} to "
                 f"{limits.high:g}",
                 channel=name,
-                remedy="begin it within that range, or leave the column out where nothing needs it",
+                remedy="begin it within that range, or leave the column out",
             )
         found[f"start.{name}"] = near
     return found
@@ -163,7 +163,7 @@ def resting(plant: Plant, held: Mapping[str, float]) -> dict[str, float]:
 def actuated(plant: Plant, held: Collection[str]) -> list[str]:
     """Return the inputs of a plant that drive its muscles, and are not held.
 
-    They are called pressures or voltages; a twin says itself what drives it.
+    They are pressures or voltages; those of a twin are its `driving` inputs.
     """
     free = [name for name in plant.inputs if name not in held]
     if isinstance(plant, Twin):

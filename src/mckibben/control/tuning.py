@@ -3,8 +3,8 @@
 A step of every pressure from the middle of its range gives gain, time constant and dead time (at 28 and
 63 % of the response); from them SIMC's rules (Skogestad, "Simple analytic rules for model reduction and
 PID controller tuning", 2003) give the gains, with a closed-loop time constant of one's choosing. They
-leave a gain margin of about three, so a slow ramp over the whole range tells whether the muscle is
-steeper somewhere than twice what the step met: a dead zone in the middle would have feedback oscillate.
+leave a gain margin of about three. A slow ramp over the whole range finds parts more than twice as steep
+as the step, for which the gains are reduced.
 """
 
 from __future__ import annotations
@@ -23,9 +23,6 @@ from mckibben.control.roles import MOVED, Plant, actuated, channels_of, rest_len
 from mckibben.control.twin import Twin
 from mckibben.errors import ModelError
 from mckibben.system.progress import Tell, one_by_one, telling
-
-NEVER = 1e9
-"""Time longer than any tuning [s]."""
 
 STEPS = (0.1, 0.2, 0.4)
 """Steps of pressure, relative to its range; larger ones are used only if smaller ones cause no
@@ -62,8 +59,7 @@ def tune_pid(
     scheduled : mapping, optional
         Other inputs, held.
     references : sequence of Channel
-        In which the references will be given, as a compensator has them; default as the plant measures
-        them.
+        Channels and units of the references; default those that the plant measures.
     seed : int
         Of the noise.
     progress : bool or callable, optional
@@ -80,8 +76,6 @@ def tune_pid(
     followed = [channel.name for channel in measured]
     driven = [channel.name for channel in untuned.given]
     starts = resting(plant, scheduled)
-    if isinstance(plant, Twin):  # what differs from run to run is no gain
-        starts["scatter_after"] = NEVER
     rig = plant.changed({"sample_time": sample_time, **starts})
     limits = [rig.limits(name) for name in driven]
     middle = {
@@ -157,10 +151,10 @@ def _moved_by(name: str, rig: Plant, driven: Sequence[str]) -> str:
 
 def _steepest(response: Array, ramp: Array, size: float) -> float:
     """Return the largest gain over steps of a size, from the response to a ramp up and down."""
-    apart = max(round(size / float(ramp[1] - ramp[0])), 1)
+    lag = max(round(size / float(ramp[1] - ramp[0])), 1)
     up, down = np.split(response, 2)
-    run = float(ramp[apart] - ramp[0])
-    return float(max((one[apart:] - one[:-apart]).max() for one in (up, down[::-1]))) / run
+    run = float(ramp[lag] - ramp[0])
+    return float(max((one[lag:] - one[:-lag]).max() for one in (up, down[::-1]))) / run
 
 
 def _settled(response: Array) -> Array:

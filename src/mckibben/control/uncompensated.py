@@ -1,9 +1,8 @@
 """Baseline without compensation: a static map of the plant.
 
-All that is known of the muscle is one slow rise of its pressure from the lowest to the highest, as every
-lab has it. A reference is read off that curve: a monotone map without memory, so that what goes down
-goes by the curve that came up. Of several muscles all rise together, and each has its own curve. Where
-more muscles than motions pull against each other, each rises alone, and moves all along straight lines.
+The map is measured in one slow rise of pressure from the lowest to the highest, and is monotone and
+memoryless: falling motion uses the same curve. Several muscles rise together, and each has its own
+curve. With more muscles than motions, each rises alone, and the map is linear.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ from mckibben.blocks.base import Block
 from mckibben.control.controller import Ahead, Controller
 from mckibben.control.loop import Tracked, track
 from mckibben.control.roles import Plant, asked, followed_by, roles
-from mckibben.control.suiting import doubts
 from mckibben.errors import MckibbenError, ModelError
 from mckibben.recording import Recording
 
@@ -194,19 +192,18 @@ def curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Before:
-    """The uncompensated loop, and warnings about the plant.
+    """Result of the uncompensated loop.
 
     Parameters
     ----------
     tracked : Tracked or None
-        What no compensation makes of the reference: pressures read off the plant's own slow rise. None
-        where that cannot be.
+        Result with commands from the plant's own slow rise; None if it could not be run.
     notes : tuple of str
-        Whether plant and compensator are of one muscle, and why nothing was tracked.
+        Why it could not be run.
     """
 
     tracked: Tracked | None
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     def beside(self, recording: Recording) -> Recording:
         """Return a loop's recording with the uncompensated outputs, as ``uncompensated_...``."""
@@ -220,25 +217,23 @@ class Before:
 
 
 def before(compensator: Block, plant: Plant, reference: Recording, **settings: Any) -> Before:
-    """Run the uncompensated loop on a plant, and check that the compensator fits the plant.
+    """Run the uncompensated loop on a plant.
 
     Parameters
     ----------
     compensator : Block
-        What is to be tried.
+        The compensator to compare with.
     plant : Plant
     reference : Recording
     **settings
-        As of `track`; a preview is passed over, for no dead time is undone.
+        As of `track`; a preview is ignored, as no dead time is compensated.
     """
     settings.pop("preview", None)
     reference = asked(plant, reference, compensator)
     few = {name: settings[name] for name in ("pressure_loop", "seed") if name in settings}
-    notes: list[str] = []
     try:
         rise = slow_rise(plant, reference, **few)
-        notes += doubts(compensator, plant, rise)
         controller = uncompensated(plant, reference, rise, **few)
-        return Before(track(controller, plant, reference, **settings), tuple(notes))
+        return Before(track(controller, plant, reference, **settings))
     except MckibbenError as error:
-        return Before(None, (*notes, f"there is no run without compensation: {error}"))
+        return Before(None, (f"there is no run without compensation: {error}",))

@@ -16,9 +16,10 @@ from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.saving import from_dict, to_dict
 from mckibben.errors import DataError, ModelError
-from mckibben.muscles.sheet import Sheet, refused
+from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import GROUPS, PLACES, traits
 from mckibben.system.ordinary import DESCRIPTION, read_text
+from mckibben.system.validation import invalid
 
 FORMAT, VERSION = "mckibben-muscle", 1
 
@@ -170,7 +171,7 @@ def _load(path: Path) -> Muscle:
         example = to_dict(Balance.example())
         balance = from_dict({name: example[name] for name in HEADING} | found.balance)
     except ValidationError as error:
-        raise refused(error, path, "what a muscle's file holds") from None
+        raise invalid(error, path, "correct it, as files of the library have it") from None
     except ModelError as error:
         remedy = error.remedy or "correct it"
         raise DataError(f"its balance: {error.problem}", file=path, remedy=remedy) from None

@@ -14,8 +14,9 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.muscles.library import FORMAT, Muscle, load, parsed
 from mckibben.muscles.library import list as all_muscles
-from mckibben.muscles.sheet import Sheet, refused
+from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import COUNT, PLACES, POSITIONS
+from mckibben.system.validation import invalid
 
 ALIKE = 0.1
 """Standard deviation of the logarithm among muscles of one make and size."""
@@ -114,7 +115,7 @@ def prior_of(given: str | Path | Sheet, *, without: Sequence[str] = ()) -> Prior
     try:
         sheet = Sheet.model_validate(content)
     except ValidationError as error:
-        raise refused(error, path, "numbers of a data sheet") from None
+        raise invalid(error, path, "give [sheet] as files of the library have it") from None
     return prior_of(sheet, without=without)
 
 

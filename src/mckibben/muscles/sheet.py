@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
 
 NEWTON_PER_BAR_MM2 = 0.1
 
@@ -112,15 +110,3 @@ class Sheet(BaseModel):
         """Return the area over that at rest, by contraction as a share of the largest."""
         a, b = self.braid
         return np.maximum(((1.0 - self.contraction * share) ** 2 * a - b) / (a - b), 0.02)
-
-
-def refused(error: ValidationError, file: str | Path | None, what: str) -> DataError:
-    """Return the first validation error of a file as a `DataError`."""
-    first = error.errors(include_url=False)[0]
-    place = ".".join(str(part) for part in first["loc"])
-    said = first["msg"][0].lower() + first["msg"][1:]
-    return DataError(
-        f"{place}: {said}" if place else said,
-        file=file,
-        remedy=f"give {what}, as the files of the library have it",
-    )

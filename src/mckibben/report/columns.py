@@ -144,6 +144,12 @@ def columns_of_board(board: Leaderboard) -> tuple[Column, ...]:
     return columns_of(rows, board.unit, board.outputs, board.chosen_by)
 
 
+def diverged(row: Given) -> bool:
+    """Return whether a model diverged in the test."""
+    share = (row.get("test") or {}).get("r2")
+    return share is not None and share < 1 - DIVERGED**2
+
+
 def _deviation(row: Given) -> float:
     """Return the standard deviation of the measured test output; infinite if unknown."""
     test = row.get("test") or {}

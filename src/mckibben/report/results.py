@@ -45,9 +45,6 @@ STARTS_MATTER = 0.05
 BOARD = ("chosen", "test", "interval", "rank", "gap")
 """Columns of a leaderboard for a terminal of 80; the files have the rest."""
 
-MOST = 12
-"""Parameters of a plan that are listed."""
-
 UNFOLDED = 30
 """Number of parameters that a page shows unfolded."""
 
@@ -107,21 +104,12 @@ def characterization(found: Characterization) -> list[Item]:
 
 
 def plan(found: Plan) -> list[Item]:
-    """Return the steps of a plan, and the expected standard errors."""
+    """Return the steps of a plan."""
     steps = [
         [f"{one.start:.0f} to {one.stop:.0f}", one.what, ", ".join(one.gaps) or "–"]
         for one in found.steps
     ]
-    items: list[Item] = [Table(["Seconds", "What", "Closes"], steps)]
-    shown = sorted(found.parameters, key=lambda one: one.after or 0.0, reverse=True)[:MOST]
-    if shown:
-        rows = [[o.name, f"{o.value:.4g}", *map(_at_most_whole, (o.now, o.after))] for o in shown]
-        items.append(Table(["Parameter", "Value", "Standard error now", "With the plan"], rows))
-    return [*items, Text(words.plan_sentences(found))]
-
-
-def _at_most_whole(share: float | None) -> str:
-    return "over 100 %" if share is not None and share > 1 else percent(share)
+    return [Table(["Seconds", "What", "Closes"], steps), Text(words.plan_sentences(found))]
 
 
 # --- Models -----------------------------------------------------------------------------------------

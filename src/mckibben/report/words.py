@@ -606,15 +606,10 @@ def tracked(found: Tracking) -> list[str]:
     unit = one.recording.units[next(iter(one.rmse))]
     kind = "virtual rig" if found.virtual else "model"
     said = [f"Plant: {found.plant.name} ({kind}), seed {found.seed}."]
-    said += [
-        f"The plant's own scatter of {name}: {size(unit, scatter)} RMS."
-        for name, scatter in one.scatter.items()
-    ]
     if one.clipped >= len(one.recording):
         said.append("Commands were at a limit throughout: the reference is out of reach.")
     elif one.clipped > max((far.samples for far in one.beyond.values()), default=0):
-        cost = f"; RMSE there is {size(unit, one.clipping_cost)} higher" * (one.clipping_cost > 0)
-        said.append(f"Commands were at a limit in {one.clipped} steps{cost}.")
+        said.append(f"Commands were at a limit in {one.clipped} steps.")
     said += [
         f"{far.samples} samples of the reference {name} are out of reach ({numeral(far.low, 4)} to "
         f"{numeral(far.high, 4)} {unit}); RMSE over the others: {size(unit, far.rmse_elsewhere)}."

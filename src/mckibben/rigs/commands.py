@@ -48,24 +48,19 @@ class Commands:
             On missing or unknown channels, or a recording without time.
         """
         sample_time_of(inputs, "drive a rig")
+        unknown = sorted(set(inputs.channels) - {*self.ranges, *self.outputs})
         first = next(iter(self.ranges))
-        remedy = f"give {', '.join(self.ranges)} and no others"
-        strangers = sorted(set(inputs.channels) - {*self.ranges, *self.outputs})
-        if strangers:
-            listed = ", ".join(map(repr, strangers))
+        if unknown or first not in inputs:
+            problem = f"has no channel {', '.join(unknown)}" if unknown else f"needs {first!r}"
             raise DataError(
-                f"the rig {self.rig!r} has no channel {listed}", file=inputs.source, remedy=remedy
-            )
-        if first not in inputs:
-            raise DataError(
-                f"the rig {self.rig!r} needs the channel {first!r}",
+                f"the rig {self.rig!r} {problem}",
                 file=inputs.source,
-                remedy=remedy,
+                remedy=f"give {', '.join(self.ranges)} and no others",
             )
         asked = np.column_stack(
             [
-                inputs[name] if name in inputs else np.full(len(inputs), self.rest[i])
-                for i, name in enumerate(self.ranges)
+                inputs[name] if name in inputs else np.full(len(inputs), rest)
+                for name, rest in zip(self.ranges, self.rest, strict=True)
             ]
         )
         given = self.limited(asked)
@@ -90,29 +85,17 @@ class Commands:
         DataError
             On wrong channels, a wrong number of commands, or one that is not finite.
         """
+        names = ", ".join(self.ranges)
         if isinstance(action, Mapping):
-            strangers = sorted(set(action) - set(self.ranges))
-            if strangers:
-                raise DataError(
-                    f"the rig {self.rig!r} has no input {', '.join(map(repr, strangers))}",
-                    remedy=f"give {', '.join(self.ranges)}",
-                )
+            if unknown := sorted(set(action) - set(self.ranges)):
+                problem = f"the rig {self.rig!r} has no input {', '.join(unknown)}"
+                raise DataError(problem, remedy=f"give {names}")
             rest = dict(zip(self.ranges, self.rest, strict=True))
-            action = [action.get(name, rest[name]) for name in self.ranges]
+            action = list((rest | dict(action)).values())
         asked = np.asarray(action, dtype=float)
-        if asked.shape != (len(self.ranges),):
-            raise DataError(
-                f"an action of shape {asked.shape} does not fit {len(self.ranges)} input(s)",
-                remedy=f"give one number each for {', '.join(self.ranges)}",
-            )
-        for name, value in zip(self.ranges, asked, strict=True):
-            if not np.isfinite(value):
-                limits = self.ranges[name]
-                raise DataError(
-                    f"the command is {value}",
-                    channel=name,
-                    remedy=f"give a number from {limits.low:g} to {limits.high:g} {standard_unit(name)}",
-                )
+        if asked.shape != (len(self.ranges),) or not np.isfinite(asked).all():
+            problem = f"the rig {self.rig!r} cannot take the commands {asked.tolist()}"
+            raise DataError(problem, remedy=f"give a finite number each for {names}")
         return asked
 
     def limited(self, asked: Array) -> Array:

@@ -9,19 +9,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 from mckibben import registry
 from mckibben.errors import DataError
 from mckibben.recording import Recording
-from mckibben.rigs.refusals import limits, refused, unit
 from mckibben.system.atomic import write_text
 from mckibben.system.ordinary import DESCRIPTION, read_text
+from mckibben.system.validation import invalid
 
 if TYPE_CHECKING:
     from mckibben.rigs.rig import Rig  # which says what was changed of a published one
 
 CHANGES = "rig_changes"
 """In the ``meta`` of what a rig recorded: how it differs from the published one."""
+
+REMEDY = "see `mckibben rig show` for all parameters, with units and ranges"
 
 FORMAT = "mckibben-rig"
 FORMAT_VERSION = 1
@@ -141,14 +144,26 @@ def _write_section(section: BaseModel, path: str, lines: list[str]) -> None:
         ):
             later += [(f"{name}.{key}", item) for key, item in value.items()]
         else:
-            words = ", ".join(part for part in (field.description, limits(field)) if part)
-            of_unit = f"[{unit(field)}] " if unit(field) else ""
-            comment = f"  # {of_unit}{words}" if words or of_unit else ""
+            words = ", ".join(part for part in (field.description, _limits(field)) if part)
+            extra = field.json_schema_extra
+            unit = extra.get("unit") if isinstance(extra, dict) else None
+            comment = f"  # [{unit}] {words}" if unit else f"  # {words}" * bool(words)
             lines.append(f"{name} = {_toml(value)}{comment}")
     for name, inner in later:
         whole = f"{path}.{name}" if path else name
         lines += ["", f"[{whole}]"]
         _write_section(inner, whole, lines)
+
+
+def _limits(field: FieldInfo) -> str:
+    """Return the range of a field, empty if there is none."""
+    words = []
+    for rule in field.metadata:
+        for name, text in (("ge", "at least"), ("gt", "above"), ("le", "at most"), ("lt", "below")):
+            bound = getattr(rule, name, None)
+            if bound is not None:
+                words.append(f"{text} {bound:g}")
+    return ", ".join(words)
 
 
 def _toml(value: Any) -> str:
@@ -198,7 +213,7 @@ def _from_fields(fields: dict[str, Any], path: Path) -> Rig:
     try:
         return model.model_validate(fields)
     except ValidationError as error:
-        raise refused(error, model, path) from None
+        raise invalid(error, path, REMEDY) from None
 
 
 def _plain(value: Any) -> Any:

@@ -73,16 +73,6 @@ class Creep(Section):
         return self
 
 
-class Heat(Section):
-    """Warming by internal losses, which softens rubber and friction; off by default."""
-
-    softening: float = parameter(
-        "stiffness and friction lost per kelvin", "1/K", ge=0, le=0.05, default=0.0
-    )
-    capacity: float = parameter("heat capacity of the muscle", "J/K", gt=0, default=100.0)
-    cooling: float = parameter("time constant of cooling", "s", ge=1, default=600.0)
-
-
 class Muscle(Section):
     """A muscle: a bladder in a braid. Contractile below 54.7 degrees braid angle, extensor above."""
 
@@ -104,7 +94,6 @@ class Muscle(Section):
     push: float = parameter("buckling force", "N", ge=0, le=1e6, default=0.0)
     friction: Friction
     creep: Creep
-    heat: Heat = Heat()
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -152,9 +141,6 @@ class Muscle(Section):
         made["creep"][0, :n] = self.creep.stiffness
         made["creep_time"][0, :n] = self.creep.time
         made["push"] = self.push if self.kind == "contractile" else np.inf
-        made["softening"] = self.heat.softening
-        made["heat_capacity"] = self.heat.capacity
-        made["cooling"] = self.heat.cooling
         return made
 
 

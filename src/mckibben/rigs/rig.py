@@ -15,15 +15,12 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.recording import PROVENANCE, Recording
 from mckibben.rigs.commands import Commands
-from mckibben.rigs.files import CHANGES, changes
+from mckibben.rigs.files import CHANGES, REMEDY, changes
 from mckibben.rigs.parameters import AGEING, Air, Muscle, Range, Section, Sensor, parameter
-from mckibben.rigs.refusals import refused
 from mckibben.rigs.system import Demands, State, System, Traces
 from mckibben.signals.checking import generator
 from mckibben.system.showing import DrawsItself
-
-ROOM_TEMPERATURE = 20.0
-"""Where every muscle starts [degC]."""
+from mckibben.system.validation import invalid
 
 
 class Rig(DrawsItself, Section, ABC):
@@ -160,7 +157,7 @@ class Rig(DrawsItself, Section, ABC):
         try:
             return type(self).model_validate(fields)
         except ValidationError as error:
-            raise refused(error, type(self), f"rig {self.name}") from None
+            raise invalid(error, f"rig {self.name}", REMEDY) from None
 
     def aged(self, factors: Mapping[str, float]) -> Self:
         """Return the rig with aged muscles in its current state.
@@ -205,8 +202,7 @@ class Rig(DrawsItself, Section, ABC):
         seed : int
             Of the sensor noise.
         ideal : bool
-            Read perfect sensors, and add ``volume`` [ml] and ``temperature`` [degC] of the
-            muscle(s).
+            Ideal sensors; adds the ``volume`` [ml] of every muscle.
         held : bool
             Hold each command until the next sample, as `step` does, rather than join them by lines.
 
@@ -231,7 +227,7 @@ class Rig(DrawsItself, Section, ABC):
         readings = self._readings(traces, seen)
         self._refuse_divergence(readings)
         if ideal:
-            readings |= _inside(traces)
+            readings |= _volumes(traces)
         else:
             rng = generator(seed)
             noise = rng.standard_normal((len(inputs), len(self.outputs)))
@@ -398,14 +394,10 @@ class _Running:
         self.saturated: dict[str, int] = {}
 
 
-def _inside(traces: Traces) -> dict[str, Array]:
-    """Return unmeasured quantities: volume [ml] and temperature [degC] of every muscle."""
+def _volumes(traces: Traces) -> dict[str, Array]:
+    """Return the volume of every muscle [ml], which no sensor measures."""
     m = traces.room.shape[1]
-    names = [""] if m == 1 else [f"_{j + 1}" for j in range(m)]
-    found = {f"volume{name}": 1e-3 * traces.room[:, j] for j, name in enumerate(names)}
-    return found | {
-        f"temperature{name}": ROOM_TEMPERATURE + traces.warmth[:, j] for j, name in enumerate(names)
-    }
+    return {f"volume_{j + 1}" if m > 1 else "volume": 1e-3 * traces.room[:, j] for j in range(m)}
 
 
 def quantity(channel: str) -> str:

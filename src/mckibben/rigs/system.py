@@ -44,7 +44,7 @@ class System(NamedTuple):
     ) -> Traces:
         """March through all samples, changing the state; see `mckibben.rigs.physics.motion.march`."""
         n, m = int(self.mechanism["n"][0]), self.muscles.size
-        rows = np.empty((len(demands.commands), 2 * n + 4 * m))
+        rows = np.empty((len(demands.commands), 2 * n + 3 * m))
         steps = max(int(np.ceil(sample_time / longest_step - 1e-9)), 1)
         march(
             *self,
@@ -88,6 +88,6 @@ class Traces:
 
     def __init__(self, rows: Array, n_coordinates: int, n_muscles: int) -> None:
         n, m = n_coordinates, n_muscles
-        ends = np.cumsum([n, n, m, m, m])
+        ends = np.cumsum([n, n, m, m])
         parts = np.split(rows, ends, axis=1)
-        self.place, self.acceleration, self.pressure, self.tension, self.room, self.warmth = parts
+        self.place, self.acceleration, self.pressure, self.tension, self.room = parts

@@ -95,8 +95,8 @@ COMMANDS: Mapping[str, Sequence[str]] = {
 
 SLOW = {"plan"}
 
-TOOLS = {"export-fmu": ("x86_64-w64-mingw32-gcc",)}
-"""Case -> what it is compared with alone: libraries for all systems."""
+TOOLS = {"export-fmu": ("cc",)}
+"""Case -> tools without which it is not compared."""
 
 REFUSED: Mapping[str, str] = {
     "no-such-file": "info missing.csv",

@@ -78,11 +78,6 @@ def twin(make: Make, limits: Mapping[str, tuple[float, float]] | None, folder: P
     return Twin(make(folder), limits=limits)
 
 
-def scattering(folder: Path) -> Twin:
-    """Return a twin that scatters as its band says."""
-    return Twin(mckibben.calibrate(other(folder), list(runs("muscle"))))
-
-
 def waves(low: float, high: float, n: int = 300) -> np.ndarray:
     """Return a motion between two ends that never comes twice."""
     t = np.arange(n) * STEP
@@ -128,7 +123,6 @@ LOOPS: Mapping[str, Loop] = {
     "twin": Loop(INVERSE, TWIN, KNOWN),
     "twin-beyond": Loop(INVERSE, TWIN, BEYOND),
     "twin-slew": Loop(INVERSE, TWIN, KNOWN, options={"slew": 2.0, "settle": 3.0}),
-    "twin-scatters": Loop(INVERSE, scattering, KNOWN, options={"seed": 3}),
     "twin-feedback": Loop(INVERSE, TWIN, KNOWN, "feedforward-pid", {"noise": 0.05, "delay": 2}),
     "twin-observer": Loop(INVERSE, TWIN, KNOWN, "observer"),
     "twin-adaptive": Loop(partial(inverse, known, "--adaptive"), TWIN, KNOWN),
@@ -180,8 +174,6 @@ def closed(name: str, folder: Path) -> Tree:
         "rmse": rounded({name: float(value) for name, value in found.rmse.items()}),
         "largest": rounded({name: float(value) for name, value in found.largest.items()}),
         "clipped": found.clipped,
-        "clipping_cost": rounded(float(found.clipping_cost)),
-        "scatter": dict(found.scatter),
         "beyond": {name: [one.low, one.high] for name, one in found.beyond.items()},
         "start_time": recording.start_time,
         "traces": {

@@ -17,8 +17,6 @@ from tests.golden.running import same, stored
 
 DURATION = 3.0
 N_STORED = 40
-FITTED = 1e-6
-"""Of what a rig from a data sheet is solved for, by root finding."""
 
 CHANGED: dict[str, dict[str, Any]] = {
     "mas10-test-stand": {"muscle.c10": 0.2},
@@ -100,22 +98,6 @@ def answers(name: str, folder: Path) -> Tree:
     }
 
 
-def data_sheet(folder: Path) -> Tree:
-    """Return a rig made of a data sheet's numbers, and what it records."""
-    del folder
-    rig = rigs.rig_from_data_sheet(
-        name="own",
-        diameter=20.0,
-        length=300.0,
-        max_pressure=6.0,
-        max_force=1500.0,
-        max_contraction=0.25,
-        payload=5.0,
-        loop_width=0.2,
-    )
-    return {"parameters": described(rig), "run": traces(rig.run(commands(rig), seed=1))}
-
-
 def protocol_run(folder: Path) -> Tree:
     """Return a run of a printed protocol on another rig than its own."""
     del folder
@@ -153,6 +135,5 @@ def cases() -> Iterator[Case]:
     """Yield a case for every published rig, and for rigs made of them."""
     for name in rigs.rig_names():
         yield Case(f"rigs/{name}", f"{name}: run, step, changed, aged", partial(answers, name))
-    yield Case("rigs/data-sheet", "rig_from_data_sheet(...).run(...)", data_sheet, {"*": FITTED})
     yield Case("rigs/protocol", "record('field-models', rig, runs=..., seed=5)", protocol_run)
     yield Case("rigs/environments", "gymnasium.make(...), reset, step", environment)

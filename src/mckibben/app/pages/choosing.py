@@ -1,4 +1,4 @@
-"""The drawer that models are chosen in: by what they are for, with reasons, and with their settings."""
+"""The drawer that models are chosen in: by what they are for, with reasons."""
 
 from __future__ import annotations
 
@@ -14,11 +14,7 @@ from mckibben.app.state import State
 from mckibben.app.terms import said
 from mckibben.app.widgets import mark
 from mckibben.comparison.channels import Channels
-from mckibben.estimators.catalogue import Need, ability, declared, full_name, settings_of
-from mckibben.estimators.core.settings import Setting, setting_value, settings_with_defaults
-
-OWN = ("input", "output", "scheduling")
-"""Settings that are chosen as channels."""
+from mckibben.estimators.catalogue import Need, ability, declared, full_name
 
 INVERSES = {
     "exact": "exact inverse",
@@ -26,8 +22,6 @@ INVERSES = {
     "solved": "inverse by solving",
     "none": "no inverse",
 }
-
-OWN_CHOICE = "its own choice"
 
 
 def choose(state: State) -> None:
@@ -56,7 +50,6 @@ class _Choice:
         self.state, self.sides, self.offered, self.drawer = state, sides, offered, drawer
         before = state.chosen.get("models.ticked", ())
         self.ticked = [name for name in before if name in offered.models] or offered.quick
-        self.settings: dict[str, dict[str, Any]] = state.chosen.setdefault("models.settings", {})
         self.boxes: dict[str, Any] = {}
         told = f", given {', '.join(sides.scheduling)}" if sides.scheduling else ""
         sets = {"Quick choice": offered.quick, "All": offered.models, "None": []}
@@ -102,15 +95,6 @@ class _Choice:
         about += [f"good only near its training: {kind.caution}"] * bool(kind.caution)
         text = "; ".join(filter(None, about))
 
-        def fold() -> None:
-            place.set_visibility(not place.visible)
-            if not place.default_slot.children:
-                given = self.settings.setdefault(model, {})
-                with place:
-                    for one in settings_with_defaults(kind):
-                        if one.name not in OWN:
-                            mark(_field(one, given), f"set-{one.name}")
-
         with ui.element("div").classes("model"):
             box = ui.checkbox(value=model in self.ticked).props("dense")
             box.on_value_change(lambda event: self._tick(model, event.value))
@@ -119,10 +103,6 @@ class _Choice:
             with words.on("click", lambda: box.set_value(not box.value), []):
                 ui.label(f"{title} · {model}")
                 ui.label(f"{ability(model)} {text[:1].upper()}{text[1:]}.").classes("muted")
-            button = widgets.icon_button("tune", f"Settings of {model}", fold)
-            mark(button, f"settings-{model}")
-            place = ui.element("div").classes("columns-even settings")
-            place.set_visibility(False)
 
     def _only(self, models: list[str]) -> None:
         for model, box in self.boxes.items():
@@ -145,11 +125,9 @@ class _Choice:
         given: dict[str, Any] = {"inputs": list(sides.inputs), "outputs": list(sides.outputs)}
         given["load"] = (sides.scheduling or ("",))[0]
         given["allow_shared"] = bool(state.chosen.get("models.shared"))
-        settings = {name: settings_of(name, self.settings.get(name, {})) for name in self.ticked}
         state.jobs.forget_ended("fit")
         for model in sorted(self.ticked, key=self.offered.seconds):
-            more = {"model": model, "settings": settings[model]}
-            state.jobs.submit(modelling.fit, model, **given, **more)
+            state.jobs.submit(modelling.fit, model, model=model, **given)
         self.drawer.close()
         state.chosen.pop("models.picked", None)
         state.changed()
@@ -160,29 +138,3 @@ def _time(seconds: float) -> str:
     if seconds < 15:
         return "seconds"
     return "a minute" if seconds < 90 else "minutes" if seconds < 1800 else "an hour or more"
-
-
-def _field(one: Setting, given: dict[str, Any]) -> Any:
-    """Make the control of a setting, of which what differs from the default is taken."""
-
-    def taken(event: Any) -> None:
-        value = event.value
-        if isinstance(value, str):
-            value = setting_value(value) if value and not one.choices else value or None
-        given.pop(one.name, None)
-        if value is not None and value != one.default:
-            given[one.name] = int(value) if one.kind == "whole" else value
-
-    label, now = one.name.replace("_", " "), given.get(one.name, one.default)
-    if one.kind in ("choice", "flag"):
-        options: dict[Any, str] = {choice: str(choice) for choice in one.choices}
-        options = options or {True: "yes", False: "no"}
-        options |= {None: OWN_CHOICE} if one.optional else {}
-        found: Any = ui.select(options, value=now, label=label, on_change=taken)
-    elif one.kind in ("whole", "number"):
-        found = ui.number(label, value=now, on_change=taken, placeholder=OWN_CHOICE)
-    else:
-        text = "" if one.name not in given else str(now)
-        found = ui.input(label, value=text, on_change=taken, placeholder=str(one.default))
-    found.props["hint"] = one.meaning.replace("``", "")
-    return found.props("dense outlined stack-label hide-bottom-space")

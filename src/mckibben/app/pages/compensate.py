@@ -1,8 +1,8 @@
-"""Compensate: a motion that is wanted, what undoes the hysteresis, and how well the two are followed."""
+"""Compensate: a desired motion, a compensator, and its tracking error."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -26,7 +26,7 @@ ICON = "moving"
 
 TABS = {"motion": "Follow a motion", "force": "Estimate a force", "log": "Review a log"}
 
-SHAPES = {**following.MOTIONS, "hold": "Stay at one value", "points": "Points, or from a file"}
+SHAPES = {**following.MOTIONS, "hold": "Stay at one value", "points": "From a file"}
 
 LOOP = ("approach", "settle", "noise", "delay", "slew", "preview", "pressure_loop", "seed")
 """Fields of `TrackOptions` that are asked for."""
@@ -37,12 +37,6 @@ USUAL = ("feedforward", "feedforward-pid")
 DRIVEN = ("pressure", "voltage", "force", "command")
 """What channels that drive a plant begin with."""
 
-DRAWN = 4
-"""Most runs in a plot."""
-
-ROWS = 100
-"""Most points that are edited in a table."""
-
 Json = dict[str, Any]
 
 
@@ -51,7 +45,7 @@ async def build(state: State) -> None:
     with mark(ui.element("div").classes("page"), "page-compensate"):
         widgets.heading(
             "Compensate",
-            "Inverses of models: what to command for a wanted motion, and how well it works.",
+            "Inverses of models: commands for a desired motion, and the tracking error.",
         )
         spinner = ui.spinner()
         await run.io_bound(_prepare, state)
@@ -109,7 +103,7 @@ def _empty(state: State, tab: str) -> None:
     else:
         title = "A compensator is the inverse of a model"
         text = (
-            "Its inverse says what to command so that the muscle moves as wanted. Fit a model that "
+            "It computes the commands for a desired motion. Fit a model that "
             "has one, such as gpi for one muscle, or balance or sdchm for several."
         )
     with widgets.card(), widgets.empty("moving", title, text):
@@ -204,62 +198,11 @@ def _motion(state: State, names: list[str]) -> None:
             for key, channel in held.items():
                 field(wish["held"], key, axis_label(f"{key}, held", channel.unit))
         with widgets.row():
-            mark(widgets.button("Edit points", lambda: _edit(state), "table_rows"), "edit-points")
             with ui.element("div").style("display: none"):
                 files = widgets.upload("", loaded, ".csv,.tsv,.txt,.parquet,.xlsx,.mat")
                 mark(files, "reference-file")
             widgets.button("From a file", lambda: files.run_method("pickFiles"), "upload_file")
     _compensator(state, name)
-
-
-def _edit(state: State) -> None:
-    """Edit the points of the channel at hand as a table."""
-    wish = _wish(state)
-    name, own = wish["now"], wish["channels"][wish["now"]]
-    if len(own["points"]) > ROWS:
-        problem = f"these are {len(own['points'])} points, and a table has {ROWS} at most"
-        raise DataError(problem, remedy="choose another shape first, or change the file")
-    points: list[list[Any]] = [[*point] for point in own["points"]]
-
-    def cell(point: list[Any], at: int, label: str) -> None:
-        found = ui.number(value=point[at], format="%.6g").props("dense borderless")
-        widgets.labelled(found, label)
-        found.on_value_change(lambda event: point.__setitem__(at, event.value))
-
-    def change(how: Callable[[], Any]) -> None:
-        how()
-        rows.refresh()
-
-    def use() -> None:
-        if any(None in point for point in points):
-            raise DataError("a number is missing", remedy="fill it in, or remove the point")
-        following.reference({name: points}, {}, wish["step"], {})
-        own.update(kind="points", points=points)
-        wish["stored"] = ""
-        window.close()
-        page.refresh()
-
-    @ui.refreshable
-    def rows() -> None:
-        cells = []
-        for at, point in enumerate(points, 1):
-            away = partial(change, partial(points.remove, point))
-            remove = partial(widgets.icon_button, "close", f"Remove point {at}", away)
-            fields = [partial(cell, point, 0, f"time of point {at}"),
-                      partial(cell, point, 1, f"{name} of point {at}")]  # fmt: skip
-            cells.append([*fields, remove])
-        widgets.table(["time [s]", name, ""], cells)
-
-    with widgets.dialog(f"Points of {name}") as window:
-        rows()
-        with widgets.row(classes="spread"):
-
-            def add() -> None:
-                time, value = points[-1] if points else (-1.0, 0.0)
-                points.append([(time or 0.0) + 1.0, value])
-
-            mark(widgets.button("Add a point", partial(change, add), "add"), "add-point")
-            mark(widgets.primary("Use these", use), "use-points")
 
 
 # -- compensator, plant, run --------------------------------------------------------------------------
@@ -319,20 +262,19 @@ async def _start(state: State, name: str) -> None:
         trying.start(state, following.loop, title, asked | more)
 
 
-# -- what came of it ----------------------------------------------------------------------------------
+# -- results ----------------------------------------------------------------------------------
 
 
 @parts.steady("runs", jobs=["loop"])
 def followed(state: State) -> None:
-    """Show the motion, what came of it, and the errors of all runs of the model."""
+    """Show the motion, the chosen run, and the errors of all runs of the model."""
     wish, runs, reference = _wish(state), _runs(state), _reference(state)
     reach = following.reach(state.workspace, _able(state))
     of_it = [run for run, one in runs.items() if one["reference"] == wish["stored"]]
     chosen = state.chosen.get("compensate.run")
     chosen = chosen if chosen in of_it else next(iter(of_it), "")
-    with widgets.card("What is wanted, and what came of it" if chosen else "What is wanted"):
-        drawn = sorted(of_it, key=lambda run: run != chosen)[:DRAWN]
-        _plot(state, reference, reach, {run: runs[run] for run in drawn})
+    with widgets.card("Desired and measured motion" if chosen else "Desired motion"):
+        _plot(state, reference, reach, runs[chosen] | {"name": chosen} if chosen else None)
         if doubt := modelling.against(modelling.comparable(state.workspace, state.sides)):
             widgets.error_box(doubt)
         together = "; each channel by itself, all at once less" if len(reach) > 1 else ""
@@ -347,7 +289,7 @@ def followed(state: State) -> None:
         if runs:
             _errors(state, runs, chosen)
         else:
-            text = "Run shows the errors beside no compensation, and the commands, here."
+            text = "Run shows the errors with and without compensation, and the commands."
             mark(ui.label(text).classes("muted"), "nothing-yet")
         if chosen:
             with widgets.details(f"More of {_title(runs[chosen])}"):
@@ -370,41 +312,36 @@ def _scored(state: State, name: str) -> Recording | None:
 
 
 def _plot(
-    state: State,
-    reference: Recording,
-    reach: Mapping[str, tuple[float, float]],
-    runs: Mapping[str, Json],
+    state: State, reference: Recording, reach: Mapping[str, tuple[float, float]], run: Json | None
 ) -> None:
-    """Draw what is wanted, what can be reached, and what runs measured, the first before others.
+    """Draw the desired motion, the reachable range, and what a run measured; below, its commands."""
+    one = None if run is None else _scored(state, run["name"])
+    panels = []
+    for place, channel in enumerate(reach):
 
-    Below are the commands of the first.
-    """
-    panels, named = [], set[str]()
-    ran = {name: one for name in runs if (one := _scored(state, name)) is not None}
+        def curve(time: Any, y: Any, name: str, colour: str, style: Any = "line") -> Curve:
+            shown = "" if place else name  # in the legend once  # noqa: B023
+            return Curve(*over_time(time, y), shown, colour, style)
 
-    def curve(time: Any, y: Any, name: str, colour: str, style: Any = "line") -> Curve:
-        """Return a curve whose name is in the legend once."""
-        shown = "" if name in named else name
-        named.add(name)
-        return Curve(*over_time(time, y), shown, colour, style)
-
-    for channel in reach:
-        curves = [curve(reference.time, reference[channel], "wanted", "measured")]
-        for place, (name, one) in enumerate(ran.items()):
+        curves = [curve(reference.time, reference[channel], "desired", "measured")]
+        if one is not None and run is not None:
             due = one.time - (one.sample_time or 0.0)  # it is recorded a step later
             plain = one.channels.get(f"uncompensated_{channel}")
-            if plain is not None and place == 0:
+            if plain is not None:
                 curves.append(curve(due, plain, "no compensation", "muted", "fine"))
             if channel in one:
-                curves.append(curve(due, one[channel], _title(runs[name]), series_colour(place)))
+                curves.append(curve(due, one[channel], _title(run), series_colour(0)))
         label = axis_label(channel, reference.units.get(channel, ""))
         panels.append(Panel("time [s]", label, tuple(curves)))
-    for name, one in [*ran.items()][:1]:
-        known = {*runs[name].get("rmse", {}), *_wish(state)["held"]}
+    if one is not None and run is not None:
+        known = {*run.get("rmse", {}), *_wish(state)["held"]}
         driven = [key for key in one.channels if key.startswith(DRIVEN) and key not in known]
         moved = [key for key in driven if np.ptp(one[key]) > 0]
         moved = [key for key in moved if key.startswith("command_")] or moved
-        commands = [curve(one.time, one[x], x, series_colour(k)) for k, x in enumerate(moved)]
+        commands = [
+            Curve(*over_time(one.time, one[x]), x, series_colour(k), "line")
+            for k, x in enumerate(moved)
+        ]
         if moved:
             label = axis_label("command", one.units.get(moved[0], ""))
             panels.append(Panel("time [s]", label, tuple(commands)))

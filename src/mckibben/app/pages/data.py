@@ -50,6 +50,7 @@ def build(state: State) -> None:
         with ui.element("div").style("display: none"):
             files = _upload(state)
         start(state)
+        arriving(state)
         with ui.element("div").classes("columns"):
             with ui.element("div").classes("stack"):
                 listed(state)
@@ -97,13 +98,22 @@ def start(state: State) -> None:
 
 
 @view
+def arriving(state: State) -> None:
+    """Show which files are being read."""
+    if names := state.chosen.get("data.reading"):
+        with widgets.card(), widgets.row():
+            ui.spinner()
+            mark(ui.label(f"Reading {', '.join(names)}"), "reading")
+
+
+@view
 def listed(state: State) -> None:
     """Show all recordings, and what drives and what moves."""
     if not _is_empty(state):
         with widgets.card("Recordings"):
             _recordings(state, state.workspace.entries())
         if state.workspace.used():
-            with widgets.card("What drives, what moves"):
+            with widgets.card("Inputs and outputs"):
                 _sides(state, state.workspace.channels())
 
 
@@ -116,7 +126,7 @@ def shown(state: State) -> None:
             with widgets.card():
                 _recording(state, entry)
     if state.inputs and state.outputs:
-        text = "Channels and roles are right? See what the muscle does."
+        text = "Channels and roles are right? Characterize the muscle."
         widgets.next_step(text, "Look", "/look")
 
 
@@ -160,11 +170,15 @@ async def _received(state: State, event: events.UploadEventArguments) -> None:
     """Keep a file, and read it as it is; where that does not work, ask."""
     with state.workspace.receiving(event.file.name, event.file.size()) as (part, path):
         await event.file.save(part)
-    unread = _unread(state)
+    unread, reading = _unread(state), state.chosen.setdefault("data.reading", [])
+    reading.append(path.name)
+    arriving.refresh()
     try:
         state.recording, *_ = await asyncio.to_thread(state.workspace.add, path.name)
     except MckibbenError as error:
         unread[path.name] = error
+    finally:
+        reading.remove(path.name)
     state.changed()
     if [*unread] == [path.name]:
         await _ask(state, path.name)
@@ -231,7 +245,7 @@ def _recordings(state: State, entries: list[Entry]) -> None:
         first, *others = unread  # mostly, they are alike
         widgets.error_box(unread[first])
         with widgets.row():
-            widgets.button("How is it read?", partial(_ask, state, first))
+            widgets.button("Import settings", partial(_ask, state, first))
             widgets.button("Discard", partial(discard, first))
         if others:
             ui.label(f"Not read yet either: {', '.join(others)}").classes("muted")
@@ -268,13 +282,9 @@ def _sides(state: State, known: list[str]) -> None:
     workspace = state.workspace
     if not known:
         widgets.error_box(
-            "The recordings in use have no channel in common. Join those of one run, set one of them to "
-            "unused, or correct how it is read"
+            "The recordings in use have no channel in common. Set one of them to unused, or correct how "
+            "it is read"
         )
-        if several := together.pairs(workspace):
-            text = f"Join {' and '.join(several[0])}" + " …" * (len(several) > 1)
-            join = partial(_changed, state, together.join, workspace)
-            mark(widgets.button(text, join, "merge"), "join")
         return
     if times := together.sample_times(workspace):
         slow = f"{times[1]:.4g}"
@@ -283,7 +293,7 @@ def _sides(state: State, known: list[str]) -> None:
             alike = partial(_changed, state, together.resample, workspace, times[1])
             mark(widgets.button(f"Resample to {slow} s", alike), "one-rate")
     if state.outputs == ["force"] and "pressure" in known and "pressure" not in state.inputs:
-        ui.label("Models of a force are given the pressure, too.").classes("muted")
+        ui.label("Models of a force also use the pressure.").classes("muted")
     rest = [name for name in known if name not in (*state.inputs, *state.outputs)]
 
     def choose(side: str, event: Any) -> None:
@@ -315,8 +325,8 @@ def _recording(state: State, entry: Entry) -> None:
     ui.label(importing.summary(recording)).classes("muted")
     _part(state, entry, recording)
     _steps(state, entry, recording)
-    if notes := dict.fromkeys([*recording.notes, *entry.notes]):
-        with widgets.details("Notes of the reading"):
+    if notes := dict.fromkeys(recording.notes):
+        with widgets.details("Import notes"):
             for note in notes:
                 ui.label(said(note)).classes("muted")
 
@@ -342,7 +352,7 @@ def _actions(state: State, entry: Entry) -> None:
     picked = ui.toggle(ROLES, value=entry.role).props("dense no-caps unelevated")
     role = widgets.guarded(lambda e: act(partial(workspace.change, name, role=e.value)))
     mark(picked.props("toggle-color=primary").on_value_change(role), "role")
-    mark(widgets.button("How it is read", lambda: _correct(state, entry), "tune"), "correct")
+    mark(widgets.button("Import settings", lambda: _correct(state, entry), "tune"), "correct")
     widgets.icon_button("edit", "Rename", rename)
     mark(widgets.icon_button("delete_outline", "Remove", remove), "remove")
 

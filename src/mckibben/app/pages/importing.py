@@ -180,7 +180,7 @@ async def ask(
         made.bind_value(form.values, name).on_value_change(check).props(FIELD)
 
     understood, columns = ui.refreshable(_understood), ui.refreshable(_columns)
-    with widgets.dialog(f"How is {path.name} read?") as shown:
+    with widgets.dialog(f"Import settings of {path.name}") as shown:
         mark(shown, "importing")
         understood(form)
         columns(form, check)
@@ -189,7 +189,7 @@ async def ask(
             bound(ui.number("Rest length [mm]").props("clearable"), "rest_length")
             bound(ui.select(GAPS, label="Gaps"), "gaps")
             held = ui.input("Held, such as force = 200 g")
-            bound(held.tooltip("A channel that stood still and has no column"), "held")
+            bound(held.tooltip("A constant channel that has no column"), "held")
             bound(ui.checkbox("Codes and counters as measured"), "raw")
         if lines := form.lines():
             with widgets.details("Lines, header and encoding of the text"):

@@ -25,7 +25,6 @@ from mckibben.recording import Recording
 from mckibben.report import results
 from mckibben.report.builder import Text
 from mckibben.report.figures import draw
-from mckibben.report.subjects import loop_by
 
 TITLE = "Look"
 ICON = "insights"
@@ -45,7 +44,7 @@ def build(state: State) -> None:
     """Build the page."""
     with mark(ui.element("div").classes("page"), "page-look"):
         with widgets.row(classes="spread"):
-            text = "What the muscle does, and what the recordings do not show yet."
+            text = "Characterization of the muscle, and data gaps of the recordings."
             widgets.heading("Look", text)
             if state.workspace.names("recordings"):
                 choose = partial(ui.navigate.to, "/models")
@@ -76,11 +75,11 @@ def content(state: State) -> None:
         with ui.element("div").classes("stack"):
             with widgets.card("Recordings"):
                 _recordings(state, used, shown)
-            with widgets.card("What the muscle does" + f": {pair[1]}" * (len(sides.outputs) > 1)):
+            with widgets.card("Characterization" + f": {pair[1]}" * (len(sides.outputs) > 1)):
                 _words(state, runs, sides, pair)
         with ui.element("div").classes("stack"):
             if len(every) > 1:
-                with widgets.card("What moves what"):
+                with widgets.card("Effects of inputs on outputs"):
                     _coupling(state, found, pair)
             with widgets.card():
                 _figure(state, [used[name] for name in shown], sides, pair)
@@ -139,35 +138,22 @@ def _coupling(state: State, found: Coupling, pair: Pair) -> None:
         rows.append([wanted, *cells, f"{100 * max(share, 0):.0f} %"])
     mark(widgets.table(["", *found.inputs, "Explained"], rows), "coupling")
     ui.label(
-        "What each input over its whole range does to an output, by one straight line through all "
-        "inputs. The rest, up to 100 %, is bent, remembers, or takes time. Choose a number to see its "
-        "loop."
+        "Effect of each input over its whole range on an output, by linear regression on all inputs. "
+        "The rest, up to 100 %, is nonlinear, hysteretic or dynamic. Choose a number to see its loop."
     ).classes("muted")
 
 
 def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
     (given, wanted), kind = pair, state.chosen.get("look.view", "loop")
     shared = [name for name in runs[0].channels if all(name in run for run in runs)]
-    spans = {name: np.ptp(np.concatenate([run[name] for run in runs])) for name in shared}
-    free = [name for name in shared if name not in pair and spans[name] > 0]
-    by = state.chosen.get("look.by", "")
     named = [n for n in (*sides.inputs, *sides.outputs, *(sides.scheduling or ())) if n in shared]
     channels = [*dict.fromkeys([given, wanted, *(named if len(named) <= MOST else ())])]
     with widgets.row(classes="spread"):
         ui.label(f"{wanted} over {given}").classes("subtitle")
-        with widgets.row():
-            if kind == "loop" and free:
-                options = {"": "Colour by recording or time"}
-                options |= {name: f"Colour by {name}" for name in free}
-                colour = ui.select(options, value=by if by in free else "").props("dense outlined")
-                widgets.labelled(colour, "Colour")
-                colour.on_value_change(lambda event: _choose(state, "look.by", event.value))
-            toggle = ui.toggle(VIEWS, value=kind).props("no-caps unelevated dense")
-            toggle.on_value_change(lambda event: _choose(state, "look.view", event.value))
+        toggle = ui.toggle(VIEWS, value=kind).props("no-caps unelevated dense")
+        toggle.on_value_change(lambda event: _choose(state, "look.view", event.value))
     if kind == "time":
         drawing = draw(runs, "time", channels=channels)
-    elif by in free:
-        drawing = loop_by(runs, given, wanted, by)
     else:
         drawing = draw(runs, "loop", input=given, output=wanted)
     for plot in widgets.plot(drawing, height=360 if kind == "loop" else 130 + 90 * len(channels)):
@@ -177,7 +163,7 @@ def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) ->
 
 
 def _words(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
-    """Show what the muscle does: a few sentences, and all numbers behind a fold-out."""
+    """Show the characterization: a few sentences, and all numbers behind a fold-out."""
     beside = tuple(n for n in (*sides.inputs, *(sides.scheduling or ())) if n != pair[0])
     key = "characterization", state.workspace.digest(), pair, beside
     make = partial(characterize, runs, *pair, beside=beside)
@@ -189,7 +175,7 @@ def _gaps(state: State, sides: Channels, pair: Pair) -> None:
     """Show what the recordings cannot identify."""
     train, test = state.workspace.train_and_test()
     inputs = sides.inputs if len(sides.inputs) > 1 else (pair[0],)
-    none = [Text(["Nothing is missing: the recordings show all that models ask for."])]
+    none = [Text(["The recordings have no data gaps."])]
     key = "gaps", state.workspace.digest(), inputs, sides.outputs
     make = partial(data_gaps, train or test, inputs, sides.outputs, tests=test if train else ())
     with mark(ui.element("div"), "gaps"):
@@ -208,7 +194,7 @@ def _planned(state: State) -> None:
         with mark(ui.element("div").classes("stack"), "planned"):
             ui.label("Planned").classes("subtitle")
             widgets.items([one for one in items if isinstance(one, Text)])
-            with widgets.details("Its steps, and what they tell"):
+            with widgets.details("Its steps, and the gaps they close"):
                 widgets.items([one for one in items if not isinstance(one, Text)])
     with widgets.row():
         text = "Plan another" if made else "Plan the next recording"

@@ -17,24 +17,21 @@ from mckibben.app.state import State
 from mckibben.app.terms import said
 from mckibben.app.widgets import mark
 from mckibben.arrays import Array
-from mckibben.blocks.bands import Banded
 from mckibben.blocks.free_run import run_free
 from mckibben.comparison.channels import Channels
 from mckibben.diagnosis.coupling import coupling
 from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.estimators.catalogue import caution, full_name
 from mckibben.numerals import number, typeset, typeset_within
-from mckibben.recording import Recording
 from mckibben.report import interactive, results, subjects
 from mckibben.report.builder import Figure, Table
 from mckibben.report.columns import Column, columns_of
-from mckibben.report.drawing import POINTS, over_time
 from mckibben.report.words import CAREFUL, CHOICES
 
 TITLE = "Models"
 ICON = "leaderboard"
 
-FIGURES = {"loop": "loops", "time": "fit", "residual": "residuals", "band": "residuals"}
+FIGURES = {"loop": "loops", "time": "fit", "residual": "residuals"}
 """Tabs with a figure, and its kind."""
 
 TABS = (*FIGURES, "parameters", "check")
@@ -46,7 +43,7 @@ ENDED = 6
 """Fits that did not work that are shown."""
 
 FIRST = ("chosen", "test")
-"""Columns of the leaderboard; the others are behind a fold-out."""
+"""Columns of the leaderboard; the report has all."""
 
 OTHER_DATA = (
     "Those marked “other data” were fitted or tested on recordings that have changed since, so that "
@@ -71,7 +68,9 @@ def build(state: State) -> None:
                 board(state)
             with ui.element("div").classes("stack"):
                 closer(state)
-        figures(state)
+        widgets.next_step(
+            "Let the inverse of a model follow a reference.", "Compensate", "/compensate"
+        )
 
 
 def _compared(state: State) -> tuple[Channels, list[Json]]:
@@ -201,30 +200,10 @@ def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:
     ui.label(typeset_within(said(" ".join(notes)))).classes("muted")
 
 
-@parts.steady("models", "results")
-def figures(state: State) -> None:
-    """Show all figures of all models behind a fold-out, and what comes next."""
-    sides, rows = _compared(state)
-    if not rows:
-        return
-    found = columns_of(rows, rows[0]["unit"], sides.outputs, rows[0]["chosen_by"])
-    with widgets.details("All figures of all models"):
-        texts = [
-            [f"{typeset(one.text(row))} {one.flag(row)}".strip() for one in found] for row in rows
-        ]
-        lines = [[row["name"], *line] for row, line in zip(rows, texts, strict=True)]
-        widgets.table(["Model", *(one.label for one in found)], lines)
-        ui.label(
-            "Width reproduced: 100 % where rising and falling branches are as far apart as measured. "
-            "Inverse: exact by a formula, solved in every step, or none."
-        ).classes("muted")
-    widgets.next_step("One is good enough? Let it follow a reference.", "Compensate", "/compensate")
-
-
 # -- the model that is chosen ----------------------------------------------------------------------
 
 
-@parts.steady("models", "banded", "results", jobs=["check", "calibrate"], own=True)
+@parts.steady("models", "results", jobs=["check"], own=True)
 def closer(state: State) -> None:
     """Show the model that is chosen, in tabs."""
     sides, _ = _compared(state)
@@ -254,8 +233,6 @@ def closer(state: State) -> None:
                 mark(ui.tab(key, key.capitalize()), f"tab-{key}")
         if tab == "check":
             _check(state, row)
-        elif tab == "band" and name not in workspace.names("banded"):
-            _work(state, modelling.calibrate, "Calibrate a band", "straighten", BAND)
         else:
             _shown(state, tab, sides, row)
 
@@ -276,7 +253,7 @@ def _delete(state: State) -> None:
     name = state.model
 
     def delete() -> None:
-        for kind in ("models", "banded", "results"):
+        for kind in ("models", "results"):
             state.workspace.delete(kind, name)
         state.chosen.pop("models.picked", None)
         sure.close()
@@ -299,7 +276,7 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
         ui.label(text).classes("muted")
         return
     train = workspace.with_role("train")
-    key = workspace.digest(), parts.stamps(workspace, "models", "banded", of=name)
+    key = workspace.digest(), parts.stamps(workspace, "models", of=name)
     if tab == "parameters":
         fitted = [run for run in train if {*inputs, *outputs} <= {*run.channels}]
         on = fitted or [run for run, *_ in runs.values()]
@@ -323,37 +300,18 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
         place = outputs.index(wanted)
         y = modelled.reshape(len(run), -1)[:, place]
         drawn = subjects.against(FIGURES[tab], run, pair, {name: y}, tested)
-        plots = interactive.plots(drawn)[-1 if tab == "band" else 0 :]
-        banded = workspace.model(name, "banded") if tab == "band" else None
+        plots = interactive.plots(drawn)
         rows, unit = slice(tested or 0, None), run.units[wanted]
         off = float(np.sqrt(np.mean((y[rows] - run[wanted][rows]) ** 2)))
         what = f"{'the held-out part of ' if tested else ''}{run.name}"
         text = [f"RMSE of {wanted} on {what}: {number(off, 3)} {unit}".rstrip() + "."]
-        if isinstance(banded, Banded):
-            band = banded.band.simulate(modelled, sample_time=run.sample_time)
-            low, high = band.reshape(len(run), -1, 3)[:, place, 1:].T
-            plots[0]["data"].insert(0, _shade(run, low - y, high - y))
-            inside = ((low <= run[wanted]) & (run[wanted] <= high))[rows].mean()
-            text.append(f"The band holds {100 * inside:.0f} % of these samples.")
         with ui.element("div").classes("columns-even" if len(plots) > 1 else "stack"):
             for plot in plots:
                 mark(widgets.plot_of(plot, height=HEIGHT), f"closer-{tab}")
         ui.label(typeset_within(" ".join(text))).classes("muted")
-        if banded is not None:
-            widgets.items(modelling.restored(row.get("calibration") or {}))
-            _work(state, modelling.calibrate, "Calibrate again", "straighten")
 
     free = partial(run_free, block, run, outputs, train)
     later(("free", *key, run.name), free, show, height=HEIGHT)
-
-
-def _shade(run: Recording, low: Array, high: Array) -> Json:
-    """Return a band about the residual over time, as a trace."""
-    (t, lower), (back, upper) = (over_time(run.time, end, POINTS) for end in (low, high))
-    outline = {"x": np.append(t, back[::-1]), "y": np.append(lower, upper[::-1])}
-    trace = {"type": "scatter", "mode": "lines", "name": "band", "fill": "toself", "opacity": 0.3}
-    trace |= {"hoverinfo": "skip", "fillcolor": "--series-1", "line": {"width": 0}}
-    return trace | outline
 
 
 def _parameters(found: ModelDescription) -> None:
@@ -365,16 +323,9 @@ def _parameters(found: ModelDescription) -> None:
             widgets.items([item])
 
 
-BAND = (
-    "How far off may it be?",
-    "A band around the model's output holds a share of the samples of new recordings, such as 90 %. "
-    "It is calibrated on the test recordings.",
-)
-
 CHECK = (
-    "Is the model right?",
-    "What it leaves over is tested for what it may have missed: speed, load, creep, hysteresis, lags "
-    "and drift.",
+    "Validate the model",
+    "Residuals are tested for dependence on speed, load, creep, hysteresis, lags and drift.",
 )
 
 

@@ -117,8 +117,7 @@ def again(state: State, jobs: Sequence[Job], work: Work) -> None:
     """Do jobs that ended again."""
     for job in jobs:
         state.jobs.forget(job.name)
-        given = {name: value for name, value in job.given.items() if name != "title"}
-        state.jobs.submit(work, job.title, **given)
+        state.jobs.submit(work, job.title, **job.given)
     state.changed()
 
 

@@ -23,7 +23,7 @@ ICON = "inventory_2"
 def build(state: State) -> None:
     """Build the page."""
     with mark(ui.element("div").classes("page"), "page-takeaway"):
-        widgets.heading("Take away", "What was found, for a paper, a controller or a colleague.")
+        widgets.heading("Take away", "Results as files, for a paper, a controller or a colleague.")
         page(state)
         script(state)
         widgets.next_step("Run it on your rig, then review its log.", "Compensate", "/compensate")
@@ -74,7 +74,7 @@ def _options(state: State, key: str, thing: Thing) -> None:
     def ask(kind: type) -> None:
         with widgets.dialog(f"{thing.title}: options") as window:
             with widgets.row(classes="fields"):
-                forms.fields(kind, thing.fields, values, taking.FIGURES)
+                forms.fields(kind, thing.fields, values)
             with widgets.row(classes="spread"):
                 ui.space()
                 widgets.button("Done", window.close)
@@ -90,9 +90,8 @@ def _button(state: State, key: str, thing: Thing) -> None:
     async def take() -> None:
         values, of = state.chosen[f"takeaway.{key}"], _of(state)
         options = forms.given(thing.kind, values) if thing.kind else {}
-        plain = vars(thing.kind()) if thing.kind else {}
         stem = state.model if of["use"] == "model" else f"{state.model}-{of['use']}"
-        wish, _, ending = thing.file.format_map({"stem": stem, **plain, **options}).rpartition(".")
+        wish, _, ending = thing.file.format(stem=stem).rpartition(".")
         file = f"{state.workspace.new_name('takeaway', wish, '.' + ending)}.{ending}"
         path = state.workspace.path("takeaway", file)
         path.unlink()  # only its name was reserved; exports replace what they wrote alone
@@ -112,7 +111,7 @@ def _button(state: State, key: str, thing: Thing) -> None:
 @view
 def script(state: State) -> None:
     """Show the script that does it all again."""
-    if not taking.fitted(state.workspace)[0]:
+    if not taking.fitted(state.workspace):
         return
     text = taking.script(state.workspace, _of(state))
     with widgets.card("All of it as a script"):

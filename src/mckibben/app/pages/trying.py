@@ -29,7 +29,7 @@ def force(state: State, names: list[str]) -> None:
         if entry.name in used and needed <= {*used[entry.name].channels}
     }
     order = sorted(fitting, key=lambda name: not given <= {*used[name].channels})  # to compare with
-    with widgets.card("Force from what is measured"):
+    with widgets.card("Force from other channels"):
         text = f"From {', '.join(sorted(needed))}. As JSON, C or FMU: under Take away."
         ui.label(text).classes("muted")
         with widgets.row(classes="fields"):
@@ -85,10 +85,10 @@ def log(state: State, names: list[str]) -> None:
         asked = {"log": path.name, "model": name, "form": state.chosen["compensate.form"]}
         start(state, following.review, path.stem, asked)
 
-    with widgets.card("Back from the rig"):
+    with widgets.card("Log of a loop"):
         ui.label(
-            "A table over time with what was wanted (reference_displacement), what was measured "
-            "(displacement) and the measured pressure; command_pressure too, where there is one."
+            "A table over time with the reference (reference_displacement), the measured displacement "
+            "and pressure, and, if recorded, command_pressure."
         ).classes("muted")
         with widgets.row(classes="fields"):
             parts.select_model(state, names)
@@ -115,15 +115,15 @@ async def received(state: State, event: events.UploadEventArguments) -> tuple[An
 def reviewed(state: State) -> None:
     """Show where the error of a logged loop comes from."""
     found = following.newest(state.workspace, "reviews")
-    with widgets.card("Where the error comes from"):
+    with widgets.card("Sources of the error"):
         for job in parts.jobs_of(state, ["review"]):
             parts.show_job(state, job)
         if not found:
             text = (
-                "The log of a loop on your rig tells how much of the error is the model's, the "
-                "actuator's, a delay, drift or a limit."
+                "A review splits the error of a loop on your rig into parts of model, actuator, delay, "
+                "drift and limits."
             )
-            widgets.empty("fact_check", "How did it go on the rig?", text)
+            widgets.empty("fact_check", "No log was reviewed yet", text)
             return
         key = f"compensate.review-of-{len(found)}"  # so that a new one is shown at once
         options = {name: str(one["log"]) for name, one in found.items()}

@@ -1,6 +1,6 @@
 """Write the motion to record next: random motion within limits, and what closes data gaps.
 
-It starts and ends at rest. Expected standard errors of a model's parameters are printed.
+It starts and ends at rest.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Virtual rigs: list, show, run, record, new."""
+"""Virtual rigs: list, show, run, record."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def run(
     duration: Annotated[float, Option("Seconds.")] = 60.0,
     rate: Annotated[float | None, Option("Samples per second. Default: the rig's.", "HZ")] = None,
     changes: Changes = {},  # noqa: B006
-    ideal: Annotated[bool, Option("Ideal sensors; adds volume and temperature.")] = False,
+    ideal: Annotated[bool, Option("Ideal sensors; adds the muscle volumes.")] = False,
     seed: Seed = 0,
     force: Force = False,
     as_json: Json = False,
@@ -145,36 +145,6 @@ def record(
     show(about, lambda: lines, as_json)
 
 
-@command
-def new(
-    file: Annotated[Path, Argument("FILE", "File to write (.toml).")],
-    diameter: Annotated[float, Option("Inner diameter [mm].")],
-    length: Annotated[float, Option("Length at rest [mm].")],
-    max_pressure: Annotated[float, Option("Highest pressure [bar].")],
-    max_force: Annotated[float, Option("Force at rest length and that pressure [N].")],
-    max_contraction: Annotated[
-        float, Option("Contraction at that pressure without load, for instance 0.25.")
-    ],
-    payload: Annotated[float, Option("Mass hanging from it [kg].")] = 0.0,
-    loop_width: Annotated[
-        float, Option("Loop width e_w as a share of its stroke, for instance 0.15.")
-    ] = 0.15,
-    force: Force = False,
-) -> None:
-    """Make a rig of your own muscle from the numbers of its data sheet."""
-    from mckibben.outputs import claim
-    from mckibben.rigs import rig_from_data_sheet, save_rig
-
-    claim(file, inputs=[], force=force)
-    name = "".join(c if c.isalnum() else "-" for c in file.stem.lower()).strip("-") or "my-rig"
-    rig = rig_from_data_sheet(
-        name=name, diameter=diameter, length=length, max_pressure=max_pressure, max_force=max_force,
-        max_contraction=max_contraction, payload=payload, loop_width=loop_width,
-    )  # fmt: skip
-    save_rig(rig, file)
-    say(f"Written: {file}. Next: mckibben rig run {file} --signal triangle:period=10 -o run.csv")
-
-
 rig = click.Group(
-    "rig", help=__doc__, commands={one.name or "": one for one in (list_, show_, run, record, new)}
+    "rig", help=__doc__, commands={one.name or "": one for one in (list_, show_, run, record)}
 )

@@ -48,7 +48,7 @@ sample, or none.
 Grid = Mapping[str, tuple[Any, ...]]
 """Setting -> candidate values."""
 
-DefaultFor = Literal["load", "plan of displacement", "plan of force"]
+DefaultFor = Literal["load"]
 """Where a model is the default: fitted to each load separately, in a comparison of models with a
 load input; or fitted for a plan of recordings.
 """

@@ -158,7 +158,6 @@ class BalanceEstimator(CoupledEstimator):
     cannot = "All muscles share one set of lags; areas and springs depend on shortening only."
     inverse_kind = "exact"
     quick = True
-    default_for = "plan of displacement"
     targets: ClassVar[dict[str, dict[str, Any]]] = {
         "mjcf": {
             "of_force": True,

@@ -295,7 +295,6 @@ MULTISTATE = preset(
         " exactly."
     ),
     cannot="Needs a static force law; compensated by feedforward only.",
-    default_for="plan of force",
     elements="each-way",
     effort=3.0,
 )

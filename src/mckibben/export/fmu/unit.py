@@ -1,7 +1,7 @@
 """A model as a functional mock-up unit (FMU), for Simulink-like tools.
 
-One zip: the description, the C it is built from, libraries for the platforms that this machine can
-build for, and a page on how to import it. The same model gives the same bytes on the same machine.
+One zip: the description, the C it is built from, the library for this machine, and a page on how to
+import it. The same model gives the same bytes on the same machine.
 
 Source: FMI 2.0.4, Modelica Association.
 """
@@ -9,10 +9,8 @@ Source: FMI 2.0.4, Modelica Association.
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import json
 import platform
-import shutil
 import sys
 import tarfile
 import tempfile
@@ -20,7 +18,7 @@ import uuid
 from collections.abc import Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -59,20 +57,12 @@ BASE_UNITS: dict[str, dict[str, str] | None] = {
 """SI base units of the units; other units have only a name."""
 
 
-class Platform(NamedTuple):
-    """A platform of an FMU: its folder, its library ending, its target for zig."""
-
-    folder: str
-    suffix: str
-    zig: str
-
-
 PLATFORMS = {
-    "linux": Platform("linux64", ".so", "x86_64-linux-gnu.2.17"),
-    "windows": Platform("win64", ".dll", "x86_64-windows-gnu"),
-    "macos": Platform("darwin64", ".dylib", "x86_64-macos"),
+    "linux": ("linux64", ".so"),
+    "win32": ("win64", ".dll"),
+    "darwin": ("darwin64", ".dylib"),
 }
-"""Those that FMI 2.0 has a folder for, by our name."""
+"""Folder and library ending of FMI 2.0, by system."""
 
 
 def export_fmu(
@@ -81,7 +71,7 @@ def export_fmu(
     *,
     name: str = "model",
     sample_time: float | None = None,
-    platforms: Sequence[str] | None = None,
+    library: bool = True,
     force: bool = False,
 ) -> Path:
     """Write a model as an FMU for co-simulation, in double precision.
@@ -96,9 +86,8 @@ def export_fmu(
         Of the model: a letter, then letters, digits and underscores.
     sample_time : float, optional
         Time between steps of the model [s]; needed by rate-dependent blocks.
-    platforms : sequence of str, optional
-        Of linux, windows and macos; default all that this machine can build for. Empty for sources
-        only.
+    library : bool
+        Whether to build the library for this machine; importers can build the sources.
     force : bool
         Whether files of the user's may be replaced; those of an earlier export are anyway.
 
@@ -118,22 +107,12 @@ def export_fmu(
     if path.suffix != ".fmu":
         raise DataError("an FMU is a file that ends in .fmu", file=path, remedy="name it so")
     claim(path, force=force)
-    wanted = buildable() if platforms is None else list(platforms)
-    unknown = [each for each in wanted if each not in PLATFORMS]
-    if unknown:
-        raise ModelError(
-            f"there is no platform {unknown[0]!r}", remedy=f"use one of {', '.join(PLATFORMS)}"
-        )
-    if platforms is None and not wanted:
-        raise ModelError(
-            "there is no C compiler on this machine, so the FMU would hold no library",
-            remedy="install one, or ask for no platforms (`platforms=none`): importers can "
-            "build the sources",
-        )
     files = fmu_files(block, name=name, sample_time=sample_time)
     texts = {path: text.encode() for path, text in files.items()}
+    if library:
+        texts |= _library(files, name)
     with replacing(path) as new:
-        new.write_bytes(zipped(texts | _libraries(files, name, wanted)))
+        new.write_bytes(zipped(texts))
     return path
 
 
@@ -203,65 +182,27 @@ def _variables(content: Mapping[str, Any], starts: Sequence[float]) -> list[dict
     return variables
 
 
-def _libraries(files: Mapping[str, str], name: str, platforms: Sequence[str]) -> dict[str, bytes]:
-    """Return the library for each platform, by path in the zip."""
-    built: dict[str, bytes] = {}
+def own_platform() -> tuple[str, str] | None:
+    """Return the folder and the library ending of this machine, if FMI 2.0 has them."""
+    return PLATFORMS.get(sys.platform) if platform.machine() in ("x86_64", "AMD64") else None
+
+
+def _library(files: Mapping[str, str], name: str) -> dict[str, bytes]:
+    """Return the library for this machine, by path in the zip."""
+    own, compiler = own_platform(), own_compiler()
+    if own is None or compiler is None:
+        raise ModelError(
+            "this machine cannot build the library of the FMU",
+            remedy="install a C compiler, or leave the library out (`library=False`): importers can "
+            "build the sources",
+        )
+    where, suffix = own
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        own = {Path(path).name: files[path] for path in files if path.startswith("sources/")}
-        write_texts(folder, own)
+        texts = {Path(path).name: files[path] for path in files if path.startswith("sources/")}
+        write_texts(folder, texts)
         sources = sorted(path.name for path in folder.glob("*.c"))
-        for each in platforms:
-            out = folder / f"{name}{PLATFORMS[each].suffix}"
-            build_library(each, folder, sources, out)
-            built[f"binaries/{PLATFORMS[each].folder}/{out.name}"] = out.read_bytes()
-            out.unlink()
-    return built
-
-
-def own_platform() -> str | None:
-    """Return this machine's platform, if it is one of them."""
-    if platform.machine() not in ("x86_64", "AMD64"):
-        return None
-    return {"linux": "linux", "win32": "windows", "darwin": "macos"}.get(sys.platform)
-
-
-def buildable() -> list[str]:
-    """Return the platforms that this machine can build for."""
-    return [name for name in PLATFORMS if _command(name) is not None]
-
-
-def _command(name: str) -> list[str] | None:
-    """Return the start of a compiler's command line for a platform, or None."""
-    if importlib.util.find_spec("ziglang") is not None:
-        return [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS[name].zig]
-    if name == own_platform():
-        found = own_compiler()
-        return [found] if found else None
-    if name == "windows":
-        mingw = shutil.which("x86_64-w64-mingw32-gcc")
-        return [mingw, "-Wl,--no-insert-timestamp", "-static-libgcc"] if mingw else None
-    return None
-
-
-def build_library(name: str, folder: Path, sources: Sequence[str], out: Path) -> None:
-    """Compile C files of a folder into a shared library for a platform.
-
-    Raises
-    ------
-    ModelError
-        If this machine cannot build for it, or the compiler refuses.
-    """
-    command = _command(name)
-    if command is None:
-        raise ModelError(
-            f"this machine cannot build for {name}",
-            remedy="install a C compiler, or pip install 'mckibben[cross]' for all platforms",
-        )
-    position = [] if PLATFORMS[name].suffix == ".dll" else ["-fPIC"]
-    maths = [] if PLATFORMS[name].suffix != ".so" else ["-lm"]
-    run(
-        [*command, *FLAGS, *position, "-I.", *sources, *maths, "-o", str(out)],
-        f"the FMU does not compile for {name}",
-        folder=folder,
-    )
+        options = [] if suffix == ".dll" else ["-fPIC"]
+        command = [compiler, *FLAGS, *options, "-I.", *sources, "-lm", "-o", f"{name}{suffix}"]
+        run(command, "the FMU does not compile", folder=folder)
+        return {f"binaries/{where}/{name}{suffix}": (folder / f"{name}{suffix}").read_bytes()}

@@ -345,7 +345,6 @@ def note(muscles: Any, mechanism: Any, states: Any, motion: Any, row: Array) -> 
         row[2 * n + m + j] = states[j].tension
         room, _, _ = chamber(muscles[j], states[j].x, states[j].pressure)
         row[2 * n + 2 * m + j] = room
-        row[2 * n + 3 * m + j] = states[j].warmth
 
 
 @compiled
@@ -367,8 +366,8 @@ def march(
 
     Commands have shape (n, muscles) [bar], loads (n, coordinates) [N or N mm], targets (n,) [mm].
     Between two samples they go on in straight lines, or are held at the first. Each row of
-    ``traces`` takes place and acceleration of every coordinate, then pressure at the regulator, tension,
-    room [mm³] and warmth [K] of every muscle.
+    ``traces`` takes place and acceleration of every coordinate, then pressure at the regulator, tension
+    and room [mm³] of every muscle.
     """
     note(muscles, mechanism[0], states, motion[0], traces[0])
     for i in range(commands.shape[0] - 1):

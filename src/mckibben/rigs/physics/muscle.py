@@ -61,9 +61,6 @@ MUSCLE = np.dtype(
         ("creep", "f8", (MOST_BRANCHES,)),  # N/mm
         ("creep_time", "f8", (MOST_BRANCHES,)),  # s
         ("push", "f8"),  # N
-        ("softening", "f8"),  # 1/K
-        ("heat_capacity", "f8"),  # J/K
-        ("cooling", "f8"),  # s
         ("levers", "f8", (MOST_COORDINATES,)),  # shortening by each coordinate
     ],
     align=True,
@@ -77,16 +74,13 @@ MUSCLE_STATE = np.dtype(
         ("pressure", "f8"),
         ("outlet", "f8"),  # pressure at the regulator's end of the line [bar]
         ("valve", "f8"),
-        ("warmth", "f8"),  # K above the room
         ("tension", "f8"),
-        ("dissipated", "f8"),  # N mm since the start
         ("friction", "f8", (MOST_ELEMENTS,)),  # N
         ("creep", "f8", (MOST_BRANCHES,)),  # N
         # What does not change while a step is solved:
         ("inside", "f8"),  # N/mm²
         ("acting", "f8"),  # N/mm², where the bladder has to reach the braid
         ("normal", "f8"),  # bar
-        ("soft", "f8"),
         ("kept", "f8", (MOST_BRANCHES,)),
         ("drawn", "f8", (MOST_BRANCHES,)),  # N/mm
     ],
@@ -112,11 +106,10 @@ def prepare(muscle: Any, state: Any, beside: float, step: float) -> None:
     ``beside`` is the pressure of the muscle that this one is tied to [bar].
     """
     acting, _, _ = acting_pressure(state.pressure, muscle.contact)
-    state.soft = max(1.0 - muscle.softening * state.warmth, 0.1)
     state.inside = NEWTON_PER_BAR_MM2 * state.pressure
     state.acting = NEWTON_PER_BAR_MM2 * acting
     pressed = state.pressure + muscle.preload + muscle.neighbour * beside
-    state.normal = state.soft * max(pressed, 0.0)
+    state.normal = max(pressed, 0.0)
     for i in range(muscle.n_branches):
         kept = math.exp(-step / muscle.creep_time[i])
         state.kept[i] = kept
@@ -134,8 +127,8 @@ def tension(muscle: Any, state: Any, x: float, step: float) -> tuple[float, floa
     rubber, rubber_slope = bladder_force(
         muscle.c10, muscle.c01, muscle.cos2, muscle.sin2, muscle.length, x
     )
-    pull = pressure * area - state.soft * rubber
-    slope = pressure * area_slope + pressure_slope * area - state.soft * rubber_slope
+    pull = pressure * area - rubber
+    slope = pressure * area_slope + pressure_slope * area - rubber_slope
     moved = x - state.x
     for i in range(muscle.n_elements):
         force, stiffness = slip(
@@ -192,29 +185,18 @@ def taut_or_slack(muscle: Any, state: Any, x: float, step: float) -> tuple[float
 
 @compiled
 def commit(muscle: Any, state: Any, x: float, step: float) -> None:
-    """Accept a step's move: update friction, creep, temperature, position and dissipated energy."""
+    """Accept a step's move: update friction, creep and position."""
     moved = x - state.x
-    lost = muscle.viscosity * moved * moved / step
     for i in range(muscle.n_elements):
-        before = state.friction[i]
-        after, _ = slip(
-            before,
+        state.friction[i], _ = slip(
+            state.friction[i],
             muscle.friction[i],
             muscle.contracting[i] * state.normal,
             muscle.extending[i] * state.normal,
             moved,
         )
-        lost += after * moved + (before * before - after * after) / (2.0 * muscle.friction[i])
-        state.friction[i] = after
     for i in range(muscle.n_branches):
-        before = state.creep[i]
-        after = relax(before, state.kept[i], state.drawn[i], moved)
-        lost += 0.5 * (before + after) * moved
-        lost += (before * before - after * after) / (2.0 * muscle.creep[i])
-        state.creep[i] = after
-    state.dissipated += lost
-    cooled = state.warmth * (1.0 - step / muscle.cooling)
-    state.warmth = cooled + 1e-3 * lost / muscle.heat_capacity
+        state.creep[i] = relax(state.creep[i], state.kept[i], state.drawn[i], moved)
     state.speed = moved / step
     state.x = x
 

@@ -549,7 +549,8 @@ class Estimator(ABC):
         """Return the condition of the free parameters, and the covariance of all; see `Diagnostics`."""
         if not self.errors_known:
             return np.nan, unknown(block)
-        return covariance_of(block, data, residual, at_bounds)
+        fixed = sorted({*at_bounds, *self.fixed(block)})
+        return covariance_of(block, data, residual, fixed, self.free_runs)
 
     def at_bounds(self, block: Block) -> tuple[int, ...]:
         """Return the indices of parameters at a bound: by default those equal to zero."""

@@ -77,7 +77,7 @@ def covariance_of(
     data: TrainingData,
     residual: Array,
     fixed: Sequence[int],
-    simulated: Simulated = simulate_all,
+    simulated: Simulated,
 ) -> tuple[float, Array]:
     """Return the condition of the free parameters, and the covariance of all.
 

@@ -25,7 +25,6 @@ from mckibben.blocks.fields import rows, vector
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.estimator import Grid
-from mckibben.estimators.core.uncertainty import covariance_of
 from mckibben.estimators.coupled.balance_bench import (
     bench_of,
     check_numbers,
@@ -480,13 +479,6 @@ class BalanceEstimator(CoupledEstimator):
         unit = shares[0] if len(shares) == 1 else r"area( of muscle 1)? at rest"
         given = re.compile(rf"gain|offset|hysteresis|dead time|side of obstacle .*|{unit}")
         return tuple(place for place, name in enumerate(names) if given.fullmatch(name))
-
-    def uncertainty(
-        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return condition and covariance of the free parameters, in the unit of force."""
-        fixed = sorted({*at_bounds, *self.fixed(block)})
-        return covariance_of(block, data, residual, fixed, self.free_runs)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
         """Return free-running outputs of blocks, each run under its own load."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -17,7 +16,6 @@ from mckibben.blocks.fields import LONGEST_DELAY
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Initial
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.core.uncertainty import covariance_of
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import Preset, preset
 
@@ -71,27 +69,6 @@ class ProcessModelEstimator(SeparableEstimator):
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         data.timed(instead=", or use gpi")
         return super().identify(data, tracker)
-
-    def uncertainty(
-        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return condition and covariance from free-running errors; the input's offset is fixed."""
-        fixed = [*at_bounds, *self.fixed(block)]
-        return covariance_of(block, data, residual, fixed, self.free_runs)
-
-    def undetermined(self) -> tuple[int, ...]:
-        """Return also a gain, a time constant or a zero within two standard errors of 0.
-
-        A zero that all but cancels a pole leaves them so, and what depends on them uncertain too.
-        """
-        values, errors = self.fitted.pack(), self.diagnostics_.standard_errors
-        names = self.fitted.parameter_names
-        vague = {
-            place
-            for place, (value, error) in enumerate(zip(values, errors, strict=True))
-            if abs(value) < 2 * error and "offset" not in names[place]
-        }
-        return tuple(sorted({*super().undetermined(), *vague}))
 
     @property
     def n_times(self) -> int:

@@ -22,7 +22,6 @@ from mckibben.blocks.kernels import summing_kernel
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
-from mckibben.estimators.core.uncertainty import covariance_by_runs, relative_sizes
 from mckibben.estimators.dynamics.linear_oscillator import (
     MOST_SUBSTEPS,
     Linear,
@@ -158,18 +157,6 @@ class StateNetworkEstimator(SearchEstimator):
             return super().free_runs(blocks, data)
         networks = [cast("StateNetwork", block) for block in blocks]
         return np.array([self.search(n, data, Tracker()).outputs(n.pack()) for n in networks])
-
-    def uncertainty(
-        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return the condition of the weights and their covariance, from exact derivatives."""
-        network = cast("StateNetwork", block)
-        merged = averaged(data) if self.periodic else data
-        search = self.search(network, merged, Tracker())
-        left = search.errors(network.pack())
-        size = relative_sizes(network.pack())
-        condition, own = covariance_by_runs(search.slopes(network.pack()) * size, left, merged.runs)
-        return condition, own * np.outer(size, size)
 
 
 class NetworkRuns:

@@ -18,7 +18,6 @@ from mckibben.blocks.force.multistate_friction import (
     EIGHTEEN,
     ELEVEN,
     PLACES,
-    SIZES,
     Direction,
     MultistateFriction,
 )
@@ -271,19 +270,6 @@ class MultistateEstimator(SeparableEstimator):
         orders = ORDERS[self.static]
         law = force_law(linear[n:], offset, orders, data.input_range, self.channels(data))
         return Parallel((law, friction))
-
-    def undetermined(self) -> tuple[int, ...]:
-        """Return the indices of values that are undetermined, or not distinct from zero.
-
-        Values of friction are positive: one within two standard errors of 0 may be any smaller one. As
-        residuals are not independent, more may be undetermined; `parameter_ranges` tells.
-        """
-        block = self.fitted
-        values = block.pack()
-        errors = np.array(self.diagnostics_.standard_errors)
-        first = values.size - sum(SIZES[e] for e in self.directions) - self.fit_pressure_gain
-        vague = first + np.flatnonzero(~(2 * errors[first:] < np.abs(values[first:])))
-        return tuple(sorted({*super().undetermined(), *vague.tolist()}))
 
 
 MULTISTATE = preset(

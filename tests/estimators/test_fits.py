@@ -79,17 +79,6 @@ def test_gpi_envelopes_stay_in_order(envelope: str, loop: Recording) -> None:
     assert np.all(np.diff(model.falling(u)) > 0)
 
 
-def test_fitted_start_finds_the_peak_before_the_recording() -> None:
-    truth = PI.example()
-    u = np.concatenate([[2.0], 2.5 + 1.5 * np.cos(np.linspace(np.pi, 30, 600))])
-    y = truth.simulate(u)
-    loop = Recording({"pressure": u[1:], "displacement": y[1:]}, 0.01)
-    blind = PIEstimator(thresholds=truth.thresholds).fit(loop)
-    fitted = PIEstimator(thresholds=truth.thresholds, initial="fitted").fit(loop)
-    assert fitted.diagnostics_.rmse < 0.2 * blind.diagnostics_.rmse
-    assert fitted.diagnostics_.peaks[0] == pytest.approx(2.0, abs=0.01)
-
-
 PRINTED = {
     "output_map": "free-polynomial",
     "map_size": 9,

@@ -89,9 +89,6 @@ class Diagnostics:
     at_bounds: tuple[int, ...]
     """Indices, in ``model_.pack()``, of the parameters at a bound."""
 
-    peaks: tuple[float | None, ...]
-    """For every recording, the assumed input from which it started before its first sample."""
-
     notes: tuple[str, ...]
     """Notes for the user."""
 
@@ -331,7 +328,7 @@ class Estimator(ABC):
 
     @abstractmethod
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the identified block, and the data with its initial peaks."""
+        """Return the identified block, and the data with the channels that it uses."""
 
     def fit(
         self,
@@ -505,7 +502,7 @@ class Estimator(ABC):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ModelWarning)
             residual = data.target - self.free_runs([block], data)[0]
-            from_rest = data.target - simulate_all([block], data.unstarted())[0]
+            from_rest = data.target - simulate_all([block], data)[0]
         notes = dict.fromkeys([*tracker.notes, *sorted({str(one.message) for one in caught})])
         by_output = _rms(residual.reshape(-1, len(data.outputs)))
         return Diagnostics(
@@ -518,7 +515,6 @@ class Estimator(ABC):
             seconds=time.perf_counter() - started,
             interrupted=tracker.interrupted,
             at_bounds=at_bounds,
-            peaks=tuple(run.peak for run in data.runs),
             notes=tuple(notes),
             # of the estimator as it is now: it may be changed or fitted again
             uncertainty=partial(copy(self).uncertainty, block, data, residual, at_bounds),

@@ -46,8 +46,7 @@ def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
     outputs = []
     for run in data.runs:
         many = run_many(blocks, run.inputs, sample_time=run.sample_time)
-        trimmed = many if run.peak is None else many[:, 1:]
-        outputs.append(trimmed[:, run.counts].reshape(len(many), -1))
+        outputs.append(many[:, run.counts].reshape(len(many), -1))
     return np.concatenate(outputs, axis=1)
 
 
@@ -60,10 +59,8 @@ def simulate_started(blocks: Sequence[Block], data: TrainingData) -> Array:
         return simulate_all(blocks, data)
     outputs = []
     for run in data.runs:
-        before = run.history.size - run.u.size
-        y, counts = np.pad(run.y, (before, 0)), np.pad(run.counts, (before, 0))
-        known = (run.inputs, y, run.sample_time, counts)
-        outputs.append([fitted_run(block, *known)[counts] for block in blocks])
+        known = (run.inputs, run.y, run.sample_time, run.counts)
+        outputs.append([fitted_run(block, *known)[run.counts] for block in blocks])
     return np.concatenate(outputs, axis=1)
 
 

@@ -49,7 +49,7 @@ class ProcessModelEstimator(SeparableEstimator):
 
     effort: ClassVar[float] = 0.3
 
-    initial: Initial = "fitted"
+    initial: Initial = "fitted"  # type: ignore[assignment]
     structure: Structure = "P1"
     fit_delay: bool = False
     hold: Literal["first", "zero"] = "first"
@@ -59,14 +59,13 @@ class ProcessModelEstimator(SeparableEstimator):
 
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
-    fits_peaks: ClassVar[bool] = False
 
     @property
     def fixed_fields(self) -> tuple[str, ...]:
         """The input's offset, which is redundant with the output's."""
         return ("process-model.input_offset",)
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         data.timed(instead=", or use gpi")
         return super().identify(data, tracker)
 
@@ -115,10 +114,10 @@ class ProcessModelEstimator(SeparableEstimator):
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the response to the input, and, with a zero, to its derivative."""
         unit = data.latest("unit", theta, lambda: self.unit(theta, data))
-        columns = [unit.simulate(run.history, sample_time=run.sample_time)]
+        columns = [unit.simulate(run.u, sample_time=run.sample_time)]
         if "Z" in self.structure:
             zero = data.latest("zero", theta, lambda: replace(unit, zero_time=1.0))
-            whole = zero.simulate(run.history, sample_time=run.sample_time)
+            whole = zero.simulate(run.u, sample_time=run.sample_time)
             columns.append(whole - columns[0])
         return np.column_stack(columns)
 

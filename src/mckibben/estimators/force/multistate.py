@@ -104,7 +104,7 @@ class MultistateEstimator(SeparableEstimator):
 
     input: str = "length"
     output: str = "force"
-    initial: Literal["first_sample", "virgin", "fitted"] = "virgin"
+    initial: Literal["first_sample", "virgin"] = "virgin"
     pressure: str = "pressure"
     static: Law | None = "bilinear"
     elements: Structure | tuple[Direction, ...] = "eleven"
@@ -128,7 +128,7 @@ class MultistateEstimator(SeparableEstimator):
             return STRUCTURES[self.elements]
         return tuple(self.elements)
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         data.timed("friction depends on rate")
         return super().identify(data, tracker)
 
@@ -194,7 +194,7 @@ class MultistateEstimator(SeparableEstimator):
         return MultistateFriction((element,), values, initial=self.starting_rule)
 
     def _forces(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the force of every element per unit of its stiffnesses, over the run's history."""
+        """Return the force of every element per unit of its stiffnesses, over the run."""
         length, pressure = run.inputs.T
         rising = np.diff(length, prepend=length[0]) >= 0
         columns = []

@@ -109,7 +109,7 @@ class CreepPIEstimator(SeparableEstimator):
         """The offset of the operators' sum, which starts at 0."""
         return ("pi.offset",)
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         if self.n_creep > 0:
             data.timed("creep depends on it", ", or use n_creep=0")
         if self.settled is not None or self.n_creep == 0:
@@ -175,11 +175,11 @@ class CreepPIEstimator(SeparableEstimator):
         return self.n_creep * (1 + max(run.place for run in data.runs))
 
     def begun(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the decay of initial creep over a run's history, (n, n_initial).
+        """Return the decay of initial creep over a run, (n, n_initial).
 
         What an element was behind by, times its compliance, is one number an element and a run.
         """
-        columns = np.zeros((run.history.size, self.n_initial(data)))
+        columns = np.zeros((run.u.size, self.n_initial(data)))
         if columns.size:
             taus, _ = self.tail(theta)
             own = slice(run.place * self.n_creep, (1 + run.place) * self.n_creep)
@@ -239,7 +239,7 @@ class CreepPIEstimator(SeparableEstimator):
         return offset, radii, ends, np.array(sums)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the pieces of the map over the run's history, with their creep."""
+        """Return the pieces of the map over the run, with their creep."""
         x, _ = self.argument(theta, run, data)
         crept = with_creep(
             PolynomialMap(self.map_size).pieces(x), *self.creep(theta), run.sample_time
@@ -249,7 +249,7 @@ class CreepPIEstimator(SeparableEstimator):
     def argument(self, theta: Array, run: Run, data: TrainingData) -> tuple[Array, Array]:
         """Return the argument of the map, 0 to 1, and its derivatives by the relative weights."""
         offset, radii, (low, high), (bottom, top) = self.memory(theta, data)
-        logarithm = Logarithm(offset).simulate(run.history)
+        logarithm = Logarithm(offset).simulate(run.u)
         operators = play_operators(logarithm, radii, self.starting_rule)
         x = (operators @ theta[: self.n_operators] - bottom) / (top - bottom)
         above = operators - (low - radii)
@@ -307,7 +307,7 @@ class CreepPIEstimator(SeparableEstimator):
 def elapsed(run: Run) -> Array:
     """Return the time since the start of a run, for its creep elements [s]."""
     assert run.sample_time is not None
-    return np.asarray(run.sample_time * np.arange(1.0, 1.0 + run.history.size))
+    return np.asarray(run.sample_time * np.arange(1.0, 1.0 + run.u.size))
 
 
 def with_creep(

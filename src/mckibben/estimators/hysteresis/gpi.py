@@ -167,9 +167,9 @@ class GPIEstimator(SeparableEstimator):
         return spread(self.n_operators + 1, (float(rising(low)), float(falling(high))))
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the generalised play operators over the run's history, shape (n, N + 1)."""
+        """Return the generalised play operators over the run, shape (n, N + 1)."""
         rising, falling = self.envelopes(theta, data)
-        u, radii = np.ascontiguousarray(run.history), self.radii(rising, falling, data)
+        u, radii = np.ascontiguousarray(run.u), self.radii(rising, falling, data)
         up, down, operators = rising(u), falling(u), np.empty((u.size, radii.size))
         state = started(radii, up[0], down[0], self.starting_rule)
         play_matrix(u, up, down, radii, state, operators)

@@ -112,7 +112,7 @@ class MPIEstimator(SeparableEstimator):
         """The offset of the operators' sum, which starts at the output's lowest value."""
         return ("pi.offset", "rate-dependent-pi.offset")
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         if not self.rate_dependent:
             return super().identify(data, tracker)
         step = data.timed(instead=", or use mpi")
@@ -129,7 +129,7 @@ class MPIEstimator(SeparableEstimator):
         step = run.sample_time
         tau = self.rate_time_constant or 0.0
         smoothing = np.exp(-step / tau) if tau > 0 else 0.0
-        raw = np.diff(run.history, prepend=run.history[0]) / step
+        raw = np.diff(run.u, prepend=run.u[0]) / step
         return np.asarray(lfilter([1 - smoothing], [1, -smoothing], raw))
 
     def fastest(self, data: TrainingData) -> float:
@@ -202,11 +202,11 @@ class MPIEstimator(SeparableEstimator):
 
     def _plays(self, radii: Array, data: TrainingData) -> Array:
         """Return play operators at the samples that count."""
-        return counting(data, lambda run: play_operators(run.history, radii, self.starting_rule))
+        return counting(data, lambda run: play_operators(run.u, radii, self.starting_rule))
 
     def operators(self, radii: Array, run: Run, data: TrainingData) -> Array:
-        """Return play operators over the run's history, then their products with the relative rate."""
-        play = play_operators(run.history, radii, self.starting_rule)
+        """Return play operators over the run, then their products with the relative rate."""
+        play = play_operators(run.u, radii, self.starting_rule)
         if not self.rate_dependent:
             return play
         relative = self.rate(run) / self.fastest(data)
@@ -236,7 +236,7 @@ class MPIEstimator(SeparableEstimator):
         return low, high
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the pieces of the map over the run's history."""
+        """Return the pieces of the map over the run."""
         return self._pieces(theta, self.operators(self.radii(theta, data), run, data), data)
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:

@@ -108,15 +108,13 @@ class Run:
 class TrainingData:
     """All runs for identification, and their common channels.
 
-    ``early`` are runs to stop a search early by, to which nothing is fitted; ``spans`` are ranges of the
-    outputs that are known otherwise, for where they do not move.
+    ``spans`` are ranges of the outputs that are known otherwise, for where they do not move.
     """
 
     runs: tuple[Run, ...]
     inputs: tuple[Channel, ...]
     outputs: tuple[Channel, ...]
     scheduled: tuple[Channel, ...] = ()
-    early: TrainingData | None = None
     spans: tuple[float, ...] | None = None
     _memo: dict[Hashable, Array] = field(default_factory=dict, init=False, repr=False)
     _latest: dict[Hashable, tuple[Array, Any]] = field(default_factory=dict, init=False, repr=False)

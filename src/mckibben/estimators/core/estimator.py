@@ -7,7 +7,7 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -83,9 +83,6 @@ class Diagnostics:
     """Number of evaluations of the model in the search."""
 
     seconds: float
-    interrupted: bool
-    """Whether the user stopped the search; the model is then the best one found."""
-
     at_bounds: tuple[int, ...]
     """Indices, in ``model_.pack()``, of the parameters at a bound."""
 
@@ -308,11 +305,6 @@ class Estimator(ABC):
         """Number of fitted values that are not in ``model_.pack()``."""
         return 0
 
-    @property
-    def stops_early(self) -> bool:
-        """Whether validation recordings can stop the search."""
-        return False
-
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
@@ -337,7 +329,6 @@ class Estimator(ABC):
         *,
         sample_time: float | None = None,
         rows: Sequence[Mask] | None = None,
-        validation: Sequence[Recording] = (),
         progress: bool | Progress | None = None,
     ) -> Self:
         """Fit the block to recordings by its free-running error.
@@ -353,8 +344,6 @@ class Estimator(ABC):
             Between samples of arrays [s].
         rows : sequence of bool arrays, optional
             For every recording, the samples whose outputs are scored.
-        validation : sequence of Recording
-            For early stopping; not fitted. Most estimators do not use them.
         progress : bool or callable, optional
             Whether to show a bar; or a callback for the share done and the best RMSE so far.
 
@@ -374,8 +363,8 @@ class Estimator(ABC):
         runs = listed(recordings) if y is None else [self._recording(recordings, y, sample_time)]
         try:
             with one_blas_thread(), telling(progress, "fitting") as tell:
-                return self._fit(runs, rows, validation, tell)
-        except BaseException:  # a fit that fails, or is interrupted too early, leaves no traces
+                return self._fit(runs, rows, tell)
+        except BaseException:  # a fit that fails or is interrupted leaves no traces
             vars(self).clear()
             vars(self).update(before)
             raise
@@ -401,28 +390,23 @@ class Estimator(ABC):
         self,
         recordings: Recording | Sequence[Recording],
         rows: Sequence[Mask] | None,
-        validation: Sequence[Recording],
         progress: Progress | None,
     ) -> Self:
         started = time.perf_counter()
         self.check_settings()
         data = self.data(listed(recordings), rows)
-        if early := listed(validation):
-            data = replace(data, early=self.data(early))
         tracker = Tracker(progress=progress)
         block, data = self.find(data, tracker)
-        tracker.end()
         diagnostics = self._diagnose(block, data, tracker, started)
-        tracker.end()
-        if progress is not None and not tracker.interrupted:
+        if progress is not None:
             progress(1.0, diagnostics.rmse)
         self.model_, self.diagnostics_ = block, diagnostics
         settings = self.get_params()
         fits_starts = self.solves_starts and settings["initial"] == "fitted"
         missed = diagnostics.rmse_from_rest > np.ptp(data.target)
-        if fits_starts and missed and not tracker.interrupted:
+        if fits_starts and missed:
             at_rest = type(self)(**settings | {"initial": "first_sample"})
-            at_rest._fit(recordings, rows, validation, progress)
+            at_rest._fit(recordings, rows, progress)
             vars(self).update(vars(at_rest) | settings)
         return self
 
@@ -513,7 +497,6 @@ class Estimator(ABC):
             n_free=block.n_parameters - len(self.fixed(block)) + self.n_further,
             n_evaluations=tracker.evaluations,
             seconds=time.perf_counter() - started,
-            interrupted=tracker.interrupted,
             at_bounds=at_bounds,
             notes=tuple(notes),
             # of the estimator as it is now: it may be changed or fitted again

@@ -177,7 +177,7 @@ class SeparableEstimator(Estimator):
             jacobian=jacobian,
             choices=self.choices(data),
         )
-        return theta if tracker.interrupted else self._polish(theta, data, tracker)
+        return self._polish(theta, data, tracker)
 
     def _scattered(self, lower: Array, upper: Array) -> list[Array]:
         from scipy.stats import qmc
@@ -279,8 +279,6 @@ class SeparableEstimator(Estimator):
             settings = self.get_params() | {setting: value}
             found.append((type(self)(**settings).identify(data, own), own))
             tracker.saw_all(own)
-            if own.interrupted:
-                break
         block, best = min(found, key=lambda item: item[1].best_cost)
         tracker.best_cost, tracker.best = best.best_cost, best.best
         return block

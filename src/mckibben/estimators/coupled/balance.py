@@ -269,10 +269,8 @@ class BalanceEstimator(CoupledEstimator):
                 "relaxation is left out: record at other speeds too, or give lags"
             )
         structure = self.widest(bench, timed=not still or self.lags is not None)
-        with tracker.searching():
-            search, z = self._found(data, structure, prior_errors, tracker)
-            self._search, self._z = search, z
-        search, z = self._search, self._z
+        search, z = self._found(data, structure, prior_errors, tracker)
+        self._search, self._z = search, z
         structure = search.structure
         values = structure.expanded(z[: len(structure.terms)])
         balance = in_newtons(structure.block(values, final=True))
@@ -369,7 +367,6 @@ class BalanceEstimator(CoupledEstimator):
         last = np.array([term.kind in LAST for term in structure.terms])
         pushed = structure.n > 1 or any(held(data, run) for run in data.runs)
         for number in range(ROUNDS):
-            self._search, self._z = search, z
             part = tracker.part(0.08 * number, 0.08 * (number + 1))
             z = search.descended(z, min(self.steps, STEPS_BETWEEN), part)
             if number == 0 and not few.all_at_rest:
@@ -377,7 +374,6 @@ class BalanceEstimator(CoupledEstimator):
             if number == 0 and self.may("slack") and pushed:
                 search, z = self._slack(search, z)
             search = search.weighed(z)
-            self._search, self._z = search, z
             active, z = search.chosen(z, tried & ~last)
             if (active == search.active).all():
                 active, z = search.chosen(z, tried)
@@ -391,7 +387,6 @@ class BalanceEstimator(CoupledEstimator):
         )
         self.terms_ = tuple(dict.fromkeys(names))
         search, z = search.narrowed(z)
-        self._search, self._z = search, z
         if structure.n == 1 and self.unknown_load is None:
             search, z = self._own_loads(search, z, data)
         z = search.descend(z, self.steps, tracker.part(0.5, 0.7))

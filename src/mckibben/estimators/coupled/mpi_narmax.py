@@ -32,7 +32,7 @@ from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors
 from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
-from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
+from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
 UNLOADED = 0.05
@@ -136,8 +136,7 @@ class MPINarmaxEstimator(CoupledEstimator):
         if self.memory == "rdpi":
             settings["rate_time_constant"] = 5.0 * (data.runs[0].sample_time or 0.0)
         estimator = registry.load("estimators", self.memory)(**settings)
-        with whole_searches():
-            block: Block = estimator.fit(recordings).model_
+        block: Block = estimator.fit(recordings).model_
         return block
 
 

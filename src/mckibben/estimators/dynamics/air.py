@@ -112,13 +112,11 @@ class AirEstimator(SeparableEstimator):
         tried: dict[int, tuple[float, Air]] = {}
         best = self._correlated(data, most)
         asked = [best]
-        while asked and not tracker.interrupted:
+        while asked:
             for late in asked:
                 own = tracker.part(1 - 0.7 ** len(tried), 1 - 0.7 ** (len(tried) + 1))
                 tried[late] = self._at(late, data, own)
                 tracker.saw_all(own)
-                if own.interrupted:
-                    break
             best = min(tried, key=lambda late: tried[late][0])
             near = (best - 1, best + 1, best - 2, best + 2)
             asked = [late for late in near if 0 <= late <= most and late not in tried][:2]
@@ -168,7 +166,7 @@ class AirEstimator(SeparableEstimator):
         block, cost = self._refined(cast(Air, found), moved, tracker, limits)
         shares = {"ambient": 0.005, "supply": 0.995}
         for limit in ("ambient", "supply", "ambient"):  # which one alone may not have shown
-            if getattr(self, limit) is None and limit not in limits and not tracker.interrupted:
+            if getattr(self, limit) is None and limit not in limits:
                 tight: dict[str, Any] = {limit: float(np.quantile(data.target, shares[limit]))}
                 limited = replace(block, **tight)
                 limited, least = self._refined(limited, moved, tracker, (*limits, limit))

@@ -366,9 +366,8 @@ def minimise(
             max_evaluations=STEPS,
         )
 
-    with tracker.searching():
-        starting = (theta for theta in starts if admissible(theta, orders))
-        follow_best(starting, begun, followed, FOLLOWED, SAME)
+    starting = (theta for theta in starts if admissible(theta, orders))
+    follow_best(starting, begun, followed, FOLLOWED, SAME)
     assert tracker.best is not None
     return tracker.best
 

@@ -100,21 +100,20 @@ class StateNetworkEstimator(SearchEstimator):
         template = self.start(linear, merged, self.substeps or linear.substeps(step, ANGLE))
         search = self.search(template, merged, tracker)
         tracker.budget = self.n_steps
-        with tracker.searching():
-            (_, squares), *_ = trust_region(
-                search.errors,
-                search.slopes,
-                template.pack(),
-                scale=np.ones(template.n_parameters),
-                least_gain=LEAST_GAIN,
-                max_evaluations=self.n_steps,
+        (_, squares), *_ = trust_region(
+            search.errors,
+            search.slopes,
+            template.pack(),
+            scale=np.ones(template.n_parameters),
+            least_gain=LEAST_GAIN,
+            max_evaluations=self.n_steps,
+        )
+        if not np.isfinite(squares):
+            raise DataError(
+                "no start runs stably under this force",
+                channel=data.input,
+                remedy="choose another seed, or record at a higher rate",
             )
-            if not np.isfinite(squares):
-                raise DataError(
-                    "no start runs stably under this force",
-                    channel=data.input,
-                    remedy="choose another seed, or record at a higher rate",
-                )
         assert tracker.best is not None
         return template.unpack(tracker.best), data
 

@@ -7,13 +7,10 @@ the rest, one to each run. The input is taken to have been at its first value be
 from nothing.
 
 The start of every run is linear in the errors and solved for in each evaluation, so the search runs in
-the polynomials alone. A polynomial with a leading 1 has its roots within the unit circle where its
-reflection coefficients lie between -1 and 1: in their inverse hyperbolic tangents no step leaves what is
-stable. Starts are the ARX model improved by Steiglitz and McBride's iteration, lags and oscillations of
+the polynomials alone; a step to unstable poles is refused. Starts are the ARX model improved by Steiglitz and McBride's iteration, lags and oscillations of
 a few speeds, and random lags. A noise model is identified last, from the plant found without it.
 
-Sources: Ljung, "System Identification", 1999, chapters 4 and 7; Monahan, "A note on enforcing
-stationarity in autoregressive-moving average models", 1984.
+Source: Ljung, "System Identification", 1999, chapters 4 and 7.
 """
 
 from __future__ import annotations
@@ -52,10 +49,6 @@ FELT = 1e-13
 
 LEAST_GAIN = 2e-9
 """Smallest relative reduction of the squared error for another step."""
-
-
-LARGEST = 1.0 - 1e-7
-"""Largest magnitude of a reflection coefficient."""
 
 Start = Literal["fitted", "first_sample", "virgin"]
 """State before the first sample: estimated; at rest at the first input; at rest at an input of zero.
@@ -259,27 +252,6 @@ def inside(tail: Array, radius: float) -> Array:
     return np.asarray(np.real(np.poly(roots))[1:], dtype=np.float64)
 
 
-def free_coordinates(tail: Array) -> Array:
-    """Return the coordinates of a stable monic polynomial; of the nearest one if unstable."""
-    a, found = tail, np.empty(tail.size)
-    for m in range(tail.size, 0, -1):
-        k = found[m - 1] = float(np.clip(a[-1], -LARGEST, LARGEST))
-        a = (a[:-1] - k * a[-2::-1]) / (1.0 - k * k) if m > 1 else a[:0]
-    return np.asarray(np.arctanh(found / (1.0 + 1e-9)))
-
-
-def polynomial(coordinates: Array) -> tuple[Array, Array]:
-    """Return the monic polynomial of coordinates, and its derivatives, (n, n)."""
-    n = coordinates.size
-    reflection = np.clip(np.tanh(coordinates), -LARGEST, LARGEST)
-    a, slopes = np.empty(0), np.empty((0, n))
-    for m, k in enumerate(reflection.tolist()):
-        by_own = np.eye(1, n, m)
-        grown = slopes + k * slopes[::-1] + np.outer(a[::-1], by_own)
-        a, slopes = np.append(a + k * a[::-1], k), np.vstack([grown, by_own])
-    return a, slopes * (1.0 - reflection**2)
-
-
 def admissible(theta: Array, orders: Orders) -> bool:
     """Return whether poles, and the roots of C and D, are admissible."""
     p = Polynomials.of(theta, orders)
@@ -289,24 +261,6 @@ def admissible(theta: Array, orders: Orders) -> bool:
         and spectral_radius(p.c) < INVERTIBLE
         and spectral_radius(p.d) <= 1.0 + 1e-9
     )
-
-
-def loosened(theta: Array, orders: Orders) -> Array:
-    """Return the coordinates of parameters in which every step is stable."""
-    p = Polynomials.of(theta, orders)
-    free = [free_coordinates(tail) for tail in p.monic]
-    return np.concatenate([p.b.ravel(), *free, [p.constant]])
-
-
-def tightened(coordinates: Array, orders: Orders) -> tuple[Array, Array]:
-    """Return the parameters of coordinates, and their derivatives."""
-    p = Polynomials.of(coordinates, orders)
-    theta, slopes, place = coordinates.copy(), np.eye(coordinates.size), orders.zeros
-    for tail in p.monic:
-        own = slice(place, place + tail.size)
-        theta[own], slopes[own, own] = polynomial(tail)
-        place += tail.size
-    return theta, slopes
 
 
 def evaluate(
@@ -350,15 +304,7 @@ def minimise(
         return found, float(np.sqrt(squares))
 
     def followed(theta: Array) -> None:
-        # in the coefficients the valley of a root near the unit circle is straight; but they have
-        # bounds, at which the others would stop too, and these coordinates have none
-        found, _ = search(here.errors, here.slopes, theta, max_evaluations=STEPS)[-1]
-        search(
-            lambda free: here.errors(tightened(free, orders)[0]),
-            lambda free: here.slopes(free) @ tightened(free, orders)[1],
-            loosened(found, orders),
-            max_evaluations=STEPS,
-        )
+        search(here.errors, here.slopes, theta, max_evaluations=STEPS)
 
     starting = (theta for theta in starts if admissible(theta, orders))
     follow_best(starting, begun, followed, FOLLOWED, SAME)

@@ -8,7 +8,8 @@ from nothing.
 
 The start of every run is linear in the errors and solved for in each evaluation, so the search runs in
 the polynomials alone; a step to unstable poles is refused. Starts are the ARX model improved by
-Steiglitz and McBride's iteration, lags and oscillations of a few speeds, and random lags. A noise model is identified last, from the plant found without it.
+Steiglitz and McBride's iteration, lags and oscillations of a few speeds, and random lags. A noise model
+is identified last, from the plant found without it.
 
 Source: Ljung, "System Identification", 1999, chapters 4 and 7.
 """

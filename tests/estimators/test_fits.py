@@ -69,7 +69,7 @@ def test_slope_rule_recovers_the_weights_of_every_kind_of_branch(
     assert fit.model_.offset == pytest.approx(truth.offset, rel=1e-6)
 
 
-@pytest.mark.parametrize("envelope", ["tanh", "exponential", "piecewise-linear"])
+@pytest.mark.parametrize("envelope", ["tanh", "piecewise-linear"])
 def test_gpi_envelopes_stay_in_order(envelope: str, loop: Recording) -> None:
     model = quick("gpi", envelope=envelope).fit(loop).model_
     low, high = model.input_range

@@ -12,7 +12,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.starts import free_responses
-from mckibben.blocks.fields import LONGEST_DELAY
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Initial
 from mckibben.estimators.core.separable import SeparableEstimator
@@ -32,10 +31,6 @@ class ProcessModelEstimator(SeparableEstimator):
     ----------
     structure : {"P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"}
         MATLAB's name: how many poles, whether two of them may oscillate (U), and a zero (Z).
-    fit_delay : bool
-        Whether a delay of up to a quarter of the longest run is searched too.
-    hold : {"first", "zero"}
-        What the input does between samples.
     initial : {"fitted", "first_sample", "virgin"}
         State before the first sample of every recording: with the least squared error; at rest at the
         first input; at rest at the operating point. A model with a fitted start that from rest is
@@ -51,8 +46,6 @@ class ProcessModelEstimator(SeparableEstimator):
 
     initial: Initial = "fitted"  # type: ignore[assignment]
     structure: Structure = "P1"
-    fit_delay: bool = False
-    hold: Literal["first", "zero"] = "first"
     nonnegative: bool = False
     n_starts: Annotated[int, Ge(1)] = 16
     n_refined: Annotated[int, Ge(1)] = 4
@@ -75,16 +68,13 @@ class ProcessModelEstimator(SeparableEstimator):
         return 1 if "U" in self.structure else int(self.structure[1])
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of [log time constants, log damping, delay]."""
+        """Return bounds of [log time constants, log damping]."""
         step = data.sample_time or 1.0
         longest = max(run.u.size for run in data.runs) * step
         lower, upper = [np.log(step)] * self.n_times, [np.log(10 * longest)] * self.n_times
         if "U" in self.structure:
             lower.append(np.log(0.02))
             upper.append(np.log(100.0))
-        if self.fit_delay:
-            lower.append(0.0)
-            upper.append(min(0.25 * longest, (LONGEST_DELAY - 1) * step))
         return np.array(lower), np.array(upper)
 
     def guesses(self, data: TrainingData) -> list[Array]:
@@ -103,10 +93,10 @@ class ProcessModelEstimator(SeparableEstimator):
             tuple(times.tolist()),
             damping,
             None,
-            float(theta[-1]) if self.fit_delay else 0.0,
+            0.0,
             data.input_range[0],
             0.0,
-            self.hold,
+            "first",
             self.initial,
             **self.channels(data),
         )

@@ -267,8 +267,8 @@ class Estimator(ABC):
 
     def channels(self, data: TrainingData) -> dict[str, Channel]:
         """Return the channels of the block to build, as keyword arguments."""
-        beside = zip(self.input_settings, data.scheduled, strict=True)
-        return {"input": data.inputs[0], "output": data.outputs[0], **dict(beside)}
+        scheduled = zip(self.input_settings, data.scheduled, strict=True)
+        return {"input": data.inputs[0], "output": data.outputs[0], **dict(scheduled)}
 
     @property
     def starting_rule(self) -> Start:

@@ -135,7 +135,7 @@ def sandwich(
 ) -> tuple[float, Array, NDArray[np.bool_]]:
     """Return condition, covariance, and which parameters are determined.
 
-    The pseudo-inverse leaves out undetermined directions, so that a parameter beside two of which
+    The pseudo-inverse leaves out undetermined directions, so that a parameter next to two of which
     only the sum is determined is as unsure as it is with their sum free.
 
     Parameters

@@ -210,9 +210,13 @@ class Search:
         bounds = np.append(np.maximum(low, shape - far), -np.minimum(high, shape + far))
         lags = [i for i in np.flatnonzero(self.active) if structure.terms[i].kind == "lags"]
         one = np.eye(z.size)
-        apart = np.array([one[j] - one[i] for i, j in pairwise(lags)])
-        every = [on_all, one[n:n_terms], -one[n:n_terms], apart.reshape(-1, z.size)]
-        asked = [least - sides @ structure.base, bounds, np.full(len(apart), LEAST_SEPARATION)]
+        separations = np.array([one[j] - one[i] for i, j in pairwise(lags)])
+        every = [on_all, one[n:n_terms], -one[n:n_terms], separations.reshape(-1, z.size)]
+        asked = [
+            least - sides @ structure.base,
+            bounds,
+            np.full(len(separations), LEAST_SEPARATION),
+        ]
         return np.concatenate(every), np.concatenate(asked)
 
     # -- choice ----------------------------------------------------------------------------------
@@ -364,10 +368,10 @@ class Search:
         """Return whether a time constant is distinct from the free ones, and in order."""
         terms = self.structure.terms
         places = [place for place, term in enumerate(terms) if term.kind == "lags"]
-        apart = (
+        separations = (
             (z[i] - z[places[which]]) * np.sign(terms[i].which - which) for i in places if active[i]
         )
-        return all(one > LEAST_SEPARATION for one in apart)
+        return all(one > LEAST_SEPARATION for one in separations)
 
     def _with_own(self, kind: str, whiches: range | tuple[int, ...], own: set[str]) -> list[Term]:
         """Return terms of a kind, with differences between muscles if they are free."""
@@ -386,7 +390,7 @@ def _left_out(
 ) -> Array:
     """Return the squared errors of every block under the least squares of the others.
 
-    ``grams`` are products of slopes and target by block, and ``likely`` those of what is believed; what
+    ``grams`` are products of slopes and target by block, and ``likely`` those of the prior; what
     is not free is as it is.
     """
     parts, likely = _reduced(grams, free, z), _reduced(likely[np.newaxis], free, z)[0]

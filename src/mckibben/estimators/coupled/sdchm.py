@@ -74,7 +74,7 @@ class SDCHMEstimator(CoupledEstimator):
     n_sets : int
         Gaussian sets of every input of the network; 0 for neither network nor friction.
     memory : str, optional
-        Model of every muscle's hysteresis: any with an exact inverse. ``cpi`` knows creep. None for a
+        Model of every muscle's hysteresis: any with an exact inverse. ``cpi`` includes creep. None for a
         network of the raw pressures.
     memory_settings : mapping
         Its settings.
@@ -386,11 +386,11 @@ def learned_inverse(
         )
     hysteresis, coupling, network, *friction = parts
     assert isinstance(network, FuzzyNetwork)
-    given, wanted, beside = (
+    given, wanted, scheduling = (
         tuple(channel.name for channel in channels)
         for channels in (hysteresis.inputs, model.outputs, network.scheduled)
     )
-    data = SDCHMEstimator(input=given, output=wanted, scheduling=beside).data(recordings)
+    data = SDCHMEstimator(input=given, output=wanted, scheduling=scheduling).data(recordings)
     before = tuple(part.inverse() for part in reversed(friction))
     h = network_inputs((hysteresis, coupling), data.runs)[:, : len(data.inputs)]
     with warnings.catch_warnings():  # noise at the ends is clipped

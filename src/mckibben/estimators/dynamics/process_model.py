@@ -80,8 +80,8 @@ class ProcessModelEstimator(SeparableEstimator):
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return initial lags; for several, distinct ones."""
         lower, upper = self.bounds(data)
-        apart = np.where(np.arange(lower.size) < self.n_times, 0.05 * np.arange(lower.size), 0.0)
-        return [lower + (share - apart) * (upper - lower) for share in (0.2, 0.4, 0.6, 0.8)]
+        spacing = np.where(np.arange(lower.size) < self.n_times, 0.05 * np.arange(lower.size), 0.0)
+        return [lower + (share - spacing) * (upper - lower) for share in (0.2, 0.4, 0.6, 0.8)]
 
     def unit(self, theta: Array, data: TrainingData, gain: float = 1.0) -> ProcessModel:
         """Return the model without zero and offsets."""

@@ -156,8 +156,8 @@ class StateNetworkEstimator(SearchEstimator):
         Most steps of the descent, each of which costs about as much as n_states runs of all weights.
     periodic : bool
         Whether every recording is a whole number of periods in steady state. Starts then have no effect,
-        and the input is band-limited between samples. Otherwise recordings begin at rest, and the input is
-        linear between samples.
+        and the input is band-limited between samples. Otherwise recordings begin at rest, and the input
+        is linear between samples.
     substeps : int, optional
         Runge-Kutta steps from sample to sample. Default: enough that the linear oscillator turns by
         no more than 1/3 rad in each.

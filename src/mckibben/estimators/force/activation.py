@@ -322,9 +322,9 @@ def by_force(runs: Sequence[Run]) -> dict[float, list[int]]:
     """Return the runs of equal mean force [N], weakest first."""
     means = [float(run.scheduled.mean()) for run in runs]
     groups: dict[float, list[int]] = {}
-    apart = SAME_FORCE * max(map(abs, means))
+    tolerance = SAME_FORCE * max(map(abs, means))
     for i in np.argsort(means, kind="stable"):
-        near = next((force for force in groups if abs(force - means[i]) <= apart), means[i])
+        near = next((force for force in groups if abs(force - means[i]) <= tolerance), means[i])
         groups.setdefault(near, []).append(int(i))
     return groups
 

@@ -74,7 +74,7 @@ class GPIEstimator(SeparableEstimator):
     Parameters
     ----------
     n_operators : int
-        N: operators with a dead zone, beside the one without.
+        N: operators with a dead zone.
     envelope : {"tanh", "piecewise-linear"}
         Shape of both envelopes.
     n_knots : int

@@ -333,8 +333,8 @@ class Problem:
     def balanced(self, structure: Structure, z: Array, active: Mask) -> Array:
         """Return the linear parameters of the force balance at measured positions.
 
-        Forces are weighed by stiffness, so that errors are of displacement. Sizes of
-        areas at rest are not determined: those of muscles with a coordinate each are 1 where samples are on average.
+        Forces are weighed by stiffness, so that errors are of displacement. Sizes of areas
+        at rest are not determined: those of muscles with a coordinate each are 1 at the mean of samples.
         """
         n, terms = structure.mix.shape[1], structure.terms
         of_force = structure.bench.of_force

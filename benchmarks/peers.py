@@ -42,7 +42,7 @@ from peers_libraries import PEERS, Array, Peer, Run, Settings, Trial
 
 OURS = (
     *("balance", "balance-force", "gpi", "cpi", "preisach", "coupled-memory", "force-chou"),
-    *("state-network", "narx-play", "bouc-wen-oscillator"),
+    *("state-network", "narx-play"),
 )
 
 BUDGET = 30.0
@@ -283,9 +283,10 @@ def frame_of(one: Set, part: Part, result: Result) -> pd.DataFrame:
 
 
 def takes_part(peer: Peer, one: Set, part: Part) -> bool:
-    """Return whether a peer takes part: not where models are given equations, or a data sheet."""
-    grey = part.task.name == "grey" or part.task.folds == 0
-    return not grey and (one.name in peer.sets if peer.sets else not part.task.leave_out)
+    """Return whether a peer takes part: not where models use a data sheet."""
+    return part.task.folds != 0 and (
+        one.name in peer.sets if peer.sets else not part.task.leave_out
+    )
 
 
 def main() -> None:

@@ -1,16 +1,12 @@
 """`balance` beside every model that fits, and its inverse, on virtual plants that know no model.
 
     python benchmarks/plants.py [PLANT ...] [--set develop|sealed|all] [--seeds N] [--models NAME ...]
-    python benchmarks/plants.py [PLANT ...] [--set develop|sealed|all] [--seeds N] --truth
 
 Every model is fitted to a plant's training runs, with loads told to it if it can be told, else as
 inputs, else left out, and runs free on every group of test runs; of several outputs, errors are the
 mean. Beside `balance` stands the best of the others in each group. Commands of the inverse, and those of
 a polynomial without memory, go to the plant itself, along a motion that it made within the pressures of
 training. A ratio above 1 is in favour of `balance`. Sealed plants are for models that are finished.
-
-With ``--truth``, plants go through the loops and steps of which the sentences of a fit of `balance` are;
-one is true that is within a factor of 1.25, or two standard errors, of what the plant itself does.
 """
 
 from __future__ import annotations
@@ -35,20 +31,14 @@ from tests.plants import DEVELOP, PLANTS, SEALED, Plant, motions
 from mckibben import Recording, registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.coupled.balance_response import KINDS
 from mckibben.blocks.free_run import run_free
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.planning import objections
 from mckibben.estimators.core.estimator import Estimator
-from mckibben.estimators.coupled.balance import BalanceEstimator
-from mckibben.estimators.coupled.balance_words import said_of
 from mckibben.numerals import numeral
 
 BALANCE, STATIC, INVERSE = "balance", "polynomial", "inverse"
 SETS = {"develop": DEVELOP, "sealed": SEALED, "all": DEVELOP + SEALED}
-
-CLOSE = 1.25
-"""Factor within which a sentence is true, whatever its standard error."""
 
 SECONDS, SETTLING, INNER = 60.0, 5.0, 0.15
 """Of the motion to follow; of its start, not scored; share of the pressures' range left out."""
@@ -165,30 +155,6 @@ def static(plant: Plant, wanted: Recording) -> Recording:
     return Recording(dict(zip(bench.pressures, now.T, strict=False)), bench.sample_time)
 
 
-def truths(plant: Plant, seed: int) -> Iterator[str]:
-    """Yield a line for every number that a fit of `balance` says, and what the plant itself does."""
-    channels = arranged(BALANCE, plant)
-    assert channels is not None
-    estimator = begun(BALANCE, channels, seed).fit(list(plant.train))
-    assert isinstance(estimator, BalanceEstimator)
-    bench, trial = plant.bench, estimator.trial_
-    named = [channel.name for channel in (*trial.pressures, *trial.others)]
-
-    def respond(inputs: Array) -> Array:
-        known = dict(zip(named, inputs.T, strict=True))
-        columns = [known.get(load, np.zeros(len(inputs))) for load in bench.loads]
-        loads = np.reshape(columns, (len(bench.loads), len(inputs))).T
-        return plant.respond(np.column_stack([known[name] for name in bench.pressures]), loads)
-
-    truly = trial.response(respond, round(0.25 * trial.seconds / bench.sample_time))
-    for one in estimator.measured_:
-        truth = float(truly[KINDS.index(one.kind), one.place, one.output])
-        close = 1.0 / CLOSE <= one.value / truth <= CLOSE
-        true = close or abs(one.value - truth) <= 2.0 * one.error
-        figures = numeral(one.value), numeral(one.error), numeral(truth), one.unit or "1"
-        yield f"| {' | '.join((plant.name, str(seed), said_of(trial, one), *figures))} | {true} |"
-
-
 def lines(plant: Plant, seed: int, every: Sequence[Found]) -> Iterator[str]:
     """Yield a line of the table for every group of runs, and for the inverse."""
     own = next((one.errors for one in every if one.name == BALANCE), {})
@@ -210,19 +176,11 @@ def main() -> None:
     names = registry.names("estimators")
     parser.add_argument("--models", nargs="+", metavar="NAME", choices=names, default=names)
     parser.add_argument("--notes", action="store_true", help="what the fits of balance say")
-    parser.add_argument("--truth", action="store_true", help="whether what balance says is so")
     parser.add_argument("--json", type=Path, help="file for what came of every model")
     given = parser.parse_args()
     if unknown := {*given.plants} - {*PLANTS}:
         parser.error(f"there is no plant {', '.join(sorted(unknown))}")
     warnings.simplefilter("ignore")
-    if given.truth:
-        print("| plant | seed | sentence | model | standard error | plant | unit | true |")
-        print("|---|---:|---|---:|---:|---:|---|---|")
-        for name in given.plants or SETS[given.set]:
-            for seed in range(given.seeds):
-                print("\n".join(truths(PLANTS[name](seed), seed)), flush=True)
-        return
     print("| plant | seed | runs | best other | balance | ratio | failed |")
     print("|---|---:|---|---|---:|---:|---|")
     kept: dict[str, list[Found]] = {}

@@ -26,9 +26,6 @@ TAKES_RECORDINGS: list[Callable[[Any], object]] = [
     lambda given: mckibben.identify(given, "pi"),
     lambda given: mckibben.check(GPI, given),
     lambda given: mckibben.GPIEstimator().fit(given),
-    lambda given: mckibben.GPIEstimator().fit(
-        mckibben.read(mckibben.example.TRAIN), validation=given
-    ),
 ]
 
 

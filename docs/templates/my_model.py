@@ -101,8 +101,8 @@ class ElasticPlasticEstimator(SeparableEstimator):
         return [np.array([share]) for share in (0.02, 0.08, 0.2)]
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:  # regressors
-        play = self.build(theta, np.array([0.0, 1.0]), 0.0, data).simulate(run.history)
-        return np.column_stack([run.history - play, play])
+        play = self.build(theta, np.array([0.0, 1.0]), 0.0, data).simulate(run.u)
+        return np.column_stack([run.u - play, play])
 
     def least(self, matrix: Array, data: TrainingData) -> Array:  # bounds for the inverse
         return LEAST_REVERSIBLE * np.ptp(data.output_range) / np.ptp(matrix, axis=0)

@@ -314,9 +314,6 @@ class FitOptions:
         ),
     ] = None
     settings: Settings = field(default_factory=dict)
-    validation: Annotated[
-        tuple[Path, ...], Option("Validation recording for early stopping; repeatable.", "FILE")
-    ] = ()
     seed: Seed = 0
 
 

@@ -87,7 +87,7 @@ def fit(
     chosen, reading = _chosen(FitOptions, options, reading, given)
     settings = settings_of(model, chosen.settings)
     prior = chosen.prior or settings.get("prior")
-    file = _claim(out, _paths(data, chosen.validation, chosen.residual_of, prior), force)
+    file = _claim(out, _paths(data, chosen.residual_of, prior), force)
     for side in ("input", "output"):
         if names := getattr(chosen, side):
             settings.setdefault(side, names[0] if len(names) == 1 else tuple(names))
@@ -101,9 +101,6 @@ def fit(
         settings["prior"] = chosen.prior
     settings = {"seed": chosen.seed} | settings
     estimator = kind(**{**kind.targets.get(chosen.target, {}), **settings})
-    if chosen.validation and not estimator.stops_early:
-        problem = f"{model!r} does not stop early"
-        raise DataError(problem, parameter="validation", remedy="leave it out")
     sides = [estimator.input, estimator.output]
     if sides == ["pressure", "displacement"]:
         asked = settings.get("input"), settings.get("output")
@@ -112,9 +109,8 @@ def fit(
         needed = [n for some in sides for n in ((some,) if isinstance(some, str) else some or ())]
         runs = read_files(data, needed or None, reading)
     base, whole = saved(chosen.residual_of), runs
-    checks = read_files(chosen.validation, None, reading)
     if base is not None:
-        runs, checks = (_residuals(base, estimator, some) for some in (runs, checks))
+        runs = _residuals(base, estimator, runs)
     used = estimator.data(runs)
     check_shared({"fit": runs}, *([one.name for one in of] for of in (used.inputs, used.outputs)))
     channels = [one.name for one in (*used.inputs, *used.outputs, *used.scheduled)]
@@ -122,7 +118,7 @@ def fit(
         problem = f"a model for {chosen.target} is fitted to a measured force"
         raise DataError(problem, channel="force", remedy="give recordings with one")
     with telling(progress, f"fitting {model}") as tell:
-        estimator.fit(runs, validation=checks, progress=tell)
+        estimator.fit(runs, progress=tell)
     price = None
     if chosen.target is not None:
         from mckibben.export.mjcf import carried

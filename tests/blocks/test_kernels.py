@@ -13,13 +13,10 @@ from numpy.typing import NDArray
 from mckibben import ModelWarning
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_law import (
-    AT_REST,
     DYNAMIC,
     OWN,
     coordinate_at,
     muscle_at,
-    solve_equilibrium,
-    update_state,
 )
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
@@ -237,23 +234,6 @@ def linear(block: Balance, c: Array) -> list[int]:
             place for place in range(first, first + terms) if place != first + 2 or block.mass
         ]
     return found
-
-
-def test_a_balance_begun_in_motion_is_its_simulation_from_that_state() -> None:
-    block = replace(Balance.example(), grip=0.1)
-    driven, x = path([0.0, 0.0], [4.0, 4.0])[5:25], path([0.0, 0.0], [1.0, 60.0])[5:25]
-    begun = np.array([0.1, 0.3, -0.05, 0.2, 0.5, -3.0, 0.2, 1.0])
-    c = block.coefficients(0.1)
-    found, _ = follow(c, driven, driven, x, held=False, begun=begun)
-    inputs = np.column_stack([driven, x])
-    state = block.inverse().initial_state(inputs[0])
-    q, scratch = state[:2].copy(), np.zeros(block.n_scratch)
-    solve_equilibrium(c, state, AT_REST, q, inputs[0, 2:], inputs[0, :2], scratch)
-    update_state(c, state, AT_REST, q, inputs[0, :2], inputs[0, 2:])
-    state[4 : 4 + begun.size] = begun
-    state[-2] = 1.0
-    expected = block.inverse().simulate(inputs, sample_time=0.1, initial=tuple(state))
-    np.testing.assert_array_equal(found, expected)
 
 
 @pytest.mark.parametrize("settled", [False, True])

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +15,7 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, Recording, write
-from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.signals import irregular_triangle, triangle
-from tests.cli.conftest import Cli
 
 STOPS = 2
 
@@ -115,27 +111,3 @@ def test_a_stopped_comparison_keeps_what_is_finished_and_goes_on(
         assert set(on_board(folder)) == set(MODELS.split(","))
         assert json.loads((folder / "leaderboard.json").read_text())["pending"] == []
         assert not (folder / "unfinished").exists()
-
-
-def stop_at(count: int, function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that is interrupted the n-th time that it is called."""
-    calls = itertools.count(1)
-
-    def called(*given: Any) -> Any:
-        found = function(*given)
-        if next(calls) == count:
-            raise KeyboardInterrupt
-        return found
-
-    return called
-
-
-def test_a_stopped_fit_keeps_the_best_so_far(
-    cli: Cli, files: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(Tracker, "saw", stop_at(60, Tracker.saw))
-    out = tmp_path / "model.json"
-    result = cli("fit", "gpi", files[0], "-o", out, "--json")
-    assert result.code == 0, result.err
-    assert json.loads(result.out)["interrupted"] is True
-    assert out.exists()

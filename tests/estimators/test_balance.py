@@ -112,12 +112,10 @@ def test_loads_beyond_those_trained_enter_as_they_are(found: BalanceEstimator) -
     assert error(found, recording(4, strongest=140.0)) < 0.1
 
 
-def test_a_load_that_counts_the_other_way_is_the_same_and_told(found: BalanceEstimator) -> None:
+def test_a_load_that_counts_the_other_way_is_the_same(found: BalanceEstimator) -> None:
     turned = BalanceEstimator().fit([recording(seed, sign=-1.0) for seed in (1, 2)])
     assert balance_of(turned).loads == ((-1.0,),)
     assert turned.diagnostics_.rmse == pytest.approx(found.diagnostics_.rmse, rel=1e-4)
-    assert [note for note in turned.diagnostics_.notes if note.startswith("force acts")]
-    assert not [note for note in found.diagnostics_.notes if note.startswith("force acts")]
 
 
 def test_a_dead_zone_is_found() -> None:
@@ -143,12 +141,6 @@ def test_times_of_filling_and_venting_are_found() -> None:
     with pytest.warns(ModelWarning, match="clipped"):
         given = compensator.simulate(np.column_stack([wanted, 0.0 * wanted]), sample_time=STEP)
     assert low[0] <= given.min() < given.max() <= high[0] < 4.1
-
-
-def test_of_moments_nothing_is_said() -> None:
-    estimator = BalanceEstimator().fit([recording(seed).slice(300, 360) for seed in (1, 2)])
-    assert estimator.trial_.seconds == pytest.approx(1.5)
-    assert not estimator.measured_
 
 
 @pytest.mark.parametrize(
@@ -352,9 +344,8 @@ def test_muscles_that_are_alike_come_out_alike_at_a_joint() -> None:
     assert error(estimator, joint(3)) < 1.5 * NOISE
     balance = balance_of(estimator)
     np.testing.assert_allclose(balance.directions, [[1.0], [-1.0]])
-    widths = [one.value for one in estimator.measured_ if one.kind == "width"]
-    for first, second in (widths, np.array(balance.areas)[:, 0]):
-        assert first == pytest.approx(second, rel=0.2)
+    first, second = np.array(balance.areas)[:, 0]
+    assert first == pytest.approx(second, rel=0.2)
     np.testing.assert_allclose(balance.areas[0][0], 60.0, rtol=0.1)
     turned = BalanceEstimator().fit([joint(1, -1.0), joint(2, -1.0)])
     assert turned.diagnostics_.rmse == pytest.approx(estimator.diagnostics_.rmse, rel=0.05)

@@ -86,18 +86,6 @@ def test_friction_is_recovered_to_the_noise() -> None:
     assert table[:, 2].sum() == pytest.approx(truth[:, 2].sum(), rel=0.05)
 
 
-def test_growth_with_pressure_is_found() -> None:
-    growing = replace(TRUTH, pressure_gain=0.2, reference_pressure=4.0)
-    runs = []
-    for pressure in (2.0, 4.0, 6.0):
-        bare = isobaric(pressure).select(["length", "pressure"])
-        runs.append(bare.with_channels(force=growing.simulate(bare)["force"]))
-    fit: Any = MultistateEstimator(static=None, elements="each-way", fit_pressure_gain=True).fit(
-        runs
-    )
-    assert fit.model_.pressure_gain == pytest.approx(0.2, abs=0.02)
-
-
 def sines(frequency: float, force: float) -> Recording:
     time = np.arange(1200) * 0.005
     contraction = 0.1 - 0.03 * np.cos(2 * np.pi * frequency * time)

@@ -94,7 +94,7 @@ def test_box_jenkins_finds_the_truth_whatever_the_noise(seed: int) -> None:
     assert isinstance(model, TransferFunction)
     np.testing.assert_allclose(model.numerator, B, atol=0.06)
     np.testing.assert_allclose(model.denominator, F, atol=0.03)
-    assert fit.noise_.deviation == pytest.approx(0.3, rel=0.1)
+    assert model.noise_deviation == pytest.approx(0.3, rel=0.1)
 
 
 def test_arx_is_ordinary_least_squares() -> None:
@@ -224,7 +224,7 @@ def test_what_is_delivered_is_what_was_optimised(initial: Any) -> None:
         ):
             delivered = np.sqrt(np.mean((modelled - recording["displacement"]) ** 2))
             assert delivered == pytest.approx(fit.diagnostics_.rmse, rel=1e-9)
-    assert fits[1].diagnostics_.rmse <= fits[1].noise_.deviation * (1 + 1e-9)
+    assert fits[1].diagnostics_.rmse <= fits[1].model_.noise_deviation * (1 + 1e-9)
 
 
 def test_prediction_goes_from_one_step_errors_to_the_free_run() -> None:
@@ -236,7 +236,7 @@ def test_prediction_goes_from_one_step_errors_to_the_free_run() -> None:
     rms = [
         float(np.std(model.predict(recording, k)["displacement"] - measured)) for k in (1, 5, 50)
     ]
-    assert rms[0] == pytest.approx(fit.noise_.deviation, rel=1e-3)
+    assert rms[0] == pytest.approx(model.noise_deviation, rel=1e-3)
     assert rms[0] < rms[1] < rms[2] * 1.001
     beyond, whole = (model.predict(recording, n) for n in (10**9, len(recording)))
     np.testing.assert_array_equal(beyond["displacement"], whole["displacement"])

@@ -24,10 +24,9 @@ def test_block_equals_the_sum_of_the_pieces(name: str, w: np.ndarray, offset: fl
     )
 
 
-@pytest.mark.parametrize("name", ["piecewise-linear", "polynomial"])
 @given(weights)
-def test_increasing_maps_increase_and_invert(name: str, w: np.ndarray) -> None:
-    block = MAPS[name](5).build(w, 0.0, 0.0, 1.0, DISPLACEMENT)
+def test_an_increasing_map_increases_and_inverts(w: np.ndarray) -> None:
+    block = MAPS["polynomial"](5).build(w, 0.0, 0.0, 1.0, DISPLACEMENT)
     y = block.simulate(np.linspace(0, 1, 101))
     assert np.all(np.diff(y) > 0)
     np.testing.assert_allclose(

@@ -21,7 +21,7 @@ from mckibben.comparison.memory_test import Memory, memory_test
 from mckibben.comparison.splits import Fold, Split
 from mckibben.diagnosis.bands import Held
 from mckibben.errors import MckibbenError, unforeseen
-from mckibben.estimators.optimisers.tracker import Progress, whole_searches
+from mckibben.estimators.optimisers.tracker import Progress
 from mckibben.metrics import Scores, mean_scores, score
 from mckibben.recording import Recording
 from mckibben.system import workers
@@ -42,15 +42,11 @@ resampling.
 
 @dataclass(frozen=True)
 class Data:
-    """Data common to all models: training and test data, folds, channels.
-
-    ``early`` are recordings for searches that stop early.
-    """
+    """Data common to all models: training and test data, folds, channels."""
 
     split: Split
     folds: tuple[Fold, ...]
     channels: Channels
-    early: tuple[Recording, ...] = ()
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
@@ -192,10 +188,7 @@ def _fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:
         progress: Progress | None = None
         if task.whole:  # the share of all fits that is done, by the share of one
             progress = lambda share, cost: tell((place + share) / n_fits, cost)  # noqa: E731
-        with whole_searches():
-            return estimator_class(**settings).fit(
-                recordings, rows=rows, validation=data.early, progress=progress
-            )
+        return estimator_class(**settings).fit(recordings, rows=rows, progress=progress)
 
     predictions, invalid = {}, None
     try:

@@ -150,7 +150,7 @@ def plan_of(
         ignored=channels.ignored(every),
         outside=_outside(split, channels.known(every)),
     )
-    return Plan(Data(split, parts, channels, tuple(checks)), items, empty, refused)
+    return Plan(Data(split, parts, channels), items, empty, refused)
 
 
 def _early(every: Sequence[Recording], channels: Channels, allow: bool) -> tuple[str, ...]:

@@ -123,7 +123,7 @@ def compare(
     load : str, optional
         Channel of a varying load, an input of the models; `mpi` per load is compared, too.
     validation : sequence of Recording
-        To stop searches early and to choose on; nothing is fitted to them.
+        To choose on; nothing is fitted to them.
     models : "all", "quick", str or sequence of str
         Short names, in a text with commas between; "all" leaves out models that do not apply to the
         channels, "quick" is a choice that takes seconds.

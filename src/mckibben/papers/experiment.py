@@ -19,7 +19,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelWarning
-from mckibben.estimators.optimisers.tracker import whole_searches
 from mckibben.papers.paper import FigureText, Paper, TableText, paper
 from mckibben.recording import REST_LENGTH, Recording, conversion
 from mckibben.rigs import Rig, load_rig, record
@@ -275,7 +274,7 @@ class Experiment:
         search: list[float] = []
 
         def fit() -> Fitted:
-            with whole_searches(), warnings.catch_warnings():
+            with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ModelWarning)
                 heard = {"progress": lambda share, best: search.append(float(best))}
                 estimator.fit(recordings, **heard | how)

@@ -121,7 +121,7 @@ def fit(found: Fit) -> list[Item]:
     said = [
         f"{found.name}: free-running RMSE {numeral(about['rmse'], 4)} {unit} on "
         f"{about['n_samples']} samples, {about['n_parameters']} parameters, "
-        f"{about['seconds']:.2f} s{' (interrupted: the best until then)' * about['interrupted']}"
+        f"{about['seconds']:.2f} s"
     ]
     if len(about["rmse_by_output"]) > 1:
         errors = [f"{k} {numeral(v, 4)} {unit}" for k, v in about["rmse_by_output"].items()]

@@ -55,7 +55,7 @@ class Fit:
         found, model = self.estimator.diagnostics_, self.estimator.model_
         numbers = quantities(model)
         names = [channel.name for channel in model.outputs]
-        copied = ("rmse", "rmse_from_rest", "n_samples", "n_evaluations", "seconds", "interrupted")
+        copied = ("rmse", "rmse_from_rest", "n_samples", "n_evaluations", "seconds")
         return {
             "model": self.name,
             "file": _text(self.file),

@@ -24,7 +24,6 @@ SENT = {"input": "voltage", "output": "pressure"}
 STOPS = {"n_stops": 3, "n_lags": 1, "elasticity": 3}
 MEMORY = {"memory": "pi", "memory_settings": {"n_operators": 4}, "n_sets": 1, "n_friction": 2}
 SWARM = {"particles": 6, "iterations": 4, "search_samples": 400}
-SHAKEN = {"substeps": 4}
 
 SINGLE: Mapping[str, Mapping[str, Any]] = {
     "armax": {},
@@ -86,8 +85,6 @@ SHOWN: Mapping[tuple[str, str], Mapping[str, Mapping[str, Any]]] = {
         "narx-network": SENT | {"n_units": 2, "n_starts": 4},
     },
     ("shaken", "shaken-softer"): {
-        "bouc-wen-oscillator": SHAKEN,
-        "duhem-oscillator": SHAKEN,
         "state-network": {"substeps": 1, "n_states": 2, "n_units": 1, "n_steps": 100},
     },
     ("lifted", "lifted-stiffer"): {

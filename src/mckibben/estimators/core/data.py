@@ -39,11 +39,6 @@ class Run:
     scheduled: Array
     counts: Mask
     sample_time: float | None
-    peak: float | None = None
-    """Input from which the run started before its first sample, where it is not lower: its initial
-    memory.
-    """
-
     place: int = 0
     """Index among all runs."""
 
@@ -70,8 +65,8 @@ class Run:
         return replace(self._at(slice(None, None, every)), sample_time=step)
 
     def cut(self, start: int, stop: int | None = None) -> Run:
-        """Return a segment of the run, with its own initial memory."""
-        return replace(self._at(slice(start, stop)), peak=None if start else self.peak)
+        """Return a segment of the run."""
+        return self._at(slice(start, stop))
 
     def stretches(self, shortest: int) -> list[Run]:
         """Return the segments of scored samples longer than a minimum, each as a run."""
@@ -104,37 +99,22 @@ class Run:
         )
 
     @property
-    def history(self) -> Array:
-        """The input preceded by the initial peak, if there is one."""
-        return self.u if self.peak is None else np.concatenate([[self.peak], self.u])
-
-    @property
     def inputs(self) -> Array:
-        """Inputs of a block, shape (n, k + s): driven and scheduling, with the initial peak in front."""
-        whole = np.hstack([self.driven, self.scheduled])
-        if self.peak is not None:
-            whole = np.concatenate([whole[:1], whole])
-            whole[0, 0] = self.peak
-        return np.ascontiguousarray(whole)
-
-    def trim(self, samples: Array) -> Array:
-        """Drop the part of the initial peak from a result over `history`."""
-        return samples if self.peak is None else samples[1:]
+        """Inputs of a block, shape (n, k + s): driven and scheduling."""
+        return np.ascontiguousarray(np.hstack([self.driven, self.scheduled]))
 
 
 @dataclass(frozen=True, eq=False)
 class TrainingData:
     """All runs for identification, and their common channels.
 
-    ``early`` are runs to stop a search early by, to which nothing is fitted; ``spans`` are ranges of the
-    outputs that are known otherwise, for where they do not move.
+    ``spans`` are ranges of the outputs that are known otherwise, for where they do not move.
     """
 
     runs: tuple[Run, ...]
     inputs: tuple[Channel, ...]
     outputs: tuple[Channel, ...]
     scheduled: tuple[Channel, ...] = ()
-    early: TrainingData | None = None
     spans: tuple[float, ...] | None = None
     _memo: dict[Hashable, Array] = field(default_factory=dict, init=False, repr=False)
     _latest: dict[Hashable, tuple[Array, Any]] = field(default_factory=dict, init=False, repr=False)
@@ -251,15 +231,6 @@ class TrainingData:
     def negated(self) -> TrainingData:
         """Return the same data with the output's sign changed."""
         return self._changed(lambda run: replace(run, outputs=-run.outputs))
-
-    def with_peaks(self, peaks: Sequence[float | None]) -> TrainingData:
-        """Return the same data with other initial peaks."""
-        runs = tuple(replace(run, peak=peak) for run, peak in zip(self.runs, peaks, strict=True))
-        return replace(self, runs=runs)
-
-    def unstarted(self) -> TrainingData:
-        """Return the same data without fitted start states."""
-        return self.with_peaks([None] * len(self.runs))
 
     def condensed(self) -> TrainingData:
         """Return the same data with reduced runs; see `Run.condensed`."""

@@ -7,7 +7,7 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -83,14 +83,8 @@ class Diagnostics:
     """Number of evaluations of the model in the search."""
 
     seconds: float
-    interrupted: bool
-    """Whether the user stopped the search; the model is then the best one found."""
-
     at_bounds: tuple[int, ...]
     """Indices, in ``model_.pack()``, of the parameters at a bound."""
-
-    peaks: tuple[float | None, ...]
-    """For every recording, the assumed input from which it started before its first sample."""
 
     notes: tuple[str, ...]
     """Notes for the user."""
@@ -273,8 +267,8 @@ class Estimator(ABC):
 
     def channels(self, data: TrainingData) -> dict[str, Channel]:
         """Return the channels of the block to build, as keyword arguments."""
-        beside = zip(self.input_settings, data.scheduled, strict=True)
-        return {"input": data.inputs[0], "output": data.outputs[0], **dict(beside)}
+        scheduled = zip(self.input_settings, data.scheduled, strict=True)
+        return {"input": data.inputs[0], "output": data.outputs[0], **dict(scheduled)}
 
     @property
     def starting_rule(self) -> Start:
@@ -311,11 +305,6 @@ class Estimator(ABC):
         """Number of fitted values that are not in ``model_.pack()``."""
         return 0
 
-    @property
-    def stops_early(self) -> bool:
-        """Whether validation recordings can stop the search."""
-        return False
-
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
@@ -331,7 +320,7 @@ class Estimator(ABC):
 
     @abstractmethod
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the identified block, and the data with its initial peaks."""
+        """Return the identified block, and the data with the channels that it uses."""
 
     def fit(
         self,
@@ -340,7 +329,6 @@ class Estimator(ABC):
         *,
         sample_time: float | None = None,
         rows: Sequence[Mask] | None = None,
-        validation: Sequence[Recording] = (),
         progress: bool | Progress | None = None,
     ) -> Self:
         """Fit the block to recordings by its free-running error.
@@ -356,8 +344,6 @@ class Estimator(ABC):
             Between samples of arrays [s].
         rows : sequence of bool arrays, optional
             For every recording, the samples whose outputs are scored.
-        validation : sequence of Recording
-            For early stopping; not fitted. Most estimators do not use them.
         progress : bool or callable, optional
             Whether to show a bar; or a callback for the share done and the best RMSE so far.
 
@@ -377,8 +363,8 @@ class Estimator(ABC):
         runs = listed(recordings) if y is None else [self._recording(recordings, y, sample_time)]
         try:
             with one_blas_thread(), telling(progress, "fitting") as tell:
-                return self._fit(runs, rows, validation, tell)
-        except BaseException:  # a fit that fails, or is interrupted too early, leaves no traces
+                return self._fit(runs, rows, tell)
+        except BaseException:  # a fit that fails or is interrupted leaves no traces
             vars(self).clear()
             vars(self).update(before)
             raise
@@ -404,28 +390,23 @@ class Estimator(ABC):
         self,
         recordings: Recording | Sequence[Recording],
         rows: Sequence[Mask] | None,
-        validation: Sequence[Recording],
         progress: Progress | None,
     ) -> Self:
         started = time.perf_counter()
         self.check_settings()
         data = self.data(listed(recordings), rows)
-        if early := listed(validation):
-            data = replace(data, early=self.data(early))
         tracker = Tracker(progress=progress)
         block, data = self.find(data, tracker)
-        tracker.end()
         diagnostics = self._diagnose(block, data, tracker, started)
-        tracker.end()
-        if progress is not None and not tracker.interrupted:
+        if progress is not None:
             progress(1.0, diagnostics.rmse)
         self.model_, self.diagnostics_ = block, diagnostics
         settings = self.get_params()
         fits_starts = self.solves_starts and settings["initial"] == "fitted"
         missed = diagnostics.rmse_from_rest > np.ptp(data.target)
-        if fits_starts and missed and not tracker.interrupted:
+        if fits_starts and missed:
             at_rest = type(self)(**settings | {"initial": "first_sample"})
-            at_rest._fit(recordings, rows, validation, progress)
+            at_rest._fit(recordings, rows, progress)
             vars(self).update(vars(at_rest) | settings)
         return self
 
@@ -505,7 +486,7 @@ class Estimator(ABC):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ModelWarning)
             residual = data.target - self.free_runs([block], data)[0]
-            from_rest = data.target - simulate_all([block], data.unstarted())[0]
+            from_rest = data.target - simulate_all([block], data)[0]
         notes = dict.fromkeys([*tracker.notes, *sorted({str(one.message) for one in caught})])
         by_output = _rms(residual.reshape(-1, len(data.outputs)))
         return Diagnostics(
@@ -516,9 +497,7 @@ class Estimator(ABC):
             n_free=block.n_parameters - len(self.fixed(block)) + self.n_further,
             n_evaluations=tracker.evaluations,
             seconds=time.perf_counter() - started,
-            interrupted=tracker.interrupted,
             at_bounds=at_bounds,
-            peaks=tuple(run.peak for run in data.runs),
             notes=tuple(notes),
             # of the estimator as it is now: it may be changed or fitted again
             uncertainty=partial(copy(self).uncertainty, block, data, residual, at_bounds),
@@ -549,7 +528,8 @@ class Estimator(ABC):
         """Return the condition of the free parameters, and the covariance of all; see `Diagnostics`."""
         if not self.errors_known:
             return np.nan, unknown(block)
-        return covariance_of(block, data, residual, at_bounds)
+        fixed = sorted({*at_bounds, *self.fixed(block)})
+        return covariance_of(block, data, residual, fixed, self.free_runs)
 
     def at_bounds(self, block: Block) -> tuple[int, ...]:
         """Return the indices of parameters at a bound: by default those equal to zero."""

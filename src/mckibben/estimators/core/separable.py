@@ -20,7 +20,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.memoryless import Negative
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.estimator import Estimator, Initial
+from mckibben.estimators.core.estimator import Estimator, Start
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.multi_start import Choice, multi_start
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -51,9 +51,9 @@ class SeparableEstimator(Estimator):
     ----------
     input, output : str
         Channels to learn from.
-    initial : {"first_sample", "virgin", "fitted"}
-        Memory before the first sample of every recording: as if the input had only risen; as if nothing
-        had ever happened; or fitted with the rest, one number a recording: the input from which it fell.
+    initial : {"first_sample", "virgin"}
+        Memory before the first sample of every recording: as if the input had only risen; or as if
+        nothing had ever happened.
     nonnegative : bool
         Whether each linear parameter is held at or above what `least` returns: by default 0, the first a
         little above it. Of most models that gives an inverse.
@@ -65,7 +65,7 @@ class SeparableEstimator(Estimator):
 
     input: str = "pressure"
     output: str = "displacement"
-    initial: Initial = "first_sample"
+    initial: Start = "first_sample"
     nonnegative: bool = True
     n_starts: Annotated[int, Ge(1)] = 48
     n_refined: Annotated[int, Ge(1)] = 4
@@ -76,9 +76,6 @@ class SeparableEstimator(Estimator):
 
     searches_condensed: ClassVar[bool] = True
     """Whether the search may use turning points of the input only."""
-
-    fits_peaks: ClassVar[bool] = True
-    """Whether a fitted start is the input from which every run descended."""
 
     rises: ClassVar[bool] = True
     """Whether the block's output increases with its input; decreasing data are then mirrored."""
@@ -93,7 +90,7 @@ class SeparableEstimator(Estimator):
 
     @abstractmethod
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the regressors of the linear parameters over the run's history, shape (n, k)."""
+        """Return the regressors of the linear parameters over a run, shape (n, k)."""
 
     @abstractmethod
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
@@ -141,24 +138,19 @@ class SeparableEstimator(Estimator):
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block for increasing data; mirrored for decreasing data."""
         if not (self.rises and data.falls):
-            return self.identify(data, tracker)
-        rising, used = self.identify(data.negated(), tracker)
+            return self.identify(data, tracker), data
+        rising = self.identify(data.negated(), tracker)
         channel = self.channels(data)["output"]
-        block = Series((rising, Negative(channel, channel)))
-        return block, data.with_peaks([run.peak for run in used.runs])
+        return Series((rising, Negative(channel, channel))), data
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the identified block, and the data with its initial peaks.
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
+        """Return the identified block.
 
         Where `rises`, the output of the data rises with the input.
         """
         theta = self._search(data, tracker)
-        if self.initial == "fitted" and self.fits_peaks:
-            for _ in range(2):
-                data = self._fit_peaks(theta, data)
-                theta = self._polish(theta, data, tracker)
         linear, offset = self.solve(self.matrix(theta, data), data)
-        return self.build(theta, linear, offset, data), data
+        return self.build(theta, linear, offset, data)
 
     def most_evaluations(self, size: int) -> int:
         """Return the maximum number of evaluations of a refinement."""
@@ -185,7 +177,7 @@ class SeparableEstimator(Estimator):
             jacobian=jacobian,
             choices=self.choices(data),
         )
-        return theta if tracker.interrupted else self._polish(theta, data, tracker)
+        return self._polish(theta, data, tracker)
 
     def _scattered(self, lower: Array, upper: Array) -> list[Array]:
         from scipy.stats import qmc
@@ -212,30 +204,6 @@ class SeparableEstimator(Estimator):
         )
         tracker.saw_all(own)
         return best
-
-    def _fit_peaks(self, theta: Array, data: TrainingData) -> TrainingData:
-        """Choose the best initial peak of every run, at fixed parameters."""
-        from scipy.optimize import minimize_scalar
-
-        high = data.input_range[1]
-        peaks = [run.peak for run in data.runs]
-        for index, run in enumerate(data.runs):
-            first = float(run.u[0])
-            if high - first <= 0:
-                continue
-
-            def cost(peak: float, index: int = index) -> float:
-                tried = [*peaks[:index], peak, *peaks[index + 1 :]]
-                return _rms(self._solved(theta, data.with_peaks(tried))[2])
-
-            grid = np.linspace(first, high, 17)
-            costs = [cost(peak) for peak in grid]
-            best = int(np.argmin(costs))
-            around = (grid[max(best - 1, 0)], grid[min(best + 1, 16)])
-            found = minimize_scalar(cost, bounds=around, method="bounded")
-            peak = float(found.x) if found.fun < costs[best] else float(grid[best])
-            peaks[index] = None if costs[0] <= cost(peak) * (1 + 1e-12) else peak
-        return data.with_peaks(peaks)
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:
         """Return the regressors at the scored samples of all runs, shape (samples, k)."""
@@ -303,31 +271,25 @@ class SeparableEstimator(Estimator):
 
     def best_of(
         self, setting: str, values: Sequence[float], data: TrainingData, tracker: Tracker
-    ) -> tuple[Block, TrainingData]:
-        """Return the best result over the values of a setting."""
+    ) -> Block:
+        """Return the block of smallest error over the values of a setting."""
         found = []
         for place, value in enumerate(values):
             own = tracker.part(place / len(values), (place + 1) / len(values))
             settings = self.get_params() | {setting: value}
-            found.append((*type(self)(**settings).identify(data, own), own))
+            found.append((type(self)(**settings).identify(data, own), own))
             tracker.saw_all(own)
-            if own.interrupted:
-                break
-        block, chosen, best = min(found, key=lambda item: item[2].best_cost)
+        block, best = min(found, key=lambda item: item[1].best_cost)
         tracker.best_cost, tracker.best = best.best_cost, best.best
-        return block, chosen
+        return block
 
 
-def counting(data: TrainingData, over_history: Callable[[Run], Array]) -> Array:
-    """Return a quantity over the runs' histories, at the scored samples of all runs."""
-    return np.concatenate([run.trim(over_history(run))[run.counts] for run in data.runs])
+def counting(data: TrainingData, of_run: Callable[[Run], Array]) -> Array:
+    """Return a quantity of every run, shape (n, ...), at the scored samples of all runs."""
+    return np.concatenate([of_run(run)[run.counts] for run in data.runs])
 
 
 def differences(theta: Array, lower: Array, upper: Array) -> Array:
     """Return steps of finite differences within the bounds."""
     steps = DIFFERENCE * (upper - lower)
     return np.where(theta + steps <= upper, steps, -steps)
-
-
-def _rms(residuals: Array) -> float:
-    return float(np.sqrt(np.mean(residuals**2)))

@@ -46,8 +46,7 @@ def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
     outputs = []
     for run in data.runs:
         many = run_many(blocks, run.inputs, sample_time=run.sample_time)
-        trimmed = many if run.peak is None else many[:, 1:]
-        outputs.append(trimmed[:, run.counts].reshape(len(many), -1))
+        outputs.append(many[:, run.counts].reshape(len(many), -1))
     return np.concatenate(outputs, axis=1)
 
 
@@ -60,10 +59,8 @@ def simulate_started(blocks: Sequence[Block], data: TrainingData) -> Array:
         return simulate_all(blocks, data)
     outputs = []
     for run in data.runs:
-        before = run.history.size - run.u.size
-        y, counts = np.pad(run.y, (before, 0)), np.pad(run.counts, (before, 0))
-        known = (run.inputs, y, run.sample_time, counts)
-        outputs.append([fitted_run(block, *known)[counts] for block in blocks])
+        known = (run.inputs, run.y, run.sample_time, run.counts)
+        outputs.append([fitted_run(block, *known)[run.counts] for block in blocks])
     return np.concatenate(outputs, axis=1)
 
 
@@ -77,7 +74,7 @@ def covariance_of(
     data: TrainingData,
     residual: Array,
     fixed: Sequence[int],
-    simulated: Simulated = simulate_all,
+    simulated: Simulated,
 ) -> tuple[float, Array]:
     """Return the condition of the free parameters, and the covariance of all.
 
@@ -138,7 +135,7 @@ def sandwich(
 ) -> tuple[float, Array, NDArray[np.bool_]]:
     """Return condition, covariance, and which parameters are determined.
 
-    The pseudo-inverse leaves out undetermined directions, so that a parameter beside two of which
+    The pseudo-inverse leaves out undetermined directions, so that a parameter next to two of which
     only the sum is determined is as unsure as it is with their sum free.
 
     Parameters

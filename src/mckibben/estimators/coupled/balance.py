@@ -25,7 +25,6 @@ from mckibben.blocks.fields import rows, vector
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.estimator import Grid
-from mckibben.estimators.core.uncertainty import covariance_of
 from mckibben.estimators.coupled.balance_bench import (
     bench_of,
     check_numbers,
@@ -48,7 +47,6 @@ from mckibben.estimators.coupled.balance_prior import (
 from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
-from mckibben.estimators.coupled.balance_words import measured, said_of, sentences
 from mckibben.estimators.coupled.base import CoupledEstimator, of_channels, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.muscles.traits import TRAVELS
@@ -146,8 +144,6 @@ class BalanceEstimator(CoupledEstimator):
         or, where others have a force, beyond their average. In the unit of the model's forces.
     terms_ : tuple of str
         What was added.
-    trial_, measured_ : Trial, list of Measured
-        Loops and steps of which the model was asked, and what of its response recordings determine.
     """
 
     title = "Balance of forces"
@@ -272,10 +268,8 @@ class BalanceEstimator(CoupledEstimator):
                 "relaxation is left out: record at other speeds too, or give lags"
             )
         structure = self.widest(bench, timed=not still or self.lags is not None)
-        with tracker.searching():
-            search, z = self._found(data, structure, prior_errors, tracker)
-            self._search, self._z = search, z
-        search, z = self._search, self._z
+        search, z = self._found(data, structure, prior_errors, tracker)
+        self._search, self._z = search, z
         structure = search.structure
         values = structure.expanded(z[: len(structure.terms)])
         balance = in_newtons(structure.block(values, final=True))
@@ -295,23 +289,11 @@ class BalanceEstimator(CoupledEstimator):
         x = of_channels(data, balance.scheduling).stacked("scheduled")
         balance = replace(balance, known=rows(np.column_stack([x.min(axis=0), x.max(axis=0)])))
 
-        def model(values: Array, balance: Balance) -> Block:
-            acting = zip(*(front(structure, values, one) for one in data.inputs), strict=True)
-            limited = (tuple(_within(given_range, block) for block in one) for one in acting)
-            before = [one[0] if len(one) == 1 else PerChannel(one) for one in limited]
-            parts = [*before, balance.inverse(), *behind]
-            return parts[0] if len(parts) == 1 else Series(tuple(parts))
-
-        def other(z: Array) -> Block:
-            values = structure.expanded(z[: len(structure.terms)])
-            return model(values, structure.block(values, final=True))
-
-        folds = search.without_folds(z)
-        self.trial_, self.measured_ = measured(search, z, folds, other)
-        tracker.notes += sentences(search, z, folds, balance)
-        tracker.notes += [said_of(self.trial_, one) for one in self.measured_]
-        self._search, self._z = self._started(search, z)
-        return model(values, balance)
+        acting = zip(*(front(structure, values, one) for one in data.inputs), strict=True)
+        limited = (tuple(_within(given_range, block) for block in one) for one in acting)
+        before = [one[0] if len(one) == 1 else PerChannel(one) for one in limited]
+        parts = [*before, balance.inverse(), *behind]
+        return parts[0] if len(parts) == 1 else Series(tuple(parts))
 
     def widest(self, bench: Bench, *, timed: bool) -> Structure:
         """Return the structure with all candidate terms."""
@@ -384,7 +366,6 @@ class BalanceEstimator(CoupledEstimator):
         last = np.array([term.kind in LAST for term in structure.terms])
         pushed = structure.n > 1 or any(held(data, run) for run in data.runs)
         for number in range(ROUNDS):
-            self._search, self._z = search, z
             part = tracker.part(0.08 * number, 0.08 * (number + 1))
             z = search.descended(z, min(self.steps, STEPS_BETWEEN), part)
             if number == 0 and not few.all_at_rest:
@@ -392,7 +373,6 @@ class BalanceEstimator(CoupledEstimator):
             if number == 0 and self.may("slack") and pushed:
                 search, z = self._slack(search, z)
             search = search.weighed(z)
-            self._search, self._z = search, z
             active, z = search.chosen(z, tried & ~last)
             if (active == search.active).all():
                 active, z = search.chosen(z, tried)
@@ -406,7 +386,6 @@ class BalanceEstimator(CoupledEstimator):
         )
         self.terms_ = tuple(dict.fromkeys(names))
         search, z = search.narrowed(z)
-        self._search, self._z = search, z
         if structure.n == 1 and self.unknown_load is None:
             search, z = self._own_loads(search, z, data)
         z = search.descend(z, self.steps, tracker.part(0.5, 0.7))
@@ -487,21 +466,6 @@ class BalanceEstimator(CoupledEstimator):
         found = own.descend(started, STEPS_BETWEEN, Tracker())
         return (own, found) if search.improved(z, own, found, by=OWN_HELPS) else (search, z)
 
-    def _started(self, search: Search, z: Array) -> tuple[Search, Array]:
-        """Return the search with estimated start states of runs that do not begin at rest.
-
-        Where these follow runs no better than the model's own start, that is left.
-        """
-        problem = search.problem
-        if problem.all_at_rest or search.structure.bench.tare:
-            return search, z
-        none = np.zeros(search.active.size, dtype=bool)
-        whole = replace(search, problem=replace(problem, whole=True))
-        started = replace(search, problem=replace(problem, starts=True), active=none)
-        found = np.append(z, np.zeros(started.problem.size(search.structure) - z.size))
-        found = started.descend(found, STEPS_BETWEEN, Tracker())
-        return (started, found) if started.cost(found) < whole.cost(z) else (search, z)
-
     def fixed(self, block: Block) -> tuple[int, ...]:
         """Return the indices of sides, of a front's gain, and of the unit of force."""
         names = block.parameter_names
@@ -510,15 +474,8 @@ class BalanceEstimator(CoupledEstimator):
         given = re.compile(rf"gain|offset|hysteresis|dead time|side of obstacle .*|{unit}")
         return tuple(place for place, name in enumerate(names) if given.fullmatch(name))
 
-    def uncertainty(
-        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return condition and covariance of the free parameters, in the unit of force."""
-        fixed = sorted({*at_bounds, *self.fixed(block)})
-        return covariance_of(block, data, residual, fixed, self.free_runs)
-
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return free-running outputs of blocks, each run with its own load and start."""
+        """Return free-running outputs of blocks, each run under its own load."""
         return self._search.problem.simulated(blocks, data, self._search.structure, self._z)
 
 
@@ -531,7 +488,7 @@ OF_TRAITS = ("elasticity", "areas", "friction", "relaxation")
 """Kinds of terms that a prior covers."""
 
 OWN_HELPS = 0.1
-"""Smallest relative reduction of errors by per-run nuisance parameters, or by start states."""
+"""Smallest relative reduction of errors by loads of recordings, or by settled starts."""
 
 EXPLAINED = 1.5
 """Largest ratio of the error of whole runs to that without their first parts, for start states to

@@ -1,9 +1,7 @@
 """Residuals of a force balance along runs: force residuals, and free-running errors.
 
-Values are those of `mckibben.estimators.coupled.balance_structure`, and behind them what recordings and
-runs have of their own: of every recording under a load that nobody measured, a constant force on every
-coordinate; of every run whose start is found, what every muscle remembers there: one share of what its
-stops hold, between -1 and 1, and what its lags are behind.
+Unknowns are the terms of `mckibben.estimators.coupled.balance_structure`, then, for every recording
+under an unmeasured load, a constant force on every coordinate.
 """
 
 from __future__ import annotations
@@ -18,14 +16,8 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.coupled.balance import Balance, balance_in
-from mckibben.blocks.coupled.balance_law import (
-    AT_REST,
-    coordinate_at,
-    friction_pressure,
-    solve_equilibrium,
-    update_state,
-)
+from mckibben.blocks.coupled.balance import balance_in
+from mckibben.blocks.coupled.balance_law import coordinate_at
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import Channel, rows
 from mckibben.blocks.memoryless import Contact, PiecewiseLinear
@@ -45,9 +37,6 @@ air.
 
 WARMING = 0.2
 """Initial share of a run that starts away from rest in which errors are ignored."""
-
-UNLIKELY = 0.03
-"""Error, relative to the range, that costs as much as start states with all friction loaded."""
 
 STEP, FIRST_STEP = 1e-4, 0.5
 """Relative step for finite differences of nonlinear parameters, and of new ones."""
@@ -113,8 +102,6 @@ class Problem:
         Whose last scheduling channels are the loads; outputs are coordinates.
     every : int
         One sample of so many is compared; all are run through.
-    starts : bool
-        Whether the starts of runs that do not begin at rest are found.
     of_force : bool
         Whether forces count in all runs.
     whole : bool
@@ -123,7 +110,6 @@ class Problem:
 
     data: TrainingData
     every: int = 1
-    starts: bool = False
     of_force: bool = False
     whole: bool = False
     _fronts: dict[tuple[object, ...], Array] = field(default_factory=dict, repr=False)
@@ -143,10 +129,10 @@ class Problem:
     def counting(self, run: Run, structure: Structure) -> Mask:
         """Return which of the compared samples are scored.
 
-        Of a run that begins in an unknown state, that is not found, the first part does not.
+        The first part of a run that begins in an unknown state is not.
         """
         places = self.places(run)
-        still = held(self.data, run) or structure.settled or self.starts or self.whole
+        still = held(self.data, run) or structure.settled or self.whole
         known = still or at_rest(self.data, run)
         return run.counts[places] & (
             np.arange(places.size) >= (0.0 if known else WARMING) * places.size
@@ -178,7 +164,7 @@ class Problem:
             self._fronts[key] = driven
         return self._fronts[key]
 
-    # -- what recordings and runs have of their own ----------------------------------------------
+    # -- loads of recordings ---------------------------------------------------------------------
 
     def loads_at(self, structure: Structure, run: Run) -> slice:
         """Return the indices of a recording's own load, after the terms."""
@@ -188,29 +174,9 @@ class Problem:
         first += unmeasured.index(run.recording) * structure.m
         return slice(first, first + structure.m)
 
-    def start_at(self, structure: Structure, run: Run) -> slice:
-        """Return the indices of a run's start state: per muscle its share, then its lags."""
-        first = len(structure.terms) + len(structure.bench.unmeasured) * structure.m
-        if not self.starts:
-            return slice(first, first)
-        width = structure.n * (1 + len(structure.lags))
-        place = [one.place for one in self.runs].index(run.place)
-        return slice(first + place * width, first + (place + 1) * width)
-
     def size(self, structure: Structure) -> int:
         """Return the total number of unknowns."""
-        own = len(self.runs) * structure.n * (1 + len(structure.lags)) * self.starts
-        return len(structure.terms) + len(structure.bench.unmeasured) * structure.m + own
-
-    def begun(self, structure: Structure, z: Array, c: Array, run: Run, p: Array) -> Array | None:
-        """Return stops and lags of a run before its first sample [mm]; None if it starts at rest."""
-        start = z[self.start_at(structure, run)].reshape(-1, 1 + len(structure.lags))
-        if not start.size:
-            return None
-        limits, ratio = np.array(structure.limits), float(c[12])
-        grown = [friction_pressure(c, float(one), run.scheduled[0]) for one in p]
-        shares = start[:, 0] * np.where(start[:, 0] > 0.0, 1.0, ratio)
-        return np.append(np.outer(shares * grown, limits).ravel(), start[:, 1:].ravel())
+        return len(structure.terms) + len(structure.bench.unmeasured) * structure.m
 
     # -- following -------------------------------------------------------------------------------
 
@@ -234,11 +200,10 @@ class Problem:
         c = structure.coefficients(values, run.sample_time or 1.0)
         for j, load in enumerate(z[self.loads_at(structure, run)].tolist()):
             c[coordinate_at(c, j)] += load
-        begun = None if held else self.begun(structure, z, c, run, driven[0])
         return follow(
             c, driven, run.outputs, run.scheduled, by_air,
             held=held, rested=held and self.of_force and self._moves(run),
-            every=self.every, sloped=sloped, begun=begun,
+            every=self.every, sloped=sloped,
         )  # fmt: skip
 
     def errors_of(
@@ -261,16 +226,15 @@ class Problem:
     ) -> tuple[list[Array], Array]:
         """Return the errors of every run, and derivatives by all unknowns, shape (errors, unknowns).
 
-        None are computed unless some are ``wanted``. Those by what acts on pressures are differences
-        before the muscles, by what is ``new`` of it over as much as is much; those by walls, pushes and
-        starts are differences behind them. Unlikely starts are errors, too, after those of runs.
+        Derivatives are computed only if some are ``wanted``. Those by parameters of the front are
+        finite differences of the acting pressures, with a large step for ``new`` ones; those by walls
+        and pushes are finite differences of the errors.
         """
+        errors, slopes = list[Array](), [np.zeros((0, z.size))]
         if wanted is None:
-            errors = [
-                self.errors_of(structure, z, run, sloped=False)[0].ravel() for run in self.runs
-            ]
-            return [*errors, *self._unlikely(structure, z)[:1]], np.zeros((0, z.size))
-        errors, slopes = [], []
+            for run in self.runs:
+                errors.append(self.errors_of(structure, z, run, sloped=False)[0].ravel())
+            return errors, slopes[0]
         n, terms = structure.mix.shape[1], structure.terms
         air = [kind for kind in OF_AIR if wanted[structure.free(kind)].any()]
         exact = [place for place in range(n, len(terms)) if terms[place].kind in EXACT]
@@ -287,17 +251,15 @@ class Problem:
             whole[:, loads] = by[
                 :, [structure.spring(0, j, -1) for j in range(loads.stop - loads.start)]
             ]
-            start = self.start_at(structure, run)
             changed = [p for p in np.flatnonzero(wanted) if terms[p].kind in ("walls", "pushes")]
-            for place in (*changed, *range(start.start, start.stop)):
+            for place in changed:
                 moved = z.copy()
                 moved[place] += (step := self._step(structure, z, place, STEP))
                 after = self.errors_of(structure, moved, run, sloped=False)[0]
                 whole[:, place] = ((after - before) / step).ravel()
             errors.append(before.ravel())
             slopes.append(whole)
-        far, by = self._unlikely(structure, z)
-        return [*errors, far], np.concatenate([*slopes, by])
+        return errors, np.concatenate(slopes)
 
     def _by_air(
         self, structure: Structure, z: Array, run: Run, kinds: list[str], new: Mask | None
@@ -316,23 +278,9 @@ class Problem:
         shape = (*run.driven.shape, len(kinds))
         return np.stack(found, axis=2) if found else np.zeros(shape)
 
-    def _unlikely(self, structure: Structure, z: Array) -> tuple[Array, Array]:
-        """Return prior residuals of start states, and their derivatives."""
-        width = 1 + len(structure.lags)
-        first = len(structure.terms) + len(structure.bench.unmeasured) * structure.m
-        scale = np.full(((z.size - first) // width, width), UNLIKELY)
-        scale[:, 1:] /= float(structure.bench.travel.mean())
-        slopes = np.zeros((scale.size, z.size))
-        slopes[:, z.size - scale.size :] = np.diag(scale.ravel())
-        return scale.ravel() * z[z.size - scale.size :], slopes
-
     def _step(self, structure: Structure, z: Array, place: int, share: float) -> float:
         """Return the finite-difference step of a parameter, away from its bounds."""
         n = structure.mix.shape[1]
-        if place >= len(structure.terms):
-            width = 1 + len(structure.lags)
-            far = float(structure.bench.travel.mean())
-            return STEP * (far if (z.size - place) % width else 1.0)
         _, high, much = (end[place - n] for end in structure.ends())
         step = share * float(much)
         return step if z[place] + step <= high else -step
@@ -359,59 +307,34 @@ class Problem:
     ) -> Array:
         """Return free-running outputs of blocks at scored samples, shape (blocks, n).
 
-        Every run is under its own load, and begins with what it was found to remember.
+        Every run is under its own load.
         """
         outputs = []
         for run in data.runs:
-            loads, start = z[self.loads_at(structure, run)], z[self.start_at(structure, run)]
+            loads = z[self.loads_at(structure, run)]
             given = []
             for model in blocks:
-                placed = balance_in(model)
-                assert placed is not None
-                balance = placed.balance
                 if loads.any():
+                    placed = balance_in(model)
+                    assert placed is not None
+                    balance = placed.balance
                     springs = np.array(balance.springs)
                     springs[:, 0] += loads * balance.areas[0][0]
                     balance = replace(balance, springs=rows(springs))
                     parts = (*placed.before, balance.inverse(), *placed.behind)
                     model = Series(parts) if len(parts) > 1 else parts[0]
-                state = model.initial_state(run.inputs[0])
-                if start.size:
-                    first = run.inputs[0].copy()
-                    for part in placed.before:
-                        first[: structure.n] = run_many(
-                            [part], first[np.newaxis, : structure.n], sample_time=run.sample_time
-                        )[0][0]
-                    self._begin(balance, state, first, structure, z, run)
-                found = run_many(
-                    [model], run.inputs, sample_time=run.sample_time, initial=tuple(state)
-                )
+                found = run_many([model], run.inputs, sample_time=run.sample_time)
                 given.append(found[0][run.counts].ravel())
             outputs.append(np.array(given))
         return np.concatenate(outputs, axis=1)
-
-    def _begin(
-        self, balance: Balance, state: Array, first: Array, structure: Structure, z: Array, run: Run
-    ) -> None:
-        """Move a rest state to equilibrium with the first pressures, with its start."""
-        n, m = structure.n, structure.m
-        own = state[state.size - balance.n_states :]  # behind it nothing remembers
-        c, q = balance.coefficients(1.0), own[:m].copy()
-        p, x = np.ascontiguousarray(first[:n]), np.ascontiguousarray(first[n:])
-        solve_equilibrium(c, own, AT_REST, q, x, p, np.zeros(balance.n_scratch))
-        update_state(c, own, AT_REST, q, p, x)
-        begun = self.begun(structure, z, c, run, p)
-        assert begun is not None
-        own[m + n : m + n + begun.size] = begun
-        own[-2] = 1.0  # the first sample comes next
 
     # -- the linear stage ------------------------------------------------------------------------
 
     def balanced(self, structure: Structure, z: Array, active: Mask) -> Array:
         """Return the linear parameters of the force balance at measured positions.
 
-        Forces are weighed by stiffness, so that errors are of displacement. They do not tell how large
-        areas at rest are: those of muscles with a coordinate each are 1 where samples are on average.
+        Forces are weighed by stiffness, so that errors are of displacement. Sizes of areas
+        at rest are not determined: those of muscles with a coordinate each are 1 at the mean of samples.
         """
         n, terms = structure.mix.shape[1], structure.terms
         of_force = structure.bench.of_force

@@ -65,7 +65,7 @@ POSITIVE_SHAPE = ("grip", "grips", "walls", "filling", "dead", "contact")
 
 @dataclass
 class Search:
-    """Unknowns z: of a structure's terms, and per-recording and per-run parameters.
+    """Unknowns z: of a structure's terms, and loads of recordings.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class Search:
         """Return the search with the prior weighted by the noise of independent errors."""
         if self.prior_errors is None:
             return self
-        parts = self.problem.errors(self.structure, z)[0][: len(self.problem.runs)]
+        parts = self.problem.errors(self.structure, z)[0]
         model, count = autoregression(parts), sum(part.size for part in parts)
         noise = np.sqrt(model.variance * count / model.effective_sample_size(count))
         return replace(
@@ -210,24 +210,14 @@ class Search:
         bounds = np.append(np.maximum(low, shape - far), -np.minimum(high, shape + far))
         lags = [i for i in np.flatnonzero(self.active) if structure.terms[i].kind == "lags"]
         one = np.eye(z.size)
-        apart = np.array([one[j] - one[i] for i, j in pairwise(lags)])
-        starts = one[z.size - self._n_starts :: 1 + len(structure.lags)]
-        every = [
-            on_all,
-            one[n:n_terms],
-            -one[n:n_terms],
-            apart.reshape(-1, z.size),
-            starts,
-            -starts,
+        separations = np.array([one[j] - one[i] for i, j in pairwise(lags)])
+        every = [on_all, one[n:n_terms], -one[n:n_terms], separations.reshape(-1, z.size)]
+        asked = [
+            least - sides @ structure.base,
+            bounds,
+            np.full(len(separations), LEAST_SEPARATION),
         ]
-        asked = [least - sides @ structure.base, bounds, np.full(len(apart), LEAST_SEPARATION)]
-        asked.append(np.full(2 * len(starts), -1.0))
         return np.concatenate(every), np.concatenate(asked)
-
-    @property
-    def _n_starts(self) -> int:
-        own = len(self.structure.bench.unmeasured) * self.structure.m
-        return self.problem.size(self.structure) - len(self.structure.terms) - own
 
     # -- choice ----------------------------------------------------------------------------------
 
@@ -281,7 +271,7 @@ class Search:
 
     def _by_block(self, z: Array) -> Array:
         """Return the squared errors per block of time."""
-        parts = self.problem.errors(self.structure, z)[0][: len(self.problem.runs)]
+        parts = self.problem.errors(self.structure, z)[0]
         return np.array([float(block @ block) for part in _blocks(parts) for block in part])
 
     def _grams(self, z: Array, wanted: Mask, new: Mask | None = None) -> tuple[Array, Places]:
@@ -291,8 +281,6 @@ class Search:
         runs of few blocks begin with different folds.
         """
         parts, slopes = self.problem.errors(self.structure, z, wanted, new)
-        parts = parts[: len(self.problem.runs)]  # without what is likely of starts
-        slopes = slopes[: sum(part.size for part in parts)]
         table = np.column_stack([slopes, slopes @ z - np.concatenate(parts)])
         table[~np.isfinite(table).all(axis=1)] = 0.0
         ends = np.cumsum([part.size for part in parts])[:-1]
@@ -324,21 +312,6 @@ class Search:
             shaped = term.kind in POSITIVE_SHAPE
             bounded[place] = (bounded[place] or shaped) and term.muscle is None
         return bounded
-
-    def without_folds(self, z: Array) -> list[Array]:
-        """Return the steps without each fold; empty if none is feasible."""
-        free = np.append(self.active, np.ones(z.size - self.active.size, dtype=bool))
-        grams, folds = self._grams(z, self.active)
-        parts, found = _reduced(grams, free, z), []
-        likely = _reduced(self._likely(z, self.active)[np.newaxis], free, z)[0]
-        for fold in np.unique(folds):
-            sizes, ways = np.linalg.eigh(parts[folds != fold].sum(axis=0) + likely)
-            root = np.sqrt(np.maximum(sizes, 0.0))[:, np.newaxis] * ways.T
-            try:
-                found.append(self._solved(root, z, FIRST_DAMPING))
-            except ModelError:
-                return []
-        return found
 
     def _candidates(self, active: Mask, z: Array) -> Iterator[Mask]:
         """Yield candidate groups of terms beyond the active ones."""
@@ -395,10 +368,10 @@ class Search:
         """Return whether a time constant is distinct from the free ones, and in order."""
         terms = self.structure.terms
         places = [place for place, term in enumerate(terms) if term.kind == "lags"]
-        apart = (
+        separations = (
             (z[i] - z[places[which]]) * np.sign(terms[i].which - which) for i in places if active[i]
         )
-        return all(one > LEAST_SEPARATION for one in apart)
+        return all(one > LEAST_SEPARATION for one in separations)
 
     def _with_own(self, kind: str, whiches: range | tuple[int, ...], own: set[str]) -> list[Term]:
         """Return terms of a kind, with differences between muscles if they are free."""
@@ -417,7 +390,7 @@ def _left_out(
 ) -> Array:
     """Return the squared errors of every block under the least squares of the others.
 
-    ``grams`` are products of slopes and target by block, and ``likely`` those of what is believed; what
+    ``grams`` are products of slopes and target by block, and ``likely`` those of the prior; what
     is not free is as it is.
     """
     parts, likely = _reduced(grams, free, z), _reduced(likely[np.newaxis], free, z)[0]

@@ -304,7 +304,6 @@ def follow(
     held: bool,
     rested: bool,
     every: int,
-    begun: Array,
     past: Array,
     rows: Array,
     scratch: Array,
@@ -326,9 +325,6 @@ def follow(
     rested : bool
         Whether those that are held come from rest without pressure; else nothing is loaded at first.
     every : int
-    begun : array, shape (n times stops and lags,)
-        Stops and lags before the first sample [mm], of muscles that are where its pressures hold them
-        without; none of those that come from rest.
     past, rows, scratch : arrays
         To compute in, all 0.
     found : array, shape (t / every, m)
@@ -355,10 +351,6 @@ def follow(
             for j in range(m):
                 tare[j] = q[j]
                 mix(tared[j], 0.0, 1.0, past[j])
-        if begun.size > 0:
-            fill(p, driven[0])
-            move(c, state, AT_REST, False, q, x[0], p, dp[0], past, rows, now, slopes[0], work)
-            fill(state[m + n : m + n + begun.size], begun)
     for t in range(driven.shape[0]):
         fill(p, driven[t])
         if held:
@@ -383,7 +375,6 @@ def run(
     rested: bool = False,
     every: int = 1,
     sloped: bool = True,
-    begun: Array | None = None,
 ) -> tuple[Array, Array]:
     """Return the results of `follow` at every n-th sample, and the derivatives."""
     n, m, n_s, n_l = (int(c[i]) for i in (0, 1, 5, 6))
@@ -396,7 +387,6 @@ def run(
     past = np.zeros((2 * m + n * (n_s + n_l + moves), n_c))
     rows = np.zeros((2 * n + 2 * m + 1, max(n_c, m, n * n_l)))
     scratch = np.zeros(n_states + 3 * m + 2 * n + 5 * m + m * m + 2 * n_terms(c))
-    start = np.zeros(0) if begun is None else begun
     p, y, x, dp = (np.ascontiguousarray(one) for one in (driven, measured, x, dp))
-    follow(c, p, y, x, dp, held, rested, every, start, past, rows, scratch, found, slopes)
+    follow(c, p, y, x, dp, held, rested, every, past, rows, scratch, found, slopes)
     return found, slopes

@@ -65,7 +65,7 @@ class Bench:
     tare : bool
         Whether coordinates count from rest at the start.
     lag_range : (float, float)
-        Shortest and longest time constant that the recordings can tell [s].
+        Shortest and longest time constant identifiable from the recordings [s].
     step : float
         Shortest sample time [s]; 0 without time.
     of_force : bool

@@ -149,17 +149,14 @@ class Problem:
         """Return the regressors of the consequents, shape (n, rules * terms)."""
         return regressors(self.x, firing(memberships(self.x, sets)), self.solver.constants)
 
-    def errors(self, sets: Sets, held: Problem | None = None) -> Array:
-        """Return the errors with optimal consequents, here or on held-out data, shape (n, outputs)."""
+    def errors(self, sets: Sets) -> Array:
+        """Return the errors with optimal consequents, shape (n, outputs)."""
         columns = self.columns(sets)
-        consequents = self.solver.fit(self.x, columns, self.y)
-        if held is None:
-            return np.asarray(columns @ consequents - self.y)
-        return np.asarray(held.columns(sets) @ consequents - held.y)
+        return np.asarray(columns @ self.solver.fit(self.x, columns, self.y) - self.y)
 
-    def cost(self, sets: Sets, held: Problem | None = None) -> float:
+    def cost(self, sets: Sets) -> float:
         """Return the root mean square over all outputs, ordered as the paper's Eq. (26)."""
-        return float(np.sqrt(np.mean(self.errors(sets, held) ** 2)))
+        return float(np.sqrt(np.mean(self.errors(sets) ** 2)))
 
 
 @dataclass(frozen=True)
@@ -187,23 +184,14 @@ def fit_network(
     search: Search,
     *,
     tracker: Tracker,
-    validation: tuple[Array, Array] | None = None,
 ) -> Fitted:
-    """Fit a network to inputs x (n, inputs) and outputs y (n, outputs).
-
-    Variable projection keeps the step that does best on the validation data, if there are any.
-    """
-
-    def thinned(x: Array, y: Array) -> Problem:
-        keep = np.linspace(0, len(x) - 1, min(len(x), search.samples)).round().astype(int)
-        return Problem(x[keep], y[keep], solver)
-
-    problem = thinned(x, y)
+    """Fit a network to inputs x (n, inputs) and outputs y (n, outputs)."""
+    keep = np.linspace(0, len(x) - 1, min(len(x), search.samples)).round().astype(int)
+    problem = Problem(x[keep], y[keep], solver)
     if search.method == "pso":
         sets = swarmed(problem, n_sets, search.swarm, search.seed, tracker)
     else:
-        held = None if validation is None else thinned(*validation)
-        sets = project(problem, n_sets, x.min(axis=0), x.max(axis=0), held, tracker)
+        sets = project(problem, n_sets, x.min(axis=0), x.max(axis=0), tracker)
     gram, right = np.zeros(()), np.zeros(())
     for start in range(0, len(x), PART):
         part = slice(start, start + PART)
@@ -213,13 +201,8 @@ def fit_network(
     return Fitted(sets, solver.solve(gram, right, n_terms))
 
 
-def project(
-    problem: Problem, n_sets: int, low: Array, high: Array, held: Problem | None, tracker: Tracker
-) -> Sets:
-    """Return antecedents by variable projection from evenly spaced sets.
-
-    Among the steps taken, the one that does best on held-out data, if there are any, is returned.
-    """
+def project(problem: Problem, n_sets: int, low: Array, high: Array, tracker: Tracker) -> Sets:
+    """Return antecedents by variable projection from evenly spaced sets."""
     scale = np.where(high > low, high - low, 1.0)
     start = Sets.even(low, low + scale, n_sets)
     if n_sets == 1:  # it fires alone, wherever it is
@@ -238,21 +221,19 @@ def project(
     def slopes(theta: Array) -> Array:
         sets = start.replaced(theta)
         by_theta, left = sensitivities(problem, sets)
-        cost = float(np.sqrt(np.mean(left**2)))
-        tracker.saw(theta, cost if held is None else problem.cost(sets, held))
+        tracker.saw(theta, float(np.sqrt(np.mean(left**2))))
         return np.vstack([by_theta, np.diag(staying)])
 
     tracker.budget = MOST_STEPS + 1
-    with tracker.searching():
-        trust_region(
-            errors,
-            slopes,
-            start.vector,
-            scale=unit,
-            bounds=(lower, upper),
-            least_gain=LEAST_GAIN,
-            max_evaluations=MOST_STEPS + 1,
-        )
+    trust_region(
+        errors,
+        slopes,
+        start.vector,
+        scale=unit,
+        bounds=(lower, upper),
+        least_gain=LEAST_GAIN,
+        max_evaluations=MOST_STEPS + 1,
+    )
     return start if tracker.best is None else start.replaced(tracker.best)
 
 

@@ -11,9 +11,7 @@ PI-NARMAX Model", Sections 3 and 4.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -27,12 +25,12 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
 from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.blocks.kernels import kernel
-from mckibben.errors import DataError, MckibbenError, ModelError, ModelWarning
+from mckibben.errors import DataError, MckibbenError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors
 from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
-from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
+from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
 UNLOADED = 0.05
@@ -43,9 +41,6 @@ SWARM = Swarm(20, 30, (0.9, 0.4), 2.0, 2.0, fastest=0.5)
 
 ROUNDS = 8
 """Number of times that consequents are solved for on the network's free-running outputs."""
-
-SETTLING = 3000
-"""Number of samples with constant inputs in the stability check."""
 
 SEARCH_SAMPLES = 6000
 """Number of samples per run, from its start, on which the swarm compares free runs."""
@@ -136,8 +131,7 @@ class MPINarmaxEstimator(CoupledEstimator):
         if self.memory == "rdpi":
             settings["rate_time_constant"] = 5.0 * (data.runs[0].sample_time or 0.0)
         estimator = registry.load("estimators", self.memory)(**settings)
-        with whole_searches():
-            block: Block = estimator.fit(recordings).model_
+        block: Block = estimator.fit(recordings).model_
         return block
 
 
@@ -282,26 +276,7 @@ class RecurrentProblem:
                 "the network diverges in a free run",
                 remedy="raise `settings[ridge]`, lower `settings[n_sets]`, or fit balance",
             )
-        if not self.settles(found):
-            warnings.warn(
-                "the network does not settle while its inputs are constant: do not simulate it for long",
-                ModelWarning,
-                stacklevel=4,
-            )
         return found
-
-    def settles(self, network: RecurrentFuzzyNetwork) -> bool:
-        """Return whether outputs stay near the data's while inputs are constant in their range."""
-        every = np.concatenate(self.inputs)
-        low, high = every.min(axis=0), every.max(axis=0)
-        y = np.concatenate(self.targets)
-        span = float(np.ptp(y))
-        for share, load in product((0.0, 0.5, 1.0), (0.0, 1.0)):
-            first = low + np.append(share, np.full(low.size - 1, load)) * (high - low)
-            output = self.free_run(network, np.tile(first, (SETTLING, 1)))
-            if not np.isfinite(output).all() or np.abs(output - y.mean()).max() > 2 * span:
-                return False
-        return True
 
     def swarm(self, even: Sets, seed: int, tracker: Tracker) -> tuple[Sets, Array]:
         """Return centres, widths and feedbacks by particle swarm on the free-running error."""

@@ -38,7 +38,7 @@ from mckibben.estimators.coupled.fuzzy import (
 )
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.optimisers.linear import solve_linear
-from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
+from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.metrics import rmse
 from mckibben.presets import preset
 from mckibben.recording import Recording
@@ -74,7 +74,7 @@ class SDCHMEstimator(CoupledEstimator):
     n_sets : int
         Gaussian sets of every input of the network; 0 for neither network nor friction.
     memory : str, optional
-        Model of every muscle's hysteresis: any with an exact inverse. ``cpi`` knows creep. None for a
+        Model of every muscle's hysteresis: any with an exact inverse. ``cpi`` includes creep. None for a
         network of the raw pressures.
     memory_settings : mapping
         Its settings.
@@ -123,11 +123,6 @@ class SDCHMEstimator(CoupledEstimator):
     search_samples: Annotated[int, Ge(100)] = 6000
 
     @property
-    def stops_early(self) -> bool:
-        """Whether there is a network."""
-        return self.n_sets > 0
-
-    @property
     def pairs(self) -> bool:
         """Whether these settings need one output per input, for the hysteresis of every muscle."""
         return self.memory is not None
@@ -163,14 +158,11 @@ class SDCHMEstimator(CoupledEstimator):
                 tracker.notes.append(f"{data.scheduled[0].name} is not used by this model")
             return Series(front)
         x, target = network_inputs(front, runs), [run.outputs for run in runs]
-        held = None
-        if data.early is not None:
-            held = network_inputs(front, data.early.runs), data.early.stacked("outputs")
         rounds = self.n_rounds if self.n_friction else 1
         parts: tuple[Block, ...] = ()
         for number in range(rounds):
             own = tracker.part(*(0.25 + 0.75 * (number + end) / rounds for end in (0, 1)))
-            network = self.network(x, np.concatenate(target), driven, data, held, own)
+            network = self.network(x, np.concatenate(target), driven, data, own)
             tracker.saw_all(own)
             parts = (*front, network)
             if not self.n_friction:
@@ -187,9 +179,7 @@ class SDCHMEstimator(CoupledEstimator):
                     for k, channel in enumerate(data.outputs)
                 )
             )
-            parts, held = (*parts, rubbing), None
-            if tracker.interrupted:
-                break
+            parts = (*parts, rubbing)
             unrubbed = rubbing.inverse()
             with warnings.catch_warnings():  # noise at the ends is clipped
                 warnings.simplefilter("ignore", ModelWarning)
@@ -202,7 +192,6 @@ class SDCHMEstimator(CoupledEstimator):
         y: Array,
         driven: tuple[Channel, ...],
         data: TrainingData,
-        held: tuple[Array, Array] | None,
         tracker: Tracker,
     ) -> FuzzyNetwork:
         """Return a network from driven and scheduling inputs to displacements."""
@@ -214,7 +203,6 @@ class SDCHMEstimator(CoupledEstimator):
             Consequents(self.constants, self.ridge),
             Search(self.method, self.search_samples, swarm, self.seed),
             tracker=tracker,
-            validation=held,
         )
         n = len(driven)
         low, high = x[:, :n].min(axis=0), x[:, :n].max(axis=0)
@@ -264,8 +252,7 @@ class SDCHMEstimator(CoupledEstimator):
                 parameter="memory_settings",
                 remedy="give settings of the estimator in memory",
             ) from None
-        with whole_searches():
-            block: Block = estimator.fit(recording).model_
+        block: Block = estimator.fit(recording).model_
         return block
 
 
@@ -351,7 +338,6 @@ def trained_inverse(
     search = Search("pso", SDCHMEstimator.search_samples, printed_swarm(), seed)
     tracker = Tracker(progress=progress)
     inverse = learned_inverse(model, recordings, search=search, tracker=tracker)
-    tracker.end()
     pairs = [(one, inverse.simulate(one)) for one in recordings]
     return inverse, {
         channel.name: rmse(*(np.concatenate([p[k][channel.name] for p in pairs]) for k in (0, 1)))
@@ -400,11 +386,11 @@ def learned_inverse(
         )
     hysteresis, coupling, network, *friction = parts
     assert isinstance(network, FuzzyNetwork)
-    given, wanted, beside = (
+    given, wanted, scheduling = (
         tuple(channel.name for channel in channels)
         for channels in (hysteresis.inputs, model.outputs, network.scheduled)
     )
-    data = SDCHMEstimator(input=given, output=wanted, scheduling=beside).data(recordings)
+    data = SDCHMEstimator(input=given, output=wanted, scheduling=scheduling).data(recordings)
     before = tuple(part.inverse() for part in reversed(friction))
     h = network_inputs((hysteresis, coupling), data.runs)[:, : len(data.inputs)]
     with warnings.catch_warnings():  # noise at the ends is clipped

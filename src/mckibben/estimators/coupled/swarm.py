@@ -65,22 +65,21 @@ def particle_swarm(
     position, velocity = start, np.zeros(shape)
     own, own_cost = position.copy(), np.full(swarm.particles, np.inf)
     first, last = swarm.inertia
-    with tracker.searching():
-        for iteration in range(swarm.iterations + 1):
-            cost = np.nan_to_num(costs(position), nan=WORST, posinf=WORST)
-            better = cost < own_cost
-            own[better], own_cost[better] = position[better], cost[better]
-            for point, value in zip(position, cost, strict=True):
-                tracker.saw(point, float(value))
-            leader = own[np.argmin(own_cost)]
-            weight = first + (last - first) * iteration / max(swarm.iterations, 1)
-            pulls = rng.random((2, *shape))
-            velocity = (
-                weight * velocity
-                + swarm.c1 * pulls[0] * (own - position)
-                + swarm.c2 * pulls[1] * (leader - position)
-            )
-            velocity = np.clip(velocity, -swarm.fastest * span, swarm.fastest * span)
-            position = np.clip(position + velocity, lower, upper)
+    for iteration in range(swarm.iterations + 1):
+        cost = np.nan_to_num(costs(position), nan=WORST, posinf=WORST)
+        better = cost < own_cost
+        own[better], own_cost[better] = position[better], cost[better]
+        for point, value in zip(position, cost, strict=True):
+            tracker.saw(point, float(value))
+        leader = own[np.argmin(own_cost)]
+        weight = first + (last - first) * iteration / max(swarm.iterations, 1)
+        pulls = rng.random((2, *shape))
+        velocity = (
+            weight * velocity
+            + swarm.c1 * pulls[0] * (own - position)
+            + swarm.c2 * pulls[1] * (leader - position)
+        )
+        velocity = np.clip(velocity, -swarm.fastest * span, swarm.fastest * span)
+        position = np.clip(position + velocity, lower, upper)
     assert tracker.best is not None
     return tracker.best

@@ -85,7 +85,6 @@ class AirEstimator(SeparableEstimator):
 
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
-    fits_peaks: ClassVar[bool] = False
 
     @classmethod
     def objection(
@@ -106,20 +105,18 @@ class AirEstimator(SeparableEstimator):
         """The dead time."""
         return 1
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         step = data.timed()
         shortest = min(run.u.size for run in data.runs)
         most = min(int(self.longest_dead_time / step + 1e-9), LONGEST_DELAY, shortest // 4)
         tried: dict[int, tuple[float, Air]] = {}
         best = self._correlated(data, most)
         asked = [best]
-        while asked and not tracker.interrupted:
+        while asked:
             for late in asked:
                 own = tracker.part(1 - 0.7 ** len(tried), 1 - 0.7 ** (len(tried) + 1))
                 tried[late] = self._at(late, data, own)
                 tracker.saw_all(own)
-                if own.interrupted:
-                    break
             best = min(tried, key=lambda late: tried[late][0])
             near = (best - 1, best + 1, best - 2, best + 2)
             asked = [late for late in near if 0 <= late <= most and late not in tried][:2]
@@ -135,7 +132,7 @@ class AirEstimator(SeparableEstimator):
                 f"dead time {block.dead_time:g} s, in whole samples; the error is higher by "
                 f"{' and '.join(others)}"
             )
-        return block, data
+        return block
 
     def _correlated(self, data: TrainingData, most: int) -> int:
         """Return the dead time with the best correlation of pressure and lagged command."""
@@ -164,12 +161,12 @@ class AirEstimator(SeparableEstimator):
     def _at(self, late: int, data: TrainingData, tracker: Tracker) -> tuple[float, Air]:
         """Return the error and the block for a dead time in samples."""
         moved = delayed(data, late)
-        found, _ = super().identify(moved, tracker)
+        found = super().identify(moved, tracker)
         limits: tuple[str, ...] = ()
         block, cost = self._refined(cast(Air, found), moved, tracker, limits)
         shares = {"ambient": 0.005, "supply": 0.995}
         for limit in ("ambient", "supply", "ambient"):  # which one alone may not have shown
-            if getattr(self, limit) is None and limit not in limits and not tracker.interrupted:
+            if getattr(self, limit) is None and limit not in limits:
                 tight: dict[str, Any] = {limit: float(np.quantile(data.target, shares[limit]))}
                 limited = replace(block, **tight)
                 limited, least = self._refined(limited, moved, tracker, (*limits, limit))
@@ -237,7 +234,7 @@ class AirEstimator(SeparableEstimator):
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         unit = data.latest("unit", theta, lambda: self.unit(theta, data))
-        return unit.simulate(run.history, sample_time=run.sample_time)[:, np.newaxis]
+        return unit.simulate(run.u, sample_time=run.sample_time)[:, np.newaxis]
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Air:
         block = replace(self.unit(theta, data), ambient=self.ambient, supply=self.supply)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from annotated_types import Interval, Len
 
-from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Parallel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
@@ -18,7 +17,6 @@ from mckibben.blocks.parameters import Parametrised
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Grid, Initial, resting
-from mckibben.estimators.core.uncertainty import covariance_by_runs, inverted, unknown
 from mckibben.estimators.coupled.base import schedules
 from mckibben.estimators.dynamics.prediction_error import (
     Orders,
@@ -28,6 +26,7 @@ from mckibben.estimators.dynamics.prediction_error import (
     evaluate,
     minimise,
     starting_points,
+    with_noise,
 )
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
@@ -37,29 +36,11 @@ Order = Annotated[int, Interval(ge=0, le=20)]
 Lag = Annotated[int, Interval(ge=0, le=120)]
 
 
-@dataclass(frozen=True)
-class Noise:
-    """The noise model of a prediction-error fit: C / D and the standard deviation of e."""
-
-    numerator: tuple[float, ...]
-    denominator: tuple[float, ...]
-    deviation: float
-    covariance: Array = field(repr=False)
-    """Of all coefficients: B, A or F, C, D, leading ones left out; constants not."""
-
-    @property
-    def standard_errors(self) -> tuple[float, ...]:
-        """Standard errors of the coefficients."""
-        return vector(np.sqrt(np.diag(self.covariance)))
-
-
 @dataclass(kw_only=True, repr=False, eq=False)
 class PredictionErrorEstimator(Estimator):
     """Estimator of a linear model by one-step prediction errors; the model runs free.
 
-    After `fit`, ``noise_`` holds the noise model, the one-step error, and the covariance of all
-    coefficients. Covariances are those of Ljung, chapter 9, and take the noise to be what the model says
-    it is; output-error models say nothing of it, and theirs hold under coloured noise too.
+    Standard errors are those of the free run, whose errors may be autocorrelated.
 
     Parameters
     ----------
@@ -232,27 +213,25 @@ class PredictionErrorEstimator(Estimator):
             theta = arx(runs, orders)
             tracker.saw(theta, evaluate(theta, orders, runs, start)[2])
         else:
-            starts = starting_points(runs, known, orders, self.n_starts, self.seed)
-            theta = minimise(runs, orders, starts, tracker, start)
+            plant = replace(orders, c=0, d=0)
+            if plant.f:
+                starts = starting_points(runs, known, plant, self.n_starts, self.seed)
+                theta = minimise(runs, plant, starts, tracker, start)
+            else:
+                theta = arx(runs, plant)
+            if plant != orders:
+                own = tracker.part(0.5, 1.0)
+                theta = minimise(runs, orders, [with_noise(theta, orders, runs)], own, start)
+                tracker.saw_all(own)
+                tracker.best, tracker.best_cost = own.best, own.best_cost
         theta[: orders.zeros] *= np.repeat(wanted / given, orders.b)
         theta[-1] *= wanted
         runs = [
             replace(run, driven=given * run.driven, outputs=wanted * run.outputs) for run in runs
         ]
         p = Polynomials.of(theta, orders)
-        self._constant = p.constant
-        e, slopes, deviation = evaluate(theta, orders, runs, start)
-        size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
-        self._condition, inverse = inverted(slopes / size)
-        freedom = max(e.size - orders.size - orders.poles * len(runs), 1)
-        self._covariance = float(e @ e) / freedom * inverse / np.outer(size, size)
-        if orders.f and not orders.c + orders.d:
-            coloured = covariance_by_runs(slopes / size, e, runs)[1]
-            self._covariance = coloured / np.outer(size, size)
+        deviation = evaluate(theta, orders, runs, start)[2]
         noise = (vector(p.c), vector(p.poles[0] if orders.a else p.d), deviation)
-        self.noise_ = Noise(
-            (1.0, *noise[0]), (1.0, *noise[1]), deviation, self._covariance[:-1, :-1]
-        )
         constant = p.constant / (1.0 + float(p.poles.sum())) if orders.a else p.constant
         found = []
         for place, (channel, b) in enumerate(zip(data.inputs, p.b, strict=True)):
@@ -296,32 +275,6 @@ class PredictionErrorEstimator(Estimator):
             if name == "input_offset" or left_out or (again and common):
                 fixed.append(place)
         return tuple(fixed)
-
-    def uncertainty(
-        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return condition and covariance from the prediction errors; the input's offset is fixed.
-
-        Of several inputs or outputs neither is known.
-        """
-        if not self.single:
-            return np.nan, unknown(block)
-        orders = self.orders
-        n, poles = block.n_parameters, orders.poles
-        turned = np.zeros((n, orders.size))
-        turned[[*orders.input_lags], : orders.b] = np.eye(orders.b)
-        first = 1 + max(orders.input_lags)
-        turned[first : first + poles, orders.b : orders.b + poles] = np.eye(poles)
-        turned[-1, -1] = 1.0
-        if orders.a:  # the offset of the output is the constant over the sum of A
-            assert isinstance(block, TransferFunction)
-            whole = 1.0 + sum(block.denominator)
-            turned[-1, -1] = 1.0 / whole
-            turned[-1, orders.b : orders.b + poles] = -self._constant / whole**2
-        used = np.any(turned != 0, axis=1)
-        covariance = np.full((n, n), np.nan)
-        covariance[np.ix_(used, used)] = (turned @ self._covariance @ turned.T)[np.ix_(used, used)]
-        return self._condition, covariance
 
 
 ARMAX = preset(

@@ -150,24 +150,20 @@ class NarxEstimator(SearchEstimator):
             if (best := next(options, None)) is not None:
                 tried.append((free_run_rmse(best, data), best))
 
-        with tracker.searching():
-            for model in found(self._fields(data), data, tracker):
-                if data.target.size <= model.n_parameters:
-                    raise DataError(
-                        f"{data.target.size} samples are too few for {model.n_parameters} parameters",
-                        remedy="give longer recordings, or use fewer lags, terms or units",
-                    )
-                paths.append(path := [model])
-                for horizon in HORIZONS if self.refine else ():
-                    path += self._refined(path[-1], horizon, data, tracker)[-1:]
-            paths.sort(key=lambda path: free_run_rmse(path[-1], data))
-            for path in paths:
-                if self.refine and len(tried) < MOST_REFINED:
-                    path += self._refined(path[-1], None, data, tracker)[1:]
-                settle(path)
-        if tracker.interrupted and not tried:
-            for path in paths:
-                settle(path)
+        for model in found(self._fields(data), data, tracker):
+            if data.target.size <= model.n_parameters:
+                raise DataError(
+                    f"{data.target.size} samples are too few for {model.n_parameters} parameters",
+                    remedy="give longer recordings, or use fewer lags, terms or units",
+                )
+            paths.append(path := [model])
+            for horizon in HORIZONS if self.refine else ():
+                path += self._refined(path[-1], horizon, data, tracker)[-1:]
+        paths.sort(key=lambda path: free_run_rmse(path[-1], data))
+        for path in paths:
+            if self.refine and len(tried) < MOST_REFINED:
+                path += self._refined(path[-1], None, data, tracker)[1:]
+            settle(path)
         if not tried:
             raise ModelError(
                 "every NARX model found diverges in a free run",

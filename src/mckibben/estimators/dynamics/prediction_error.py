@@ -7,13 +7,11 @@ the rest, one to each run. The input is taken to have been at its first value be
 from nothing.
 
 The start of every run is linear in the errors and solved for in each evaluation, so the search runs in
-the polynomials alone. A polynomial with a leading 1 has its roots within the unit circle where its
-reflection coefficients lie between -1 and 1: in their inverse hyperbolic tangents no step leaves what is
-stable. Starts are the high-order ARX model reduced by Steiglitz and McBride's iteration, lags and
-oscillations of a few speeds, and random lags, each with the noise model that its residuals ask for.
+the polynomials alone; a step to unstable poles is refused. Starts are the ARX model improved by
+Steiglitz and McBride's iteration, lags and oscillations of a few speeds, and random lags. A noise model
+is identified last, from the plant found without it.
 
-Sources: Ljung, "System Identification", 1999, chapters 4 and 7; Monahan, "A note on enforcing
-stationarity in autoregressive-moving average models", 1984.
+Source: Ljung, "System Identification", 1999, chapters 4 and 7.
 """
 
 from __future__ import annotations
@@ -41,14 +39,8 @@ INVERTIBLE = 1.0 - 1e-7
 FIRST_STEPS, FOLLOWED, STEPS = 8, 3, 60
 """Steps from every start; number of distinct best starts that are continued; their steps."""
 
-ALTERNATIONS = 2
-"""Number of alternations between the noise model and B, for a start."""
-
 NOISE_SAMPLES = 2000
 """Samples of every run used for the noise model of a start."""
-
-REPLANTED = 4
-"""Number of best starts whose noise model is used to re-estimate the plant."""
 
 SAME = 1e-6
 """Relative difference of equal errors."""
@@ -58,10 +50,6 @@ FELT = 1e-13
 
 LEAST_GAIN = 2e-9
 """Smallest relative reduction of the squared error for another step."""
-
-
-LARGEST = 1.0 - 1e-7
-"""Largest magnitude of a reflection coefficient."""
 
 Start = Literal["fitted", "first_sample", "virgin"]
 """State before the first sample: estimated; at rest at the first input; at rest at an input of zero.
@@ -265,27 +253,6 @@ def inside(tail: Array, radius: float) -> Array:
     return np.asarray(np.real(np.poly(roots))[1:], dtype=np.float64)
 
 
-def free_coordinates(tail: Array) -> Array:
-    """Return the coordinates of a stable monic polynomial; of the nearest one if unstable."""
-    a, found = tail, np.empty(tail.size)
-    for m in range(tail.size, 0, -1):
-        k = found[m - 1] = float(np.clip(a[-1], -LARGEST, LARGEST))
-        a = (a[:-1] - k * a[-2::-1]) / (1.0 - k * k) if m > 1 else a[:0]
-    return np.asarray(np.arctanh(found / (1.0 + 1e-9)))
-
-
-def polynomial(coordinates: Array) -> tuple[Array, Array]:
-    """Return the monic polynomial of coordinates, and its derivatives, (n, n)."""
-    n = coordinates.size
-    reflection = np.clip(np.tanh(coordinates), -LARGEST, LARGEST)
-    a, slopes = np.empty(0), np.empty((0, n))
-    for m, k in enumerate(reflection.tolist()):
-        by_own = np.eye(1, n, m)
-        grown = slopes + k * slopes[::-1] + np.outer(a[::-1], by_own)
-        a, slopes = np.append(a + k * a[::-1], k), np.vstack([grown, by_own])
-    return a, slopes * (1.0 - reflection**2)
-
-
 def admissible(theta: Array, orders: Orders) -> bool:
     """Return whether poles, and the roots of C and D, are admissible."""
     p = Polynomials.of(theta, orders)
@@ -295,24 +262,6 @@ def admissible(theta: Array, orders: Orders) -> bool:
         and spectral_radius(p.c) < INVERTIBLE
         and spectral_radius(p.d) <= 1.0 + 1e-9
     )
-
-
-def loosened(theta: Array, orders: Orders) -> Array:
-    """Return the coordinates of parameters in which every step is stable."""
-    p = Polynomials.of(theta, orders)
-    free = [free_coordinates(tail) for tail in p.monic]
-    return np.concatenate([p.b.ravel(), *free, [p.constant]])
-
-
-def tightened(coordinates: Array, orders: Orders) -> tuple[Array, Array]:
-    """Return the parameters of coordinates, and their derivatives."""
-    p = Polynomials.of(coordinates, orders)
-    theta, slopes, place = coordinates.copy(), np.eye(coordinates.size), orders.zeros
-    for tail in p.monic:
-        own = slice(place, place + tail.size)
-        theta[own], slopes[own, own] = polynomial(tail)
-        place += tail.size
-    return theta, slopes
 
 
 def evaluate(
@@ -356,19 +305,10 @@ def minimise(
         return found, float(np.sqrt(squares))
 
     def followed(theta: Array) -> None:
-        # in the coefficients the valley of a root near the unit circle is straight; but they have
-        # bounds, at which the others would stop too, and these coordinates have none
-        found, _ = search(here.errors, here.slopes, theta, max_evaluations=STEPS)[-1]
-        search(
-            lambda free: here.errors(tightened(free, orders)[0]),
-            lambda free: here.slopes(free) @ tightened(free, orders)[1],
-            loosened(found, orders),
-            max_evaluations=STEPS,
-        )
+        search(here.errors, here.slopes, theta, max_evaluations=STEPS)
 
-    with tracker.searching():
-        starting = (theta for theta in starts if admissible(theta, orders))
-        follow_best(starting, begun, followed, FOLLOWED, SAME)
+    starting = (theta for theta in starts if admissible(theta, orders))
+    follow_best(starting, begun, followed, FOLLOWED, SAME)
     assert tracker.best is not None
     return tracker.best
 
@@ -412,109 +352,55 @@ def filtered(run: Run, numerator: Sequence[float], denominator: Sequence[float])
 def starting_points(
     runs: Sequence[Run], known: Sequence[Run], orders: Orders, n_starts: int, seed: int
 ) -> list[Array]:
-    """Return initial parameters: reduced ARX, typical lags and oscillations, random lags.
+    """Return initial parameters without noise model: ARX, typical lags and oscillations, random lags.
 
-    ARX looks at past outputs, so it is found on what is known: stretches whose samples all count.
-
-    Under coloured noise poles are also found on data whitened by ARX models of high order, which
-    give plant and noise alike without bias, and once more on data whitened by the noise models that
-    follow from all these.
+    ARX uses past outputs, so it is found on ``known`` segments, whose samples are all scored.
     """
     rng = np.random.default_rng(seed)
     n = orders.a + orders.f
-    coloured = orders.c + orders.d > 0
-    white = _whitened(runs, orders) if coloured else []
-    candidates: list[tuple[Array, Sequence[Run]]]
-    candidates = [(_steiglitz_mcbride(data, orders, k), data) for data in white for k in (1, 10)]
-    if known:
-        candidates += [(_steiglitz_mcbride(known, orders, k), runs) for k in (0, 1, 3, 10)]
-    plain = white[0] if white else runs
+    tried = [_steiglitz_mcbride(known, orders, rounds) for rounds in (0, 1, 3, 10) if known]
     speeds = [[0.2], [0.9], [0.99, 0.9], [0.9995, 0.97]]
     turns = np.exp(1j * np.array([0.03, 0.2, 1.0]))
     oscillating = [[0.98 * z, 0.98 * z.conj(), 0.97, 0.2] for z in turns] if n > 1 else []
-    tried = [np.resize(speed, n) * (1 - 1e-3 * np.arange(n)) for speed in speeds]
-    tried += [np.append(poles, np.full(max(n - 4, 0), 0.2))[:n] for poles in oscillating]
-    while len(candidates) + len(tried) < n_starts:
-        tried.append(1 - 10 ** rng.uniform(-4, 0, n))
-    candidates += [(np.real(np.poly(poles))[1:], plain) for poles in tried]
-    stable = [(poles, data) for poles, data in candidates if spectral_radius(poles) < STABLE]
-    found = [_complete(poles, data, runs, orders) for poles, data in stable]
-    if not coloured:
-        return found
-    found.sort(key=lambda theta: evaluate(theta, orders, runs)[2])
-    return found + [_with_plant(theta, runs, orders) for theta in found[:REPLANTED]]
+    roots = [np.resize(speed, n) * (1 - 1e-3 * np.arange(n)) for speed in speeds]
+    roots += [np.append(poles, np.full(max(n - 4, 0), 0.2))[:n] for poles in oscillating]
+    while len(tried) + len(roots) < n_starts:
+        roots.append(1 - 10 ** rng.uniform(-4, 0, n))
+    tried += [np.real(np.poly(poles))[1:] for poles in roots]
+    return [_complete(poles, orders, runs) for poles in tried if spectral_radius(poles) < STABLE]
 
 
-def _with_plant(theta: Array, runs: Sequence[Run], orders: Orders) -> Array:
-    """Return parameters with the plant re-estimated on data whitened by the noise model."""
-    p = Polynomials.of(theta, orders)
-    top, below = ([1.0, *p.d], [1.0, *p.c]) if not orders.a else ([1.0], [1.0, *p.c])
-    moved = (
-        replace(run, driven=run.driven - run.driven[0], outputs=run.outputs - run.outputs[0])
-        for run in runs
-    )
-    white = [filtered(run, top, below) for run in moved]
-    poles = _steiglitz_mcbride(white, orders, 10)
-    return _complete(poles, white, runs, orders)
-
-
-def _complete(poles: Array, white: Sequence[Run], runs: Sequence[Run], orders: Orders) -> Array:
-    """Return parameters with given poles, and optimal B, constant, C and D.
-
-    B is solved for on data in which the noise is white, or taken to be; its residuals on the data as
-    they are give C and D; under these B and the constant are solved for again, and so on.
-    """
+def _complete(poles: Array, orders: Orders, runs: Sequence[Run]) -> Array:
+    """Return parameters with given poles, and the best B and constant."""
     theta = np.zeros(orders.size)
     theta[orders.zeros : orders.zeros + orders.poles] = np.tile(poles, orders.recursions)
-    if orders.c + orders.d == 0:
-        return _linear_solved(theta, orders, runs)
-    plant = replace(orders, c=0, d=0)
-    simple = _linear_solved(np.append(theta[: plant.size - 1], 0.0), plant, white)
-    theta[: orders.zeros] = simple[: orders.zeros]
-    for _ in range(ALTERNATIONS):
-        noise = [_noise(theta, orders, run) for run in runs]
-        theta[orders.zeros + orders.poles : -1] = arma(noise, orders.c, orders.d)
-        theta = _linear_solved(theta, orders, runs)
+    places = [*range(orders.zeros), orders.size - 1]
+    e, jacobian, _ = evaluate(theta, orders, runs)
+    theta[places] -= np.linalg.lstsq(jacobian[:, places], e, rcond=1e-12)[0]
     return theta
 
 
-def _noise(theta: Array, orders: Orders, run: Run) -> Array:
-    """Return the residual of plant, constant and start under the noise model."""
-    from scipy.signal import lfilter
-
-    p = Polynomials.of(theta, orders)
-    e, jacobian = errors(theta, orders, run)
-    columns = jacobian[:, orders.size - 1 :]
-    e = e - columns @ np.linalg.lstsq(columns, e, rcond=1e-10)[0]
-    return np.asarray(lfilter([1.0, *p.c], [1.0, *p.d], e))
-
-
-def _linear_solved(theta: Array, orders: Orders, runs: Sequence[Run]) -> Array:
-    """Return the parameters with the best B and constant, others fixed."""
-    places = [*range(orders.zeros), orders.size - 1]
-    e, jacobian, _ = evaluate(theta, orders, runs)
-    solved = theta.copy()
-    solved[places] -= np.linalg.lstsq(jacobian[:, places], e, rcond=1e-12)[0]
-    return solved
+def with_noise(plant: Array, orders: Orders, runs: Sequence[Run]) -> Array:
+    """Return parameters of a plant found without noise model, and a noise model of its residuals."""
+    own = replace(orders, c=0, d=0)
+    residuals = []
+    for run in runs:
+        e, jacobian = errors(plant, own, run)
+        starts = jacobian[:, own.size :]
+        residuals.append(e - starts @ np.linalg.lstsq(starts, e, rcond=1e-10)[0])
+    return np.concatenate([plant[:-1], arma(residuals, orders.c, orders.d), plant[-1:]])
 
 
 def arma(series: Sequence[Array], n_c: int, n_d: int) -> Array:
-    """Return C and D, without leading ones, of noise C / D e: the best of several C.
-
-    One is Hannan and Rissanen's, by regression on the residuals of a long autoregression; it misses
-    roots near the unit circle, whose memory is longer than any regression's, so roots are tried too.
-
-    Source: Hannan and Rissanen, "Recursive estimation of mixed autoregressive-moving average order",
-    1982.
-    """
+    """Return C and D, without leading ones, of noise C / D e: the best of several C."""
     from scipy.signal import lfilter
 
     short = [v[:NOISE_SAMPLES] for v in series]
     best, found = np.inf, np.zeros(n_c + n_d)
-    for c in [_hannan_rissanen(short, n_c, n_d), *_tried(n_c)]:
+    for c in _tried(n_c):
         filtered = [np.asarray(lfilter([1.0], [1.0, *c], v)) for v in short]
         now = np.concatenate(filtered)
-        past = np.concatenate([lagged(v, n_d, 0) for v in filtered])
+        past = np.concatenate([lagged(v, n_d) for v in filtered])
         d = inside(-np.linalg.lstsq(past.T @ past, past.T @ now, rcond=1e-14)[0], 1.0)
         cost = float(np.mean((now + past @ d) ** 2))
         if cost < best:
@@ -536,51 +422,11 @@ def _tried(order: int) -> list[Array]:
     return [np.asarray(np.real(np.poly(given))[1:], dtype=np.float64) for given in padded]
 
 
-def _hannan_rissanen(series: Sequence[Array], n_c: int, n_d: int) -> Array:
-    """Return C by regression of the noise on its past and past innovations."""
-    from scipy.signal import lfilter
-
-    total = sum(v.size for v in series)
-    long = max(min(int(np.sqrt(total)), total // 20), n_c + n_d, 1)
-    kept = [v for v in series if v.size > 4 * long]
-    if n_c == 0 or not kept:
-        return np.zeros(n_c)
-    now = np.concatenate([v[long:] for v in kept])
-    past = np.concatenate([lagged(v, long, long) for v in kept])
-    slopes = np.linalg.lstsq(past, now, rcond=1e-10)[0]
-    driving = [np.asarray(lfilter([1.0, *-slopes], [1.0], v)) for v in kept]
-    columns = [
-        np.column_stack([lagged(e, n_c, long), lagged(v, n_d, long)])
-        for e, v in zip(driving, kept, strict=True)
-    ]
-    found = np.linalg.lstsq(np.concatenate(columns), now, rcond=1e-10)[0]
-    return inside(found[:n_c], INVERTIBLE)
-
-
-def lagged(x: Array, lags: int, first: int) -> Array:
-    """Return lags 1 to n of x from a first sample on, shape (n - first, lags)."""
+def lagged(x: Array, lags: int) -> Array:
+    """Return lags 1 to n of x, shape (n, lags)."""
     padded = np.concatenate([np.zeros(lags), x])
     columns = [padded[lags - k : padded.size - k] for k in range(1, lags + 1)]
-    return np.column_stack([np.empty((x.size, 0)), *columns])[first:]
-
-
-def _whitened(runs: Sequence[Run], orders: Orders) -> list[list[Run]]:
-    """Return the data filtered by the A of high-order ARX models, which whitens the noise.
-
-    Source: Zhu and Hjalmarsson, "The Box-Jenkins Steiglitz-McBride algorithm", Automatica, 2016.
-    """
-    total = sum(run.u.size for run in runs)
-    found = []
-    for long in (8, 20, 50):
-        order = max(min(long, total // 10), orders.poles + orders.d)
-        enough = [run for run in runs if run.u.size > 3 * order]
-        if not enough:
-            continue
-        simple = Orders(b=order + 1, a=order, delay=orders.delay, inputs=orders.inputs)
-        a = [1.0, *Polynomials.of(arx(enough, simple), simple).poles[0]]
-        # the first samples, which have too few before them, are left out
-        found.append([filtered(run, a, [1.0]).cut(order) for run in enough])
-    return found
+    return np.column_stack([np.empty((x.size, 0)), *columns])
 
 
 def _steiglitz_mcbride(runs: Sequence[Run], orders: Orders, rounds: int) -> Array:

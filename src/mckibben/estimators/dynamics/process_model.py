@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -13,11 +12,9 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.starts import free_responses
-from mckibben.blocks.fields import LONGEST_DELAY
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Initial
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.core.uncertainty import covariance_of
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import Preset, preset
 
@@ -34,10 +31,6 @@ class ProcessModelEstimator(SeparableEstimator):
     ----------
     structure : {"P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"}
         MATLAB's name: how many poles, whether two of them may oscillate (U), and a zero (Z).
-    fit_delay : bool
-        Whether a delay of up to a quarter of the longest run is searched too.
-    hold : {"first", "zero"}
-        What the input does between samples.
     initial : {"fitted", "first_sample", "virgin"}
         State before the first sample of every recording: with the least squared error; at rest at the
         first input; at rest at the operating point. A model with a fitted start that from rest is
@@ -51,47 +44,23 @@ class ProcessModelEstimator(SeparableEstimator):
 
     effort: ClassVar[float] = 0.3
 
-    initial: Initial = "fitted"
+    initial: Initial = "fitted"  # type: ignore[assignment]
     structure: Structure = "P1"
-    fit_delay: bool = False
-    hold: Literal["first", "zero"] = "first"
     nonnegative: bool = False
     n_starts: Annotated[int, Ge(1)] = 16
     n_refined: Annotated[int, Ge(1)] = 4
 
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
-    fits_peaks: ClassVar[bool] = False
 
     @property
     def fixed_fields(self) -> tuple[str, ...]:
         """The input's offset, which is redundant with the output's."""
         return ("process-model.input_offset",)
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         data.timed(instead=", or use gpi")
         return super().identify(data, tracker)
-
-    def uncertainty(
-        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return condition and covariance from free-running errors; the input's offset is fixed."""
-        fixed = [*at_bounds, *self.fixed(block)]
-        return covariance_of(block, data, residual, fixed, self.free_runs)
-
-    def undetermined(self) -> tuple[int, ...]:
-        """Return also a gain, a time constant or a zero within two standard errors of 0.
-
-        A zero that all but cancels a pole leaves them so, and what depends on them uncertain too.
-        """
-        values, errors = self.fitted.pack(), self.diagnostics_.standard_errors
-        names = self.fitted.parameter_names
-        vague = {
-            place
-            for place, (value, error) in enumerate(zip(values, errors, strict=True))
-            if abs(value) < 2 * error and "offset" not in names[place]
-        }
-        return tuple(sorted({*super().undetermined(), *vague}))
 
     @property
     def n_times(self) -> int:
@@ -99,23 +68,20 @@ class ProcessModelEstimator(SeparableEstimator):
         return 1 if "U" in self.structure else int(self.structure[1])
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of [log time constants, log damping, delay]."""
+        """Return bounds of [log time constants, log damping]."""
         step = data.sample_time or 1.0
         longest = max(run.u.size for run in data.runs) * step
         lower, upper = [np.log(step)] * self.n_times, [np.log(10 * longest)] * self.n_times
         if "U" in self.structure:
             lower.append(np.log(0.02))
             upper.append(np.log(100.0))
-        if self.fit_delay:
-            lower.append(0.0)
-            upper.append(min(0.25 * longest, (LONGEST_DELAY - 1) * step))
         return np.array(lower), np.array(upper)
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return initial lags; for several, distinct ones."""
         lower, upper = self.bounds(data)
-        apart = np.where(np.arange(lower.size) < self.n_times, 0.05 * np.arange(lower.size), 0.0)
-        return [lower + (share - apart) * (upper - lower) for share in (0.2, 0.4, 0.6, 0.8)]
+        spacing = np.where(np.arange(lower.size) < self.n_times, 0.05 * np.arange(lower.size), 0.0)
+        return [lower + (share - spacing) * (upper - lower) for share in (0.2, 0.4, 0.6, 0.8)]
 
     def unit(self, theta: Array, data: TrainingData, gain: float = 1.0) -> ProcessModel:
         """Return the model without zero and offsets."""
@@ -127,10 +93,10 @@ class ProcessModelEstimator(SeparableEstimator):
             tuple(times.tolist()),
             damping,
             None,
-            float(theta[-1]) if self.fit_delay else 0.0,
+            0.0,
             data.input_range[0],
             0.0,
-            self.hold,
+            "first",
             self.initial,
             **self.channels(data),
         )
@@ -138,10 +104,10 @@ class ProcessModelEstimator(SeparableEstimator):
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the response to the input, and, with a zero, to its derivative."""
         unit = data.latest("unit", theta, lambda: self.unit(theta, data))
-        columns = [unit.simulate(run.history, sample_time=run.sample_time)]
+        columns = [unit.simulate(run.u, sample_time=run.sample_time)]
         if "Z" in self.structure:
             zero = data.latest("zero", theta, lambda: replace(unit, zero_time=1.0))
-            whole = zero.simulate(run.history, sample_time=run.sample_time)
+            whole = zero.simulate(run.u, sample_time=run.sample_time)
             columns.append(whole - columns[0])
         return np.column_stack(columns)
 

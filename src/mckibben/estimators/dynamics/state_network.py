@@ -8,7 +8,7 @@ left to the descent, whose derivatives are exact.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
@@ -16,22 +16,18 @@ from annotated_types import Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.dynamics.process_model import ProcessModel
+from mckibben.blocks.dynamics.repeating import BETWEEN
 from mckibben.blocks.dynamics.state_network import SETTLING, SETTLING_STEP, StateNetwork
 from mckibben.blocks.fields import rows
 from mckibben.blocks.kernels import summing_kernel
 from mckibben.errors import DataError
-from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
-from mckibben.estimators.core.uncertainty import covariance_by_runs, relative_sizes
-from mckibben.estimators.dynamics.linear_oscillator import (
-    MOST_SUBSTEPS,
-    Linear,
-    averaged,
-    linear_oscillator,
-    paths,
-)
+from mckibben.estimators.dynamics.process_model import ProcessModelEstimator
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.signals.periodic import band_limited
 
 ANGLE = 1 / 3
 """Largest angle of the linear oscillator per substep [rad]."""
@@ -53,6 +49,100 @@ RUNGE_KUTTA = ((0.0, 1.0, 0.5), (0.5, 2.0, 0.5), (0.5, 2.0, 1.0), (1.0, 1.0, 0.0
 LARGEST = 1e6
 """State, in units of the output's scale, that counts as diverged."""
 
+FORGOTTEN = 3 * np.log(1e8)
+"""Number of decay times after which a start is forgotten: three times those of a decay to 1e-8, as
+small motions decay more slowly with hysteresis.
+"""
+
+MOST_SUBSTEPS = 1000
+"""Largest number of Runge-Kutta steps per sample."""
+
+MOST_PERIODS = 20
+"""Limit of that number, in periods of the longest run."""
+
+
+def linear_oscillator(data: TrainingData, channels: dict[str, Any]) -> ProcessModel:
+    """Return the linear oscillator of least free-running error, with a start state per run.
+
+    Raises
+    ------
+    DataError
+        If the displacement falls while the force rises slowly.
+    """
+    estimator = ProcessModelEstimator(
+        structure="P2U", input=channels["input"].name, output=channels["output"].name, n_refined=1
+    )
+    model, _ = estimator.find(data, Tracker())
+    assert isinstance(model, ProcessModel)
+    if not model.gain > 0:
+        raise DataError(
+            "the displacement falls while the force rises slowly",
+            channel=channels["output"].name,
+            remedy="turn the sign of one of them",
+        )
+    return model
+
+
+def settling_samples(model: ProcessModel, data: TrainingData) -> int:
+    """Return the number of samples after which the start state of an oscillator has no effect."""
+    frequency, damping = 1.0 / model.time_constants[0], model.damping or 0.0
+    decay = frequency * (damping - float(np.sqrt(max(damping**2 - 1.0, 0.0))))
+    longest = MOST_PERIODS * max(run.u.size for run in data.runs)
+    return int(min(np.ceil(FORGOTTEN / max(decay * data.timed(), 1e-9)), longest))
+
+
+@dataclass(frozen=True)
+class Path:
+    """The input of a run in substeps; substeps per sample; samples before the first scored one."""
+
+    run: Run
+    inputs: Array
+    every: int
+    skipped: int
+
+
+def paths(data: TrainingData, substeps: int, warm: int | None, at_rest: bool) -> list[Path]:
+    """Return the inputs of all runs in substeps.
+
+    Parameters
+    ----------
+    data : TrainingData
+    substeps : int
+        From sample to sample; `BETWEEN` times as many in periodic runs.
+    warm : int or None
+        Samples to be run before those of a period; None where runs are not periodic: then the input goes
+        in straight lines from sample to sample.
+    at_rest : bool
+        Whether a run that is not periodic begins with its first input, instead of with none.
+    """
+    found = []
+    for run in data.runs:
+        n = run.u.size
+        if warm is None:
+            steps = np.arange(1 + substeps * n) / substeps
+            before = run.u[0] if at_rest else 0.0
+            u = np.interp(steps, np.arange(n + 1), np.append(before, run.u))
+            found.append(Path(run, u, substeps, 0))
+            continue
+        ratio = BETWEEN * substeps
+        places = np.arange(-(warm + 1) * ratio, (n - 1) * ratio + 1) % (n * ratio)
+        found.append(Path(run, band_limited(run.u, ratio)[places], ratio, warm))
+    return found
+
+
+def averaged(data: TrainingData) -> TrainingData:
+    """Return periodic runs of one input as one, with the mean output; other runs unchanged.
+
+    What runs free is the same in all, so their squared errors are that of the mean, but for a constant.
+    """
+    first, *others = data.runs
+    if not all(np.array_equal(run.driven, first.driven) and run.counts.all() for run in data.runs):
+        return data
+    if not others:
+        return data
+    mean = np.mean([run.outputs for run in data.runs], axis=0)
+    return replace(data, runs=(replace(first, outputs=mean),))
+
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class StateNetworkEstimator(SearchEstimator):
@@ -65,8 +155,9 @@ class StateNetworkEstimator(SearchEstimator):
     n_steps : int
         Most steps of the descent, each of which costs about as much as n_states runs of all weights.
     periodic : bool
-        Whether every recording is a whole number of periods of a motion that repeats itself; see
-        `mckibben.estimators.hysteresis.oscillators.OscillatorEstimator`.
+        Whether every recording is a whole number of periods in steady state. Starts then have no effect,
+        and the input is band-limited between samples. Otherwise recordings begin at rest, and the input
+        is linear between samples.
     substeps : int, optional
         Runge-Kutta steps from sample to sample. Default: enough that the linear oscillator turns by
         no more than 1/3 rad in each.
@@ -96,30 +187,31 @@ class StateNetworkEstimator(SearchEstimator):
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         step = data.timed()
         linear = linear_oscillator(data, self.channels(data))
-        self._warm = linear.forgets(data)
+        self._warm = settling_samples(linear, data)
         merged = averaged(data) if self.periodic else data
-        template = self.start(linear, merged, self.substeps or linear.substeps(step, ANGLE))
+        turned = step / linear.time_constants[0]
+        fewest = int(np.clip(np.ceil(turned / ANGLE), 1, MOST_SUBSTEPS))
+        template = self.start(linear, merged, self.substeps or fewest)
         search = self.search(template, merged, tracker)
         tracker.budget = self.n_steps
-        with tracker.searching():
-            (_, squares), *_ = trust_region(
-                search.errors,
-                search.slopes,
-                template.pack(),
-                scale=np.ones(template.n_parameters),
-                least_gain=LEAST_GAIN,
-                max_evaluations=self.n_steps,
+        (_, squares), *_ = trust_region(
+            search.errors,
+            search.slopes,
+            template.pack(),
+            scale=np.ones(template.n_parameters),
+            least_gain=LEAST_GAIN,
+            max_evaluations=self.n_steps,
+        )
+        if not np.isfinite(squares):
+            raise DataError(
+                "no start runs stably under this force",
+                channel=data.input,
+                remedy="choose another seed, or record at a higher rate",
             )
-            if not np.isfinite(squares):
-                raise DataError(
-                    "no start runs stably under this force",
-                    channel=data.input,
-                    remedy="choose another seed, or record at a higher rate",
-                )
         assert tracker.best is not None
         return template.unpack(tracker.best), data
 
-    def start(self, linear: Linear, data: TrainingData, substeps: int) -> StateNetwork:
+    def start(self, linear: ProcessModel, data: TrainingData, substeps: int) -> StateNetwork:
         """Return the initial network of the descent."""
         rng, n, units = np.random.default_rng(self.seed), self.n_states, self.n_units
         force, moved = data.stacked("driven")[:, 0], data.target
@@ -128,7 +220,7 @@ class StateNetworkEstimator(SearchEstimator):
         own = np.zeros((n, n + 2))
         own[0, 1] = 1.0
         own[1, : n + 1] = -SPRING if n > 2 else -1.0
-        own[1, 1], own[1, n] = -DAMPING, sizes[0] / (linear.stiffness * sizes[1])
+        own[1, 1], own[1, n] = -DAMPING, sizes[0] * linear.gain / sizes[1]
         for place in range(2, n):
             own[1, place] /= n - 2
             own[place, [1, place]] = 1.0, -LAG * (place - 1)
@@ -138,7 +230,7 @@ class StateNetworkEstimator(SearchEstimator):
             linear=rows(own),
             hidden=rows(hidden),
             readout=rows(READ * rng.normal(size=(n, units))),
-            rate=linear.frequency,
+            rate=1.0 / linear.time_constants[0],
             input_offset=float(np.mean(force)) if self.periodic else 0.0,
             input_scale=sizes[0],
             output_offset=float(np.mean(moved)) if self.periodic else 0.0,
@@ -158,18 +250,6 @@ class StateNetworkEstimator(SearchEstimator):
             return super().free_runs(blocks, data)
         networks = [cast("StateNetwork", block) for block in blocks]
         return np.array([self.search(n, data, Tracker()).outputs(n.pack()) for n in networks])
-
-    def uncertainty(
-        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return the condition of the weights and their covariance, from exact derivatives."""
-        network = cast("StateNetwork", block)
-        merged = averaged(data) if self.periodic else data
-        search = self.search(network, merged, Tracker())
-        left = search.errors(network.pack())
-        size = relative_sizes(network.pack())
-        condition, own = covariance_by_runs(search.slopes(network.pack()) * size, left, merged.runs)
-        return condition, own * np.outer(size, size)
 
 
 class NetworkRuns:

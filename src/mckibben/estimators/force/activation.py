@@ -80,7 +80,7 @@ class ActivationMemoryEstimator(SeparableEstimator):
     rate_time_constant: Annotated[float, Ge(0)] | None = None
     nonnegative: bool = False
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         data.timed()
         return super().identify(data, tracker)
 
@@ -111,7 +111,7 @@ class ActivationMemoryEstimator(SeparableEstimator):
         )
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the response to each coefficient but the constant, over the run's history."""
+        """Return the response to each coefficient but the constant, over the run."""
         unit = self.unit(data)
         alone = np.eye(unit.n_parameters)[1:]
         return unit.simulate_many(alone, run.inputs, sample_time=run.sample_time).T
@@ -322,9 +322,9 @@ def by_force(runs: Sequence[Run]) -> dict[float, list[int]]:
     """Return the runs of equal mean force [N], weakest first."""
     means = [float(run.scheduled.mean()) for run in runs]
     groups: dict[float, list[int]] = {}
-    apart = SAME_FORCE * max(map(abs, means))
+    tolerance = SAME_FORCE * max(map(abs, means))
     for i in np.argsort(means, kind="stable"):
-        near = next((force for force in groups if abs(force - means[i]) <= apart), means[i])
+        near = next((force for force in groups if abs(force - means[i]) <= tolerance), means[i])
         groups.setdefault(near, []).append(int(i))
     return groups
 

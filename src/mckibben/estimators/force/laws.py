@@ -194,7 +194,7 @@ class TonduLopezEstimator(SeparableEstimator):
         """Return the ideal force, with and without the decay of mu."""
         ideal = self.law(theta, (0.0, 1.0), 0.0, data)
         force = ideal.simulate(run.inputs)[:, 0]
-        e = 1.0 - run.history / ideal.rest_length
+        e = 1.0 - run.u / ideal.rest_length
         return np.column_stack([force * np.exp(-MU_DECAY * e), force])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:

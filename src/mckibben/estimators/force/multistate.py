@@ -18,7 +18,6 @@ from mckibben.blocks.force.multistate_friction import (
     EIGHTEEN,
     ELEVEN,
     PLACES,
-    SIZES,
     Direction,
     MultistateFriction,
 )
@@ -38,10 +37,6 @@ LEAST_SHARE = 1e-5
 LENGTHS = np.geomspace(0.02, 1.0, 8)
 TIMES = (0.1, 10.0)
 """Initial break-away lengths of elements, relative to the range, and times [samples]."""
-
-
-GAINS = (-0.5, 1.0)
-"""Bounds of the pressure gain [1/bar]."""
 
 
 def extract_hysteresis(
@@ -95,8 +90,6 @@ class MultistateEstimator(SeparableEstimator):
         The paper's two structures; ours, of eleven parameters too, with one element shared, one for
         lengthening and one for shortening; or one direction an element ("shared", "both",
         "lengthening", "shortening").
-    fit_pressure_gain : bool
-        Whether friction may grow with pressure; wants recordings at several pressures.
     """
 
     purpose = "force"
@@ -105,11 +98,10 @@ class MultistateEstimator(SeparableEstimator):
 
     input: str = "length"
     output: str = "force"
-    initial: Literal["first_sample", "virgin", "fitted"] = "virgin"
+    initial: Literal["first_sample", "virgin"] = "virgin"
     pressure: str = "pressure"
     static: Law | None = "bilinear"
     elements: Structure | tuple[Direction, ...] = "eleven"
-    fit_pressure_gain: bool = False
     nonnegative: bool = False
     n_starts: Annotated[int, Ge(1)] = 64
     n_refined: Annotated[int, Interval(ge=1)] = 8
@@ -129,27 +121,26 @@ class MultistateEstimator(SeparableEstimator):
             return STRUCTURES[self.elements]
         return tuple(self.elements)
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         data.timed("friction depends on rate")
         return super().identify(data, tracker)
 
     # An element's deflection follows from how far it goes before it slips, F_c / k, and from the time
     # sigma / k in which it relaxes; its force is k times that. So theta is the logarithms of these
-    # lengths and times, element by element, lengthening first, then the pressure gain if it is fitted;
-    # the stiffnesses are linear.
+    # lengths and times, element by element, lengthening first; the stiffnesses are
+    # linear.
 
     def _pairs(self) -> list[int]:
         """Return the number of length and time pairs of each element."""
         return [2 if element in ("shared", "both") else 1 for element in self.directions]
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of the logarithms, then of the gain."""
+        """Return bounds of the logarithms."""
         low, high = data.input_range
         lengths = np.log((high - low) * np.array([0.005, 2.0]))
         times = np.log((data.sample_time or 1.0) * np.array([1e-2, 20.0]))
         pairs = np.tile([lengths, times], (sum(self._pairs()), 1))
-        rows = np.vstack([pairs, *[GAINS] * self.fit_pressure_gain])
-        return rows[:, 0], rows[:, 1]
+        return pairs[:, 0], pairs[:, 1]
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return initial elements that slip early and late, without delay."""
@@ -162,7 +153,7 @@ class MultistateEstimator(SeparableEstimator):
                 for place, pairs in enumerate(self._pairs()):
                     length = np.log((high - low) * first * ratio**place)
                     theta += [length, time] * pairs
-                guesses.append(np.array([*theta, *[0.1] * self.fit_pressure_gain]))
+                guesses.append(np.array(theta))
         return guesses
 
     def choices(self, data: TrainingData) -> list[Choice]:
@@ -194,26 +185,15 @@ class MultistateEstimator(SeparableEstimator):
         values = tuple(six[value] for value in PLACES[element])
         return MultistateFriction((element,), values, initial=self.starting_rule)
 
-    def _forces(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the force of every element per unit of its stiffnesses, over the run's history."""
-        length, pressure = run.inputs.T
+    def _forces(self, theta: Array, run: Run) -> Array:
+        """Return the force of every element per unit of its stiffnesses, over the run."""
+        length = run.u
         rising = np.diff(length, prepend=length[0]) >= 0
         columns = []
         for place, element in enumerate(self.directions):
             force = self._unit(place, theta).simulate(run.inputs, sample_time=run.sample_time)[:, 0]
             columns += [force * rising, force * ~rising] if element == "both" else [force]
-        grown = 1.0
-        if self.fit_pressure_gain:
-            grown = 1.0 + float(theta[-1]) * (pressure - self._reference(data))
-        return np.column_stack(columns) * np.reshape(grown, (-1, 1))
-
-    def _reference(self, data: TrainingData) -> float:
-        """Return the reference pressure of the values."""
-        pressures = data.once(
-            "reference pressure",
-            lambda: np.median(np.concatenate([run.scheduled[:, 0] for run in data.runs])),
-        )
-        return float(pressures)
+        return np.column_stack(columns)
 
     @property
     def n_stiffnesses(self) -> int:
@@ -230,15 +210,15 @@ class MultistateEstimator(SeparableEstimator):
         return MultistateFriction(
             self.directions,
             tuple(values),
-            float(theta[-1]) if self.fit_pressure_gain else 0.0,
-            self._reference(data),
+            0.0,
+            float(np.median(data.stacked("scheduled"))),
             self.starting_rule,
             **self.channels(data),
         )
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the forces of the elements, then the regressors of the static law."""
-        friction = self._forces(theta, run, data)
+        friction = self._forces(theta, run)
         if self.static is None:
             return friction
         length, pressure = run.inputs.T
@@ -271,19 +251,6 @@ class MultistateEstimator(SeparableEstimator):
         orders = ORDERS[self.static]
         law = force_law(linear[n:], offset, orders, data.input_range, self.channels(data))
         return Parallel((law, friction))
-
-    def undetermined(self) -> tuple[int, ...]:
-        """Return the indices of values that are undetermined, or not distinct from zero.
-
-        Values of friction are positive: one within two standard errors of 0 may be any smaller one. As
-        residuals are not independent, more may be undetermined; `parameter_ranges` tells.
-        """
-        block = self.fitted
-        values = block.pack()
-        errors = np.array(self.diagnostics_.standard_errors)
-        first = values.size - sum(SIZES[e] for e in self.directions) - self.fit_pressure_gain
-        vague = first + np.flatnonzero(~(2 * errors[first:] < np.abs(values[first:])))
-        return tuple(sorted({*super().undetermined(), *vague.tolist()}))
 
 
 MULTISTATE = preset(

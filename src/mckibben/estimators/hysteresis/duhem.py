@@ -64,11 +64,11 @@ class DuhemEstimator(SeparableEstimator):
         )
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the output per coefficient, without the constant, over the run's history."""
+        """Return the output per coefficient, without the constant, over the run."""
         unit = self.unit(theta, data)
         n = unit.n_parameters - 1
         alone = np.column_stack([np.eye(n)[1:], np.full(n - 1, unit.alpha)])
-        return np.column_stack([unit.unpack(row).simulate(run.history) for row in alone])
+        return np.column_stack([unit.unpack(row).simulate(run.u) for row in alone])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         target = (offset, *linear[: self.degree].tolist())

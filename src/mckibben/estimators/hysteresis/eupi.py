@@ -54,9 +54,9 @@ class EUPIEstimator(SeparableEstimator):
         return [np.array(edges) for edges in ([1.0, 1.0], [1.2, 0.8], [0.8, 1.2])]
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the pieces of the cubic, then the operators, over the run's history."""
+        """Return the pieces of the cubic, then the operators, over the run."""
         low, high = data.input_range
-        x = np.ascontiguousarray(run.history - low)
+        x = np.ascontiguousarray(run.u - low)
         radii = spread(self.n_operators, data.input_range)
         operators = np.empty((x.size, radii.size))
         state = started(radii, x[0], x[0], self.starting_rule)

@@ -12,7 +12,7 @@ from annotated_types import Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.envelopes import Envelope, Exponential, PiecewiseLinear, Tanh
+from mckibben.blocks.hysteresis.envelopes import Envelope, PiecewiseLinear, Tanh
 from mckibben.blocks.hysteresis.gpi import GPI, smallest_gap
 from mckibben.blocks.hysteresis.play_operators import play_matrix, started
 from mckibben.estimators.core.data import Run, TrainingData
@@ -38,23 +38,6 @@ def tanh_shape(low: float, high: float, n_knots: int) -> Shape:
     return np.tile(lower, 2), np.tile(upper, 2), guesses, envelopes
 
 
-def exponential_shape(low: float, high: float, n_knots: int) -> Shape:
-    """Return exponentials by both rates and the logarithm of their relative steepness."""
-    span = high - low
-
-    def envelopes(shape: Array) -> list[Envelope]:
-        found: list[Envelope] = []
-        for rate, steepness in ((shape[0], 0.0), (shape[1], shape[2])):
-            bent = float(np.copysign(max(abs(rate), 1e-3 / span), rate))
-            rise = abs(np.exp(-bent * low) - np.exp(-bent * high))
-            found.append(Exponential(bent, float(steepness - np.log(rise))))
-        return found
-
-    most = np.array([4 / span, 4 / span, 1.5])
-    guesses = [np.array([rate, rate, 0.0]) / span for rate in (-1.5, -0.5, 0.5, 1.5)]
-    return -most, most, guesses, envelopes
-
-
 def piecewise_linear_shape(low: float, high: float, n_knots: int) -> Shape:
     """Return lines between equally spaced knots by the logarithms of all their rises."""
     n = n_knots - 1
@@ -73,7 +56,6 @@ def piecewise_linear_shape(low: float, high: float, n_knots: int) -> Shape:
 SHAPES = {
     "tanh": tanh_shape,
     "piecewise-linear": piecewise_linear_shape,
-    "exponential": exponential_shape,
 }
 
 HEIGHTS = np.array([[-0.5], [0.0], [0.5]])
@@ -92,8 +74,8 @@ class GPIEstimator(SeparableEstimator):
     Parameters
     ----------
     n_operators : int
-        N: operators with a dead zone, beside the one without.
-    envelope : {"tanh", "piecewise-linear", "exponential"}
+        N: operators with a dead zone.
+    envelope : {"tanh", "piecewise-linear"}
         Shape of both envelopes.
     n_knots : int
         Knots of a piecewise-linear envelope.
@@ -117,7 +99,7 @@ class GPIEstimator(SeparableEstimator):
     effort: ClassVar[float] = 0.7
 
     n_operators: Annotated[int, Interval(ge=0, le=1000)] = 10
-    envelope: Literal["tanh", "piecewise-linear", "exponential"] = "tanh"
+    envelope: Literal["tanh", "piecewise-linear"] = "tanh"
     n_knots: Annotated[int, Interval(ge=3, le=100)] = 6
     threshold_rule: Literal["envelope", "paper"] = "envelope"
 
@@ -167,9 +149,9 @@ class GPIEstimator(SeparableEstimator):
         return spread(self.n_operators + 1, (float(rising(low)), float(falling(high))))
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the generalised play operators over the run's history, shape (n, N + 1)."""
+        """Return the generalised play operators over the run, shape (n, N + 1)."""
         rising, falling = self.envelopes(theta, data)
-        u, radii = np.ascontiguousarray(run.history), self.radii(rising, falling, data)
+        u, radii = np.ascontiguousarray(run.u), self.radii(rising, falling, data)
         up, down, operators = rising(u), falling(u), np.empty((u.size, radii.size))
         state = started(radii, up[0], down[0], self.starting_rule)
         play_matrix(u, up, down, radii, state, operators)

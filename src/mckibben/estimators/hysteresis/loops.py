@@ -92,9 +92,9 @@ class Loops:
 
 
 def relative(run: Run, data: TrainingData) -> Array:
-    """Return the input over a run's history, from 0 to 1 over its range."""
+    """Return the input over a run, from 0 to 1 over its range."""
     low, high = data.input_range
-    return (run.history - low) / (high - low)
+    return (run.u - low) / (high - low)
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -124,7 +124,7 @@ class BoucWenEstimator(SeparableEstimator):
     exponent: Literal[1, 2] | None = None
     asymmetric: bool = False
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         if self.exponent is not None:
             return super().identify(data, tracker)
         return self.best_of("exponent", (1, 2), data, tracker)
@@ -169,7 +169,7 @@ class BoucWenEstimator(SeparableEstimator):
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         unit = self.unit(theta, data)
-        z = unit.simulate(run.history, initial=self.starting_rule)[:, np.newaxis]
+        z = unit.simulate(run.u, initial=self.starting_rule)[:, np.newaxis]
         return self.linear.columns(relative(run, data), z, self.steepest(theta, unit))
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
@@ -263,7 +263,7 @@ class MaxwellSlipEstimator(SeparableEstimator):
         return np.full(self.n_operators, springs.scale * max(1.0, springs.stiffness_ratio))
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        springs, n, u = self.springs(theta, data), self.n_operators, run.history
+        springs, n, u = self.springs(theta, data), self.n_operators, run.u
         start = springs.initial_state(u[:1], self.starting_rule)[:n]
         deflections = np.empty((u.size, n))
         limits = np.array(springs.breakaways)

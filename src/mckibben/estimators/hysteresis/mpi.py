@@ -16,7 +16,7 @@ from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator, counting
-from mckibben.estimators.hysteresis.output_maps import MAPS, OutputMap
+from mckibben.estimators.hysteresis.output_maps import MAPS, PolynomialMap
 from mckibben.estimators.hysteresis.pi import play_operators, spread
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -64,11 +64,11 @@ class MPIEstimator(SeparableEstimator):
     nonnegative : bool
         Whether the map increases, where it can. Where thresholds are identified, also whether weights
         at rest may not be negative.
-    output_map : {"piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"}
-        Map behind the operators. The first two increase, and so have an inverse, whatever the data;
-        the last two are the papers' and may not.
+    output_map : {"polynomial", "free-polynomial"}
+        Map behind the operators. The first increases whatever the data, and so has an inverse; the
+        second is the papers', and may not.
     map_size : int
-        Straight lines of the map, or degree of the polynomial.
+        Degree of the map.
     rate_dependent : bool
         Whether weights are linear in the rate of the input, as in "High-Precision Displacement and Force
         Hybrid Modeling of Pneumatic Artificial Muscle Using 3D PI-NARMAX Model", Eqs. (2) to (5).
@@ -95,9 +95,7 @@ class MPIEstimator(SeparableEstimator):
 
     n_operators: Operators = 10
     thresholds: Literal["spread", "identified"] = "spread"
-    output_map: Literal["piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"] = (
-        "polynomial"
-    )
+    output_map: Literal["polynomial", "free-polynomial"] = "polynomial"
     map_size: Annotated[int, Interval(ge=1, le=50)] = 5
     rate_dependent: bool = False
     rate_time_constant: Annotated[float, Ge(0)] | None = None
@@ -112,7 +110,7 @@ class MPIEstimator(SeparableEstimator):
         """The offset of the operators' sum, which starts at the output's lowest value."""
         return ("pi.offset", "rate-dependent-pi.offset")
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         if not self.rate_dependent:
             return super().identify(data, tracker)
         step = data.timed(instead=", or use mpi")
@@ -129,7 +127,7 @@ class MPIEstimator(SeparableEstimator):
         step = run.sample_time
         tau = self.rate_time_constant or 0.0
         smoothing = np.exp(-step / tau) if tau > 0 else 0.0
-        raw = np.diff(run.history, prepend=run.history[0]) / step
+        raw = np.diff(run.u, prepend=run.u[0]) / step
         return np.asarray(lfilter([1 - smoothing], [1, -smoothing], raw))
 
     def fastest(self, data: TrainingData) -> float:
@@ -141,7 +139,7 @@ class MPIEstimator(SeparableEstimator):
         return float(rates.max())
 
     @property
-    def map(self) -> OutputMap:
+    def map(self) -> PolynomialMap:
         """The family of maps."""
         return MAPS[self.output_map](self.map_size)
 
@@ -202,11 +200,11 @@ class MPIEstimator(SeparableEstimator):
 
     def _plays(self, radii: Array, data: TrainingData) -> Array:
         """Return play operators at the samples that count."""
-        return counting(data, lambda run: play_operators(run.history, radii, self.starting_rule))
+        return counting(data, lambda run: play_operators(run.u, radii, self.starting_rule))
 
     def operators(self, radii: Array, run: Run, data: TrainingData) -> Array:
-        """Return play operators over the run's history, then their products with the relative rate."""
-        play = play_operators(run.history, radii, self.starting_rule)
+        """Return play operators over the run, then their products with the relative rate."""
+        play = play_operators(run.u, radii, self.starting_rule)
         if not self.rate_dependent:
             return play
         relative = self.rate(run) / self.fastest(data)
@@ -236,7 +234,7 @@ class MPIEstimator(SeparableEstimator):
         return low, high
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the pieces of the map over the run's history."""
+        """Return the pieces of the map over the run."""
         return self._pieces(theta, self.operators(self.radii(theta, data), run, data), data)
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:
@@ -281,8 +279,8 @@ class MPIEstimator(SeparableEstimator):
 
     @property
     def solves_nonnegative(self) -> bool:
-        """Whether linear parameters must be non-negative: for increasing maps only."""
-        return self.nonnegative and self.output_map in ("piecewise-linear", "polynomial")
+        """Whether linear parameters must be non-negative: for an increasing map only."""
+        return self.nonnegative and self.output_map == "polynomial"
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Series:
         """Return the series, its PI part scaled to the output's range."""

@@ -88,9 +88,9 @@ class PIEstimator(SeparableEstimator):
     n_operators: Operators = 10
     thresholds: Annotated[Sequence[float], Len(1)] | None = None
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         if self.method == "slopes":
-            return self._by_slopes(data), data
+            return self._by_slopes(data)
         return super().identify(data, tracker)
 
     def radii(self, data: TrainingData) -> Array:
@@ -100,8 +100,8 @@ class PIEstimator(SeparableEstimator):
         return spread(self.n_operators, data.input_range)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the play operators over the run's history, shape (n, N)."""
-        return play_operators(run.history, self.radii(data), self.starting_rule)
+        """Return the play operators over the run, shape (n, N)."""
+        return play_operators(run.u, self.radii(data), self.starting_rule)
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> PI:
         radii = vector(self.radii(data))
@@ -139,7 +139,7 @@ def _segments(data: TrainingData, radii: Array, rule: str) -> tuple[Array, Array
     longest = {1: 0.0, -1: 0.0}
     cut = {1: np.zeros((2, radii.size)), -1: np.zeros((2, radii.size))}
     for run in data.runs:
-        states = run.trim(play_operators(run.history, radii, rule))
+        states = play_operators(run.u, radii, rule)
         for start, stop, way in branches(run.u):
             if way == 0 or not run.counts[start:stop].all():
                 continue

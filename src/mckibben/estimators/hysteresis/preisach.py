@@ -56,11 +56,11 @@ class GridEstimator(SeparableEstimator):
         return vector(np.linspace(*data.input_range, self.n_levels + 1))
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the output of every cell separately, over the run's history."""
+        """Return the output of every cell separately, over the run."""
         grid = self.grid(data)
         n = len(grid.weights)
         alone = np.column_stack([np.eye(n), np.zeros(n)])
-        return grid.simulate_many(alone, run.history, initial=self.starting_rule).T
+        return grid.simulate_many(alone, run.u, initial=self.starting_rule).T
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every diagonal cell, which the inverse needs."""

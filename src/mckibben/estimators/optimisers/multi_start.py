@@ -103,15 +103,14 @@ def multi_start(
             gtol=None,
         )
 
-    with tracker.searching():
-        follow_best(starts, begun, refine, n_refined)
-        for _ in range(EXCHANGES if choices else 0):
-            assert tracker.best is not None
-            best = tracker.best
-            better = exchange(cost, best, choices)
-            if better is best:
-                break
-            refine(better)
+    follow_best(starts, begun, refine, n_refined)
+    for _ in range(EXCHANGES if choices else 0):
+        assert tracker.best is not None
+        best = tracker.best
+        better = exchange(cost, best, choices)
+        if better is best:
+            break
+        refine(better)
     assert tracker.best is not None
     return tracker.best
 

@@ -1,10 +1,8 @@
-"""Progress, best point and interruption of a search."""
+"""Progress and best point of a search."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,25 +13,9 @@ Progress = Callable[[float, float], None]
 """Called with the share of the work done, 0 to 1, and the best RMSE so far."""
 
 
-_whole: ContextVar[bool] = ContextVar("_whole", default=False)
-
-
-@contextmanager
-def whole_searches() -> Iterator[None]:
-    """Let an interrupt abort a fit within this context, instead of returning the best point.
-
-    A search cut short is no model to be ranked, or kept as finished.
-    """
-    before = _whole.set(True)
-    try:
-        yield
-    finally:
-        _whole.reset(before)
-
-
 @dataclass
 class Tracker:
-    """Stores the best point of a search, reports progress, and handles an interrupt."""
+    """Stores the best point of a search, and reports progress."""
 
     progress: Progress | None = None
     budget: int = 1
@@ -42,13 +24,12 @@ class Tracker:
     evaluations: int = 0
     best_cost: float = np.inf
     best: Array | None = None
-    interrupted: bool = False
     notes: list[str] = field(default_factory=list)
     """Notes for the user on the result."""
 
     def reached(self, share: float) -> None:
-        """Report the share of the work done, unless interrupted."""
-        if self.progress is not None and not self.interrupted:
+        """Report the share of the work done."""
+        if self.progress is not None:
             self.progress(share, self.best_cost)
 
     def part(self, first: float, last: float) -> Tracker:
@@ -66,34 +47,6 @@ class Tracker:
     def saw_all(self, part: Tracker) -> None:
         """Register a finished part, without its best point."""
         self.evaluations += part.evaluations
-        self.interrupted = self.interrupted or part.interrupted
-
-    def end(self) -> None:
-        """Re-raise an interrupt if only complete searches are wanted.
-
-        Raises
-        ------
-        KeyboardInterrupt
-            If the search was interrupted.
-        """
-        if self.interrupted and _whole.get():
-            raise KeyboardInterrupt
-
-    @contextmanager
-    def searching(self) -> Iterator[None]:
-        """Let an interrupt end the search within this context, once there is a result.
-
-        Raises
-        ------
-        KeyboardInterrupt
-            If there is nothing yet.
-        """
-        try:
-            yield
-        except KeyboardInterrupt:
-            if self.best is None:
-                raise
-            self.interrupted = True
 
     def saw(self, point: Array, cost: float) -> None:
         """Register one evaluation."""

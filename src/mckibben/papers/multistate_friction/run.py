@@ -16,7 +16,6 @@ from mckibben.blocks.force.multistate_friction import MultistateFriction
 from mckibben.control import track
 from mckibben.errors import DataError
 from mckibben.estimators.catalogue import full_name
-from mckibben.estimators.core.ranges import parameter_ranges
 from mckibben.estimators.force.multistate import extract_hysteresis
 from mckibben.metrics import score
 from mckibben.papers.experiment import (
@@ -180,34 +179,25 @@ def _errors(experiment: Experiment, found: Hysteresis) -> None:
         experiment.says(worst=worst, better=better, won=won, unused=len(found.unused))
 
 
-WIDE, EVERY, NEAR = 10.0, 16.0, 1.05
-"""Ratio of a range's ends beyond which a parameter is called not determined; evaluations from one
-report of a search to the next, and how near to its least error is near."""
+EVERY, NEAR = 16.0, 1.05
+"""Number of evaluations between reports of a search; ratio to its smallest error that counts as near."""
 
 
 def _parameters(experiment: Experiment, key: str, model: str, found: Hysteresis) -> None:
-    """Add the parameters of a friction model, and whether the closed loop determines them."""
-    fits, (of, settings) = [first := found.fitted[CLOSED[model]]], MODELS[model]
-    for seed in range(experiment.seed + 1, experiment.seed + (2 if experiment.quick else 5)):
-        own = settings | FROM_FIRST_SAMPLE | {"seed": seed}
-        fits.append(experiment.fit(f"{model}, seed {seed}", of, found.loop, own))
-    ranked = [one.block.by_strength() for one in fits if isinstance(one.block, MultistateFriction)]
-    friction, order = ranked[0]
-    ranges = parameter_ranges(friction, found.loop, others=[other for other, _ in ranked[1:]])
-    errors = np.array(first.standard_errors)[order]
+    """Add the parameters of a friction model fitted to the closed loop, with standard errors."""
+    fitted = found.fitted[CLOSED[model]]
+    assert isinstance(fitted.block, MultistateFriction)
+    friction, order = fitted.block.by_strength()
+    errors = np.array(fitted.standard_errors)[order].tolist()
     printed = experiment.paper.printed("multistate-friction").values
     theirs = printed if model == PAPERS else [math.nan] * len(order)
-    each = zip(theirs, friction.values, errors.tolist(), ranges.tolist(), strict=True)
-    rows: dict[str, list[Cell]] = {}
-    for name, (*three, (low, high)) in zip(friction.parameter_names, each, strict=True):
-        cells = [None if math.isnan(x) else x for x in three]
-        ends: list[Cell] = [low, high if math.isfinite(high) else "any larger"]
-        rows[name] = [*cells, *ends, "" if high < WIDE * low else "not determined"]
-    columns = ["printed", "here", "standard error", "from", "to", "determined?"]
-    experiment.table(key, columns, rows, wide=WIDE, at=found.chosen)
-    if model == PAPERS:
-        vague = [name for name, cells in rows.items() if cells[-1]]
-        experiment.says(n_vague=len(vague), vague="; ".join(vague) or "none")
+    rows: dict[str, list[Cell]] = {
+        name: [None if math.isnan(x) else x for x in numbers]
+        for name, *numbers in zip(
+            friction.parameter_names, theirs, friction.values, errors, strict=True
+        )
+    }
+    experiment.table(key, ["printed", "here", "standard error"], rows, at=found.chosen)
 
 
 def _figures(experiment: Experiment, isometric: Sequence[Recording], found: Hysteresis) -> None:

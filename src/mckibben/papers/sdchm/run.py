@@ -140,7 +140,7 @@ def _fits(experiment: Experiment, runs: Runs) -> None:
         tried: dict[float, Fitted] = {}
         for seed in range(experiment.seed, experiment.seed + (SEEDS if several else 1)):
             label, settings = f"{name}, seed {seed}", changes | {"seed": seed}
-            fitted = experiment.fit(label, model, train, settings, validation=sets[0])
+            fitted = experiment.fit(label, model, train, settings)
             errors = [rms(_off(experiment, label, some)) for some in sets] if several else [0.0]
             tried[errors[0]] = fitted
             by_seed += [[name, seed, *errors]] if several else []

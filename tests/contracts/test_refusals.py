@@ -74,11 +74,6 @@ NO_MODEL: list[tuple[str, dict[str, Any], str]] = [
         "pressure_range",
     ),
     ("predictive", {"compensator": ARM.inverse(), "pressure_range": OPEN}, "'predictive'"),
-    (
-        "predictive",
-        {"compensator": ARM, "pressure_range": (1.0, 2.0), "total_limit": 1.5},
-        "total_limit",
-    ),
     ("adaptive", {"memory": (0.0, 1.0, 2.0)}, "3"),
     ("balance", {"friction": ((3.0, -1.5), (2.5, 2.0))}, "friction"),
     ("balance", {"relaxation": ((1.0, -0.6), (0.8, 0.5))}, "relaxation"),

@@ -129,6 +129,9 @@ class Block(DrawsItself, Parametrised):
     lowest and highest value in its identification, or None; see `mckibben.blocks.setting`.
     """
 
+    retired: ClassVar[Mapping[str, Any]] = {}
+    """Fields of older files, with the value of each that had no effect."""
+
     sample_time: float | None = None
     """Sample time of a discrete block [s]; None if it has no fixed one."""
 
@@ -142,11 +145,6 @@ class Block(DrawsItself, Parametrised):
     def title(self) -> str:
         """Title of the block: its kind, and for an inverse also the kind of the inverted block."""
         return self.kind
-
-    @property
-    def needs_double(self) -> str:
-        """Why double precision is needed, as part of a sentence; empty if single precision suffices."""
-        return ""
 
     # -- channels ----------------------------------------------------------------------------
 

@@ -233,13 +233,8 @@ def check_single(block: Block, sample_time: float | None) -> None:
     Raises
     ------
     ModelError
-        If two knots, levels or thresholds that follow one another become one, or the block says that
-        it needs more.
+        If two knots, levels or thresholds that follow one another become one.
     """
-    if block.needs_double:
-        raise ModelError(
-            f"{block.title!r} {block.needs_double}", remedy="export in double precision"
-        )
     for name, places in block.strictly_increasing():
         if np.any(np.diff(np.array(places, dtype=np.float32)) <= 0) and np.all(np.diff(places) > 0):
             raise ModelError(

@@ -47,9 +47,6 @@ NO_MODEL: list[tuple[str, dict[str, Any], str]] = [
     ("piecewise-linear", {"knots": OPEN, "values": (1.0, 1.0)}, "piecewise-linear"),
     ("bouc-wen", {"exponent": 3}, "exponent"),
     ("generalized-bouc-wen", {"shape": (0.5, 0.5, 0.1, 0.0, 0.0)}, "shape"),
-    ("duhem-oscillator", {"rising": OPEN, "falling": OPEN, "knots": (1.0, 1.0)}, "knots"),
-    ("state-network", {"linear": ((0.0, 1.0),)}, "rows"),
-    ("state-network", {"readout": ((1.0,), (1.0,))}, "rows"),
     ("air", {"ambient": 7.0}, "7"),
     ("air", {"gain": -1.0}, "gain.*'air'"),
     ("coupling", {"gains": ((1.0,), (1.0,)), "driven": PAIR, "given": PAIR}, "'coupling'"),
@@ -164,7 +161,6 @@ OTHERS: dict[str, tuple[Make, str]] = {
         lambda: ProcessModel(2.0, (0.3,), delay=5.0).simulate(U, sample_time=0.01),
         "254",
     ),
-    "too fast": (lambda: example("state-network").simulate(U, sample_time=1.0), "2 substep"),
     "not linear": (lambda: PI.example().to_scipy(0.01), "'pi'"),
     "linear but for its delay": (
         lambda: ProcessModel(1.0, (0.1,), None, None, 0.05).to_scipy(),

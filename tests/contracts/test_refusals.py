@@ -161,11 +161,6 @@ OTHERS: dict[str, tuple[Make, str]] = {
         lambda: ProcessModel(2.0, (0.3,), delay=5.0).simulate(U, sample_time=0.01),
         "254",
     ),
-    "not linear": (lambda: PI.example().to_scipy(0.01), "'pi'"),
-    "linear but for its delay": (
-        lambda: ProcessModel(1.0, (0.1,), None, None, 0.05).to_scipy(),
-        "sample time",
-    ),
     "learns several channels": (lambda: adaptive(PerChannel.example(), 20.0), "'per-channel'"),
     "learns creep alone": (lambda: adaptive(example("creep"), 10.0), "'creep'"),
     "learns a learner": (lambda: adaptive(example("adaptive"), 20.0, 0.02), "'pi-adaptive'"),

@@ -24,7 +24,6 @@ from mckibben.arrays import Array
 from mckibben.blocks import saving
 from mckibben.blocks.fields import Channel, Initial
 from mckibben.blocks.kernels import Step, in_scratch
-from mckibben.blocks.linear import LinearSystem, Polynomials, as_control, as_scipy
 from mckibben.blocks.parameters import Parametrised, gathered
 from mckibben.blocks.running import Stream, refuse_time, run_many
 from mckibben.errors import DataError, ModelError
@@ -120,6 +119,9 @@ class Block(DrawsItself, Parametrised):
 
     increasing: ClassVar[tuple[str, ...]] = ()
     """Fields that must be strictly increasing, also after rounding to single precision."""
+
+    is_linear: ClassVar[bool] = False
+    """Whether outputs are linear in inputs and state, but for constant offsets."""
 
     filters: ClassVar[bool] = False
     """Whether the block is a linear filter, whose poles may be too slow for single precision."""
@@ -349,25 +351,6 @@ class Block(DrawsItself, Parametrised):
             first, second = np.sort(self.simulate(np.array([low, high])), axis=0)
             return first, second
         return self.reachable()
-
-    # -- linear blocks -----------------------------------------------------------------------
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return a linear block as a state-space system about its operating point.
-
-        The time between samples [s] is needed by blocks that are continuous in time.
-        """
-        raise ModelError(
-            f"{self.kind!r} is not linear, so it has no transfer function",
-            remedy="use a linear model (oe, arx, armax, bj, p1 to p3)",
-        )
-
-    def continuous(self) -> Polynomials | None:
-        """Return the continuous transfer function without dead time, or None."""
-        return None
-
-    to_scipy = as_scipy
-    to_control = as_control
 
     @classmethod
     def example(cls) -> Self:

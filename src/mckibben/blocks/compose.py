@@ -10,7 +10,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass as plain_dataclass
 from dataclasses import replace
-from functools import cached_property, partial, reduce
+from functools import cached_property, partial
 from itertools import groupby, pairwise
 from typing import Annotated, Any, ClassVar, Self
 
@@ -21,7 +21,6 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Run, explicit_state
 from mckibben.blocks.fields import STRICT, Channel, Initial
-from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 from mckibben.registry import load
@@ -194,6 +193,11 @@ class Composition(Block):
     undoing = _of_any("undoing")
 
     @property
+    def is_linear(self) -> bool:  # type: ignore[override]
+        """Whether all parts are linear."""
+        return all(part.is_linear for part in self.parts)
+
+    @property
     def dead_time(self) -> float:  # type: ignore[override]
         return type(self).together(part.dead_time for part in self.parts)
 
@@ -305,9 +309,6 @@ class Series(Composition):
             low, high = part.passes(low, high)
         return low, high
 
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        return reduce(LinearSystem.then, [part.linear_system(sample_time) for part in self.parts])
-
     def joined(self, parts: Sequence[str]) -> str:
         """Return the nested expression of the series."""
         return rf"y = {'['.join(reversed(parts))}[u{']' * len(parts)}"
@@ -378,13 +379,6 @@ class Parallel(Composition):
             for place, signal in zip(places, signals, strict=True):
                 terms[place].append(signal)
         return [board.add(own) for own in terms]
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        n, m = len(self.inputs), len(self.outputs)
-        systems = [
-            part.linear_system(sample_time).among(*self._places(part), n, m) for part in self.parts
-        ]
-        return reduce(LinearSystem.beside, systems)
 
     def joined(self, parts: Sequence[str]) -> str:
         """Return their sum."""

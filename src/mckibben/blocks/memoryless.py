@@ -17,7 +17,6 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block
 from mckibben.blocks.inverse import Invertible, nothing_clipped
 from mckibben.blocks.kernels import DERIVED, SLACK, improved, inlined, kernel, step
-from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.notation import Notation, summed
 from mckibben.blocks.solving import newton
 from mckibben.errors import ModelError
@@ -50,6 +49,7 @@ class Affine(Block):
 
     kind = "affine"
     kernel = affine_step
+    is_linear = True
     parameters = ("gain", "offset")
     typical = (6.8, -1.5)
     notation = Notation("y = K u + y_0", gain="K [{y}/{u}]", offset="y_0 [{y}]")
@@ -68,9 +68,6 @@ class Affine(Block):
 
     def worked(self) -> tuple[str, ...]:
         return (f"y = {summed([(self.gain, 'u'), (self.offset, '')])}",)
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        return LinearSystem.gain(self.gain, self.offset)
 
 
 @step
@@ -91,6 +88,7 @@ class Negative(Block):
 
     kind = "negative"
     kernel = negative_step
+    is_linear = True
     typical = ()
     notation = Notation("y = -u")
 
@@ -99,9 +97,6 @@ class Negative(Block):
 
     def inverse(self) -> Negative:
         return Negative(self.output, self.input)
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        return LinearSystem.gain(-1.0)
 
 
 # -- straight pieces -------------------------------------------------------------------------

@@ -17,7 +17,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, rows
 from mckibben.blocks.kernels import step
-from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -52,6 +51,7 @@ class Coupling(Block):
     kind = "coupling"
     ports = ("driven",), (), ("given",)
     kernel = coupling_step
+    is_linear = True
     parameters = ("gains",)
     notation = Notation(
         r"h_j = \sum_i G_{ij} v_i",
@@ -114,10 +114,6 @@ class Coupling(Block):
         """Return the range of each output over a box of inputs."""
         at_low, at_high = self.matrix.T * low, self.matrix.T * high
         return np.minimum(at_low, at_high).sum(axis=1), np.maximum(at_low, at_high).sum(axis=1)
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return the gains."""
-        return LinearSystem.gain(np.array(self.gains).T)
 
     @classmethod
     def example(cls) -> Self:

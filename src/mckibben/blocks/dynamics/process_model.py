@@ -24,7 +24,6 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block, needs_sample_time
 from mckibben.blocks.dynamics.starts import start_on
 from mckibben.blocks.kernels import kernel, remember, step
-from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import Notation, tex
 from mckibben.errors import ModelError
 
@@ -97,6 +96,7 @@ class ProcessModel(Block):
     kernel = process_model_step
     start_kernel = process_model_start
     rate_dependent = True
+    is_linear = True
     filters = True
     start_on = start_on
     typical = (6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
@@ -203,43 +203,6 @@ class ProcessModel(Block):
         above = gain if self.zero_time is None else f"{gain} ({zero} + 1)"
         late = rf"\, e^{{-{delay}\,s}}" if self.delay else ""
         return rf"\frac{{Y(s) - y_0}}{{U(s) - u_0}} = \frac{{{above}}}{{{below}}}{late}"
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return the lags after the past inputs of dead time and hold."""
-        found = _discretised(self, sample_time)
-        n, m = int(found[0]), int(found[1])
-        now, before = found[4:6]
-        c, first, second, third = found[6 : 6 + 4 * n].reshape(4, n)
-        lags = found[6 + 4 * n :].reshape(n, n)
-        # [x, u of the last m + 2 samples, latest first]
-        size = n + m + 2
-        driven = np.zeros((n, m + 3))  # by the input now, a sample ago and so on
-        driven[:, m:] = np.transpose([first, second, third])
-        at_once = np.array([*np.zeros(m), now, before, 0.0])
-        a, b = np.zeros((size, size)), np.zeros((size, 1))
-        a[:n, :n], a[:n, n:], b[:n, 0] = lags, driven[:, 1:], driven[:, 0]
-        a[n + 1 :, n:-1], b[n, 0] = np.eye(m + 1), 1.0
-        given = np.concatenate([c @ lags, c @ driven[:, 1:] + at_once[1:]])[np.newaxis]
-        through = np.array([[c @ driven[:, 0] + at_once[0]]])
-        offsets = np.array([self.input_offset]), np.array([self.output_offset])
-        return LinearSystem(a, b, given, through, sample_time, *offsets)
-
-    def continuous(self) -> Polynomials:
-        """Return the lags and the zero as a continuous transfer function.
-
-        Raises
-        ------
-        ModelError
-            If there is a dead time, which polynomials cannot hold.
-        """
-        if self.delay > 0:
-            raise ModelError(
-                f"{self.kind!r} has a dead time of {self.delay:g} s, which a continuous "
-                "transfer function cannot represent",
-                remedy="give a sample time",
-            )
-        zero = [] if self.zero_time is None else [self.gain * self.zero_time]
-        return Polynomials((*zero, self.gain), tuple(self.denominator().tolist()))
 
 
 @lru_cache(maxsize=8)  # once for many runs of one model

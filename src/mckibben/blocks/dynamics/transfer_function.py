@@ -21,7 +21,6 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block, one_per, own_sample_time
 from mckibben.blocks.dynamics.starts import free_responses, start_on
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import FEW, Notation, summed
 from mckibben.errors import ModelError, require
 from mckibben.recording import Recording
@@ -86,6 +85,7 @@ class TransferFunction(Block):
     kernel = filter_step
     start_kernel = filter_start
     rate_dependent = True
+    is_linear = True
     filters = True
     start_on = start_on
     parameters = (
@@ -233,22 +233,6 @@ class TransferFunction(Block):
             self.initial if isinstance(self.initial, str) else "first_sample",
             self.output,
             self.input,
-        )
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return the filter, in observable form, without its noise model."""
-        own_sample_time(self.kind, self.sample_time, sample_time or self.sample_time)
-        b, f = self._padded()
-        n = self.n_states
-        a = np.eye(n, k=1)
-        if n:
-            a[:, 0] = -f[1:]
-        return LinearSystem(
-            *(a, (b[1:] - f[1:] * b[0])[:, np.newaxis], np.eye(1, n), b[:1, np.newaxis]),
-            self.sample_time,
-            np.array([self.input_offset]),
-            np.array([self.output_offset]),
-            Polynomials(tuple(np.trim_zeros(b, "f").tolist()) or (0.0,), tuple(f.tolist())),
         )
 
     def worked(self) -> tuple[str, ...]:

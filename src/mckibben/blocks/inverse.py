@@ -17,7 +17,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Cost, Start, explicit_state
 from mckibben.blocks.fields import STRICT, Channel, Initial
 from mckibben.blocks.kernels import Step, kernel
-from mckibben.blocks.notation import lettered
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError, ModelWarning
@@ -252,11 +251,6 @@ class Inverse(Block):
     def equations(self) -> tuple[str, ...]:
         """Return the equation of the inverse; those of the forward block follow."""
         return (r"\hat{u} = P^{-1}[y] \quad\text{such that}\quad P[\hat{u}] = y",)
-
-    def worked(self) -> tuple[str, ...]:
-        """Return the channels of the inverse; P is the forward block."""
-        letters = lettered("y", self.forward.outputs) + lettered(r"\hat{u}", self.outputs)
-        return (r",\quad ".join([*letters, r"P\text{: the model below}"]),)
 
     @classmethod
     def example(cls) -> Self:

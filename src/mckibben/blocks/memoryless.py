@@ -17,7 +17,7 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block
 from mckibben.blocks.inverse import Invertible, nothing_clipped
 from mckibben.blocks.kernels import DERIVED, SLACK, improved, inlined, kernel, step
-from mckibben.blocks.notation import Notation, summed
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton
 from mckibben.errors import ModelError
 
@@ -65,9 +65,6 @@ class Affine(Block):
                 "'affine' of gain 0 has no inverse", remedy="give a gain that is not 0"
             )
         return Affine(1 / self.gain, -self.offset / self.gain, self.output, self.input)
-
-    def worked(self) -> tuple[str, ...]:
-        return (f"y = {summed([(self.gain, 'u'), (self.offset, '')])}",)
 
 
 @step
@@ -314,10 +311,6 @@ class Polynomial(Invertible):
     def _arguments(self) -> tuple[float, float]:
         low, high = self.input_limits
         return (low - self.centre) / self.scale, (high - self.centre) / self.scale
-
-    def worked(self) -> tuple[str, ...]:
-        powers = ["", "x", *(f"x^{{{k}}}" for k in range(2, len(self.polynomial)))]
-        return (f"y = {summed(list(zip(self.polynomial, powers, strict=False)))}",)
 
 
 # -- logarithm and exponential ---------------------------------------------------------------

@@ -24,7 +24,7 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block, needs_sample_time
 from mckibben.blocks.dynamics.starts import start_on
 from mckibben.blocks.kernels import kernel, remember, step
-from mckibben.blocks.notation import Notation, tex
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 
@@ -185,24 +185,12 @@ class ProcessModel(Block):
 
     def equations(self) -> tuple[str, ...]:
         """Return the transfer function of this structure."""
-        lags = [f"T_{{p,{k + 1}}} s + 1" for k in range(len(self.time_constants))]
-        return (
-            self._transfer("K", r"T_z\,s", lags, r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1", "T_d"),
-        )
-
-    def worked(self) -> tuple[str, ...]:
-        """Return the transfer function with numerical values."""
-        a, b = (tex(float(c)) for c in self.denominator()[:2])
-        zero = rf"{tex(self.zero_time or 0.0)}\,s"
-        lags = [rf"{tex(t)}\,s + 1" for t in self.time_constants]
-        pair = rf"{a}\,s^2 + {b}\,s + 1"
-        return (self._transfer(tex(self.gain), zero, lags, pair, tex(self.delay)),)
-
-    def _transfer(self, gain: str, zero: str, lags: list[str], pair: str, delay: str) -> str:
-        below = "".join(f"({lag})" for lag in lags) if self.damping is None else pair
-        above = gain if self.zero_time is None else f"{gain} ({zero} + 1)"
-        late = rf"\, e^{{-{delay}\,s}}" if self.delay else ""
-        return rf"\frac{{Y(s) - y_0}}{{U(s) - u_0}} = \frac{{{above}}}{{{below}}}{late}"
+        below = r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1"
+        if self.damping is None:
+            below = "".join(f"(T_{{p,{k + 1}}} s + 1)" for k in range(self.order))
+        above = "K" if self.zero_time is None else r"K (T_z\,s + 1)"
+        late = r"\, e^{-T_d\,s}" if self.delay else ""
+        return (rf"\frac{{Y(s) - y_0}}{{U(s) - u_0}} = \frac{{{above}}}{{{below}}}{late}",)
 
 
 @lru_cache(maxsize=8)  # once for many runs of one model

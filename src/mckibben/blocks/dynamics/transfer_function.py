@@ -9,8 +9,6 @@ output answers at once (b_0 is not zero) and all zeros of B lie within the unit 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import FiniteFloat
@@ -21,7 +19,7 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block, one_per, own_sample_time
 from mckibben.blocks.dynamics.starts import free_responses, start_on
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.notation import FEW, Notation, summed
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError, require
 from mckibben.recording import Recording
 
@@ -234,21 +232,3 @@ class TransferFunction(Block):
             self.output,
             self.input,
         )
-
-    def worked(self) -> tuple[str, ...]:
-        """Return the polynomials with numerical values, if short."""
-        own = (self.numerator, (1.0, *self.denominator))
-        noise = ((1.0, *self.noise_numerator), (1.0, *self.noise_denominator))
-        if max(map(len, (*own, *noise))) > FEW:
-            return ()
-        top, below = map(_powers, own)
-        text = rf"y_t - y_0 = \frac{{{top}}}{{{below}}}\,(u_t - u_0)"
-        if max(map(len, noise)) > 1:
-            text += rf" + \frac{{{_powers(noise[0])}}}{{{_powers(noise[1])}}}\,e_t"
-        return (text,)
-
-
-def _powers(coefficients: Sequence[float]) -> str:
-    return summed(
-        [(c, f"q^{{-{k}}}" if k else "") for k, c in enumerate(coefficients) if c or not k]
-    )

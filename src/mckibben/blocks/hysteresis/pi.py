@@ -42,7 +42,7 @@ from mckibben.blocks.learning import (
     learnable_operators,
     start_learning,
 )
-from mckibben.blocks.notation import FEW, Notation, summed, tex
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solved_inverse
 
 
@@ -188,14 +188,6 @@ class PI(Invertible):
             pi_adaptive_start,
             lambda theta: replace(self, weights=fields.vector(theta[:-1]), offset=float(theta[-1])),
         )
-
-    def worked(self) -> tuple[str, ...]:
-        """Return the sum with numerical values, if short."""
-        if len(self.weights) > FEW:
-            return ()
-        pairs = zip(self.weights, self.thresholds, strict=True)
-        terms = [(w, rf"F_{{{tex(r)}}}[u]" if r else "u") for w, r in pairs]
-        return (f"y = {summed([(self.offset, ''), *terms])}",)
 
 
 @summing_step

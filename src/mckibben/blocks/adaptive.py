@@ -14,10 +14,8 @@ by a dead time is moved on first by as much as the reference has gone on since (
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass as plain_dataclass
 from dataclasses import replace
 from functools import cached_property
-from statistics import NormalDist
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -48,18 +46,7 @@ from mckibben.blocks.fields import (
 )
 from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, kernel, remember, step
-from mckibben.blocks.learning import (
-    LARGEST,
-    READY,
-    SENSES,
-    SQUARED,
-    STOOD,
-    USUAL,
-    Group,
-    Learnable,
-    covariance_of,
-    start_root,
-)
+from mckibben.blocks.learning import READY, SENSES, USUAL, Learnable, start_root
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
@@ -73,79 +60,6 @@ TIMES = 1e-3, 1e9
 """Shortest and longest adaptation time [s]."""
 NOISES = 1e-9, 1e3
 """Smallest and largest noise, relative to the reachable range."""
-
-FARTHEST = 1e6
-"""Bounds of scales and variances of all parameters."""
-MOST = 1e12
-"""Bound of the inverse's state and of sample counts."""
-
-FALSE_ALARMS = 1e-3
-"""Expected false alarms per hour without drift."""
-FIT_ERROR = 0.01
-"""Assumed standard error of the fit itself, by group."""
-
-
-@plain_dataclass(frozen=True)
-class Drift:
-    """Changes of the model since the fit, by groups of parameters.
-
-    Parameters
-    ----------
-    groups : tuple of Group
-        Which changes are reported.
-    changes, errors : tuple of float
-        Relative change of every group, and its standard error: that of the learner's covariance, a
-        little of every group, and whatever moves the output no further than its usual error.
-    limit : float
-        Standard errors at which an alarm is given, see `alarm_limit`.
-    measured : bool
-        Whether anything was, by now.
-    """
-
-    groups: tuple[Group, ...]
-    changes: tuple[float, ...]
-    errors: tuple[float, ...]
-    limit: float
-    measured: bool = True
-
-    @property
-    def by_errors(self) -> tuple[float, ...]:
-        """Changes in standard errors."""
-        return tuple(c / e for c, e in zip(self.changes, self.errors, strict=True))
-
-    @property
-    def alarms(self) -> tuple[bool, ...]:
-        """Whether the change of each group is significant."""
-        return tuple(abs(size) > self.limit for size in self.by_errors)
-
-    @property
-    def alarm(self) -> bool:
-        """Whether any change is significant."""
-        return any(self.alarms)
-
-    def __str__(self) -> str:
-        if not self.measured:
-            return "nothing measured yet"
-        changed, same = [], []
-        for group, change, alarm in zip(self.groups, self.changes, self.alarms, strict=True):
-            if alarm:
-                way = group.more if change > 0 else group.less
-                changed.append(f"{group.name} {100 * abs(change):.0f} % {way}")
-            else:
-                same.append(group.name)
-        if not changed:
-            return f"{' and '.join(same)} unchanged since the day of the fit"
-        text = f"{', '.join(changed)} than on the day of the fit"
-        return f"{text}; {', '.join(same)} unchanged" if same else text
-
-
-def alarm_limit(time: float, n_groups: int, rate: float = FALSE_ALARMS) -> float:
-    """Return the threshold, in standard errors, for a rate of false alarms [1/h].
-
-    Looks are independent of each other after the ``time`` to learn in [s].
-    """
-    looks = n_groups * 3600.0 / time
-    return -NormalDist().inv_cdf(min(rate / looks, 0.5) / 2.0)
 
 
 def learnable_of(block: Block) -> Learnable | None:
@@ -304,29 +218,15 @@ class Adaptive(Block):
                     part.initial_state(np.zeros(len(part.inputs)), share.tolist())
             return
         own, theta, used, root, senses = self._split(state)
-        learnable, p = self.learnable, theta.size
-        senses = senses.reshape(-1, SENSES)
-        with np.errstate(all="ignore"):
-            far = np.abs(np.array([theta, used]) - learnable.fitted) > FARTHEST * learnable.scales
-            variances = np.diag(covariance_of(root, p))
-            wide = variances > FARTHEST * np.diag(learnable.spread)
-        ready, usual = senses[:, READY], senses[:, USUAL]
-        wrong = {
-            "hysteresis": (np.abs(own) > MOST).any(),
-            "parameters": far.any(),
-            "covariance": not (root[:p] > 0).all() or wide.any(),
-            "readings": not ((ready >= 0) & (ready <= p) & (ready == np.round(ready))).all(),
-            "errors": not (senses[:, [USUAL, SQUARED, STOOD]] > 0).all()
-            or (usual > 2 * LARGEST * self.core.noise).any(),
-        }
-        for name, found in wrong.items():
-            if found:
-                raise ModelError(
-                    f"the {name} in the memory of {self.kind!r} cannot result from running it",
-                    remedy="save the model afresh, or resume what was saved unchanged",
-                )
+        p, senses = theta.size, senses.reshape(-1, SENSES)
+        counts = (senses[:, READY] >= 0) & (senses[:, READY] <= p) & (senses[:, USUAL] > 0)
+        if not (counts.all() and (root[:p] > 0).all()):
+            raise ModelError(
+                f"the covariance or errors in the memory of {self.kind!r} are not positive",
+                remedy="save the model afresh, or resume what was saved unchanged",
+            )
         for parameters in (theta, used):
-            learnable.with_parameters(parameters).inverse()
+            self.learnable.with_parameters(parameters).inverse()
         if own.size:
             fixed = self.fixed
             fixed.initial_state(np.zeros(len(fixed.inputs)), own[: fixed.n_states].tolist())
@@ -497,10 +397,9 @@ class Adaptive(Block):
         if self.parts:
             return super().coefficients(sample_time)
         step, learnable = needs_sample_time(self.kind, sample_time), self.learnable
-        settings = [min(step / self.time, 0.5), self.noise, 1.0 / len(self.measured)]
         return np.concatenate(
             [
-                [float(learnable.fitted.size), *settings],
+                [float(learnable.fitted.size), min(step / self.time, 0.5), self.noise],
                 learnable.scales,
                 np.diag(learnable.spread),
                 learnable.fitted,
@@ -552,31 +451,13 @@ class Adaptive(Block):
             return super().n_clipped(state)
         return self.fixed.n_clipped(state[: self.fixed.n_states])
 
-    # -- what is learnt ----------------------------------------------------------------------
+    # -- present model ------------------------------------------------------------------------
 
     def present(self, state: Array) -> Block:
         """Return the forward block with the parameters of a state, shape (n_states,)."""
         found = self.learnable.with_parameters(self._split(self._core_state(state))[2])
         before, _, behind = learning_part(self.forward)
         return Series((*before, found, *behind)) if isinstance(self.forward, Series) else found
-
-    def drift(self, state: Array) -> Drift:
-        """Return the change of the parameters since the fit, from a state, shape (n_states,)."""
-        learnable, groups = self.learnable, self.learnable.groups
-        limit = alarm_limit(self.time, len(groups))
-        _, theta, _, root, senses = self._split(self._core_state(state))
-        if not senses[READY::SENSES].any():
-            none = (0.0,) * len(groups)
-            return Drift(groups, none, (FIT_ERROR,) * len(none), limit, measured=False)
-        there = learnable.group_changes(theta)
-        steps = 1e-6 * np.diag(learnable.scales)
-        slopes = np.array([(learnable.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
-        usual, moved = float(senses[USUAL::SENSES].max()), learnable.whole_changes
-        left = np.divide(usual, moved, out=np.zeros(moved.size), where=moved > 0)
-        covariance = covariance_of(root, theta.size)
-        learnt = np.einsum("gi,ij,gj->g", slopes, covariance, slopes)
-        errors = np.sqrt(learnt + FIT_ERROR**2 + left**2)
-        return Drift(groups, vector(there), vector(errors), limit)
 
     def equations(self) -> tuple[str, ...]:
         """Return the equations of the inverse and of the parameter update."""

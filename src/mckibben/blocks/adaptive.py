@@ -26,7 +26,6 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import (
     Block,
-    Cost,
     Ports,
     Run,
     Start,
@@ -407,12 +406,6 @@ class Adaptive(Block):
                 learnable.numbers(sample_time),
             ]
         )
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of the inverse, plus three operations per number of the covariance."""
-        p = self.learnable.fitted.size
-        learnt = 6 * p * p + 20 * p
-        return self.fixed.cost(sample_time) + Cost(learnt, learnt)
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         run = Layout(self).bind if self.parts else super().bind

@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 from reprlib import Repr
@@ -50,23 +49,6 @@ Ports = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
 
 SEVERAL: Ports = ("driven",), ("scheduled",), ("given",)
 """Channel fields of blocks with several channels."""
-
-
-@dataclass(frozen=True)
-class Cost:
-    """Approximate number of arithmetic operations of a step: typical and maximum."""
-
-    usual: int
-    worst: int
-
-    def __add__(self, other: Cost) -> Cost:
-        return Cost(self.usual + other.usual, self.worst + other.worst)
-
-    @classmethod
-    def of(cls, numbers: Array, n_states: int) -> Cost:
-        """Return the cost of one pass: about two operations per coefficient, four per state."""
-        operations = 2 * numbers.size + 4 * n_states
-        return cls(operations, operations)
 
 
 class Block(DrawsItself, Parametrised):
@@ -308,10 +290,6 @@ class Block(DrawsItself, Parametrised):
         if step is None or (self.n_states and start is None):
             return ()
         return (step, start) if self.n_states and start is not None else (step,)
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of a step."""
-        return Cost.of(self.coefficients(sample_time), self.n_states)
 
     def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Yield name and values of every `increasing` field."""

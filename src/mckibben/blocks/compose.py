@@ -26,9 +26,6 @@ from mckibben.errors import ModelError
 from mckibben.registry import load
 from mckibben.system.compiling import in_turn
 
-DEEPEST, MOST_BLOCKS = 32, 1000
-"""Maximum depth of nested compositions, and maximum number of blocks."""
-
 AT_REST = ("first_sample", "fitted")
 """Start rules by which a block is at rest at its first input if no output is known."""
 
@@ -201,25 +198,10 @@ class Composition(Block):
     def dead_time(self) -> float:  # type: ignore[override]
         return type(self).together(part.dead_time for part in self.parts)
 
-    @property
-    def depth(self) -> int:
-        """Nesting depth of compositions, including this one."""
-        return 1 + max(getattr(part, "depth", 0) for part in self.parts)
-
-    @property
-    def n_blocks(self) -> int:
-        """Number of blocks, including compositions."""
-        return 1 + sum(getattr(part, "n_blocks", 1) for part in self.parts)
-
     def check_parts(self) -> None:
-        """Raise an error for no parts, or for more or more deeply nested parts than allowed."""
+        """Raise an error for no parts."""
         if not self.parts:
             raise ModelError(f"{self.kind!r} has no parts", remedy="give at least one block")
-        if self.depth > DEEPEST or self.n_blocks > MOST_BLOCKS:
-            raise ModelError(
-                f"{self.kind!r} is nested {self.depth} deep and made of {self.n_blocks} blocks",
-                remedy=f"compose at most {MOST_BLOCKS} blocks, at most {DEEPEST} deep",
-            )
 
     @cached_property
     def wiring(self) -> Layout:

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Cost, Start, explicit_state
+from mckibben.blocks.base import Block, Start, explicit_state
 from mckibben.blocks.fields import STRICT, Channel, Initial
 from mckibben.blocks.kernels import Step, kernel
 from mckibben.blocks.parameters import same_as
@@ -24,10 +24,6 @@ from mckibben.registry import load
 
 if TYPE_CHECKING:
     from mckibben.blocks.learning import Learnable
-
-USUAL_TRIALS, MOST_TRIALS = 12, 600
-"""Trials per step of an inverse without a closed form: typical on smooth references, and maximum.
-"""
 
 COMMANDS = ("pressure", "voltage")
 """Names of channels that drive a muscle."""
@@ -126,14 +122,6 @@ class Invertible(Block):
         """Adaptive parameters of the inverse; None if it has none."""
         return None
 
-    def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of a step of the inverse; by default one pass, or several trials."""
-        if self.solved:
-            once = self.cost(sample_time).usual
-            return Cost(USUAL_TRIALS * once, MOST_TRIALS * once)
-        numbers = self.inverse_numbers(self.coefficients(sample_time))
-        return Cost.of(numbers, self.n_inverse_states)
-
     def reachable(self) -> tuple[Array, Array]:
         """Return the lowest and highest outputs that are reachable from every state.
 
@@ -189,7 +177,6 @@ class Inverse(Block):
     n_states = same_as("forward.n_inverse_states")
     n_scratch = same_as("forward.n_inverse_scratch")
     start = same_as("forward.start")
-    cost = same_as("forward.inverse_cost")
     strictly_increasing = same_as("forward.strictly_increasing")
 
     def __post_init__(self) -> None:

@@ -22,7 +22,7 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Cost, Run, Start, explicit_state, needs_sample_time
+from mckibben.blocks.base import Block, Run, Start, explicit_state, needs_sample_time
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.fields import STRICT, Initial
@@ -32,7 +32,7 @@ from mckibben.blocks.inverse import Inverse, drives
 from mckibben.blocks.kernels import Step, fill, in_scratch, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
-from mckibben.blocks.planning import MOST_SWEEPS, clip_path, plan_path, plan_scratch
+from mckibben.blocks.planning import clip_path, plan_path, plan_scratch
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
@@ -475,14 +475,6 @@ class Predictive(Block):
         sizes = [self._planned.n_states, self._undoing.n_states, *map(len, own)]
         head = [len(low), self.horizon, *sizes, self.compensator.n_driven]
         return np.concatenate([head, NUDGE * (high - low), [change], low, high, *own])
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of the inverse over the horizon; at worst of all plans too."""
-        n, length = len(self.outputs), self.horizon
-        inverse = self.compensator.cost(sample_time).usual
-        answers = PASSES * (n + 1) * self._planned.cost(sample_time).usual
-        planned = PASSES * n * (1 if n == 1 else MOST_SWEEPS) * length * (20 * length + 4 * n)
-        return Cost(length * inverse, length * (inverse + answers + planned))
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         if self._kernels is not None:

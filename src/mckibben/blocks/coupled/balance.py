@@ -29,7 +29,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Cost, Ports, Start, needs_sample_time
+from mckibben.blocks.base import SEVERAL, Block, Ports, Start, needs_sample_time
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.balance_adaptive import learnable_balance
 from mckibben.blocks.coupled.balance_law import (
@@ -49,7 +49,6 @@ from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.learning import Learnable
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import newton_cost
 from mckibben.errors import ModelError, ModelWarning
 
 
@@ -492,15 +491,6 @@ class Balance(Invertible):
             f"{self.kind!r} found no equilibrium in {int(state[-1])} samples: the model was not made "
             "for such pressures"
         )
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost: about six operations per number, as friction is evaluated twice."""
-        operations = 6 * self.coefficients(sample_time).size
-        return Cost(operations, 20 * operations)
-
-    def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of the Newton steps."""
-        return newton_cost(4 * self.coefficients(sample_time).size + len(self.driven) ** 3)
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
         """Return the unit of a parameter: forces in N, or in the input's unit for relative areas."""

@@ -25,12 +25,12 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Cost
+from mckibben.blocks.base import SEVERAL
 from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import DERIVED, NOTHING, SLACK, fill, kernel, step
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import eliminate, newton_cost
+from mckibben.blocks.solving import eliminate
 from mckibben.errors import ModelError
 
 MOST_STEPS = 40
@@ -350,20 +350,6 @@ class FuzzyNetwork(Invertible):
         sets = [len(row) for row in self.centres]
         sizes = [len(sets), len(self.given), sum(sets), int(self.constants), max(sets)]
         return np.concatenate([[*sizes, *sets], self.pack()])
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of memberships and all rules."""
-        n = len(self.centres)
-        each = n + len(self.given) * (2 * n + 2)
-        operations = self._n_rules(n) * each + 10 * sum(map(len, self.centres))
-        return Cost(operations, operations)
-
-    def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of contracting the scheduling inputs, then of Newton steps."""
-        m, n = len(self.driven), len(self.centres)
-        once = self._n_rules(n) * m * (2 * n + 2) + 10 * sum(map(len, self.centres[m:]))
-        step = self._n_rules(m) * (2 * m + m * (6 * m + 2)) + 16 * sum(map(len, self.centres[:m]))
-        return Cost(once, once) + newton_cost(step + m**3)
 
     def _n_rules(self, n: int) -> int:
         """Return the number of combinations of the first inputs' sets."""

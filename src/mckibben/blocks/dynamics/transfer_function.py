@@ -17,11 +17,10 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block, one_per, own_sample_time
-from mckibben.blocks.dynamics.starts import free_responses, start_on
+from mckibben.blocks.dynamics.starts import start_on
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
-from mckibben.errors import ModelError, require
-from mckibben.recording import Recording
+from mckibben.errors import ModelError
 
 
 @step
@@ -152,53 +151,6 @@ class TransferFunction(Block):
         gain = self.gain if np.isfinite(self.gain) else 0.0
         b, f = self._padded()
         return np.array([self.input_offset, self.output_offset, *b, *f, gain])
-
-    def predict(self, recording: Recording, horizon: int = 1) -> Recording:
-        """Predict the output some samples ahead from measured outputs; not free-running.
-
-        Parameters
-        ----------
-        recording : Recording
-            With the input, which is known until the sample predicted, and the measured output.
-        horizon : int
-            Samples ahead, at least 1.
-
-        Returns
-        -------
-        Recording
-            The input, and the output predicted. Where the block's `initial` is "fitted", the state
-            before the first sample is that with the least one-step errors on this recording. The noise
-            before the first sample is taken to be zero.
-
-        Raises
-        ------
-        DataError
-            If the recording lacks a channel.
-        ModelError
-            If the horizon is not a positive whole number.
-        """
-        from scipy.signal import convolve, lfilter
-
-        whole = isinstance(horizon, int) and horizon >= 1
-        require(whole, "horizon", horizon, "a whole number of samples, 1 or more")
-        c, d = [1.0, *self.noise_numerator], [1.0, *self.noise_denominator]
-        name = self.output.name
-        inputs, measured = self._inputs_from(recording), recording[name]
-        fitted = self.initial == "fitted"
-        rest = self.simulate(
-            inputs, initial="first_sample" if fitted else None, sample_time=recording.sample_time
-        )[:, 0]
-        errors = np.asarray(lfilter(d, c, measured - rest))
-        if fitted and self.n_fitted:
-            places = range(self.n_fitted)
-            free = free_responses(self, inputs, recording.sample_time, places)
-            free = lfilter(d, c, free, axis=0)
-            errors = errors - free @ np.linalg.lstsq(free, errors, rcond=1e-12)[0]
-        # what an error does to the samples after it, of which there are no more than in the recording
-        ahead = lfilter(c, d, np.eye(1, min(horizon, len(errors)))[0])
-        predicted = measured - np.asarray(convolve(errors, ahead))[: len(errors)]
-        kept = recording.select([self.input.name])
-        return kept.with_channels({name: self.output.unit}, **{name: predicted})
 
     def inverse(self) -> TransferFunction:
         """Return the inverse filter.

@@ -618,6 +618,21 @@ def contact_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
     )
 
 
+def _braid_pressure(block: Any, displacement: float) -> float:
+    e = (displacement - block.offset) / block.rest_length
+    angle = block.braid_angle
+    geometry = 3 * (1 - e) ** 2 / math.tan(angle) ** 2 - 1 / math.sin(angle) ** 2
+    area = math.pi * block.diameter**2 / 4 * 0.1
+    force = block.load + block.stiffness * e + block.hardening * e**3
+    return float(force / (area * geometry))
+
+
+def braid_equilibrium(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    low, high = (float(end[0]) for end in block.reachable())
+    pressures = _column(inputs)
+    return _rows([bisect(lambda x: _braid_pressure(block, x), p, low, high) for p in pressures])
+
+
 def _polynomial_force(block: Any, length: float, p: float) -> float:
     x = (length - block.centre) / block.scale
     pull = math.fsum(g * x**power for power, g in enumerate(block.per_bar))
@@ -1129,6 +1144,8 @@ TWINS: dict[str, Twin] = {
     "balance-inverse": balance_inverse,
     "bouc-wen": stepping(_BoucWen),
     "bouc-wen-inverse": solved(_BoucWen),
+    "braid-equilibrium": braid_equilibrium,
+    "braid-equilibrium-inverse": memoryless(lambda block, x: _braid_pressure(block.forward, x)),
     "chou-hannaford": memoryless(_chou_hannaford),
     "coupled-memory": coupled_memory,
     "coupling": coupling,

@@ -25,6 +25,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "band": "mckibben.blocks.bands:Band",
         "banded": "mckibben.blocks.bands:Banded",
         "bouc-wen": "mckibben.blocks.hysteresis.differential:BoucWen",
+        "braid-equilibrium": "mckibben.blocks.force.braid_equilibrium:BraidEquilibrium",
         "chou-hannaford": "mckibben.blocks.force.laws:ChouHannaford",
         "contact": "mckibben.blocks.memoryless:Contact",
         "coupled-memory": "mckibben.blocks.coupled.coupled_memory:CoupledMemory",

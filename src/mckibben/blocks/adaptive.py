@@ -1,14 +1,15 @@
 """Adaptive inverses, which estimate parameters from measurements and remain exact.
 
-Inputs are those of the inverse, then what is measured of the references; outputs are the inverse's. With
-every measured sample the parameters of the model follow, see `mckibben.blocks.learning`; the
-inverse runs with them as they are, so that model and inverse match at every step.
+Inputs are those of the inverse, then the measurements of the references; outputs are the inverse's.
+Every measured sample updates the parameters of the model, see `mckibben.blocks.learning`. The inverse
+uses the updated parameters, so that model and inverse match at every step.
 
-A measurement answers the reference of the step before, as behind a compensator: since the model gives
-exactly what was asked for, what it predicts is known from the inverse's own memory. One part of a series
-learns (mpi, cpi, a balance behind its valves): parts behind it are undone on what is measured as on the
-reference, each with a memory of its own, and parts before it on what the inverse gives. What comes late
-by a dead time is moved on first by as much as the reference has gone on since (`Prompt`).
+A measurement belongs to the reference of the step before, as behind a compensator: the model's output
+equals the reference, so the prediction follows from the inverse's own state. In a series one part is
+adaptive (mpi, cpi, a balance behind its valves): the parts after it are inverted both for the
+measurement and for the reference, each with its own state; the parts before it are inverted for the
+output of the adaptive inverse. A measurement delayed by a dead time is first corrected by the change of
+the reference since then (`Prompt`).
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ class Prompt(Block):
     late : float
         Dead time [s].
     reference, measured : Channel
-        What is asked for, and measured of it.
+        Reference, and its measurement.
     """
 
     kind: ClassVar[str] = "prompt"
@@ -156,15 +157,15 @@ class Adaptive(Block):
     Parameters
     ----------
     forward : Block
-        The block undone, which declares what of it is learnt, or whose inverse does, as of a balance; or
-        a series of blocks, exactly one of which does.
+        The inverted block, which declares its adaptive parameters, or whose inverse does, as of a
+        balance; or a series of blocks, exactly one of which is adaptive.
     time : float
-        How long it takes to learn what the motion shows [s]; positive.
+        Adaptation time [s]; positive.
     noise : float
-        Standard deviation of what is measured [unit of the output]; smaller errors are not
+        Standard deviation of the measurement noise [unit of the output]; smaller errors are not
         distinguished.
     memory : sequence of float, optional
-        State to go on from, or what is learnt of it, as `resumed` keeps it; default is to start from
+        State to continue from, or its adaptive part, as `resumed` stores it; default is to start from
         the fit.
     """
 
@@ -351,7 +352,7 @@ class Adaptive(Block):
             return explicit_state(self, start)
         if len(start) == self.n_learnt:
             learnt = np.array(start)
-            self._split(learnt)[4][READY::SENSES] = 0.0  # the next measurement answers nothing
+            self._split(learnt)[4][READY::SENSES] = 0.0  # the next measurement has no prediction
             own = self.fixed.initial_state(asked, self.forward.start)
             return np.concatenate([own, np.zeros(self.learnable.n_more_states), learnt])
         state = self.initial_state(first, "first_sample")
@@ -371,7 +372,7 @@ class Adaptive(Block):
     def resumed(self, state: Array, memory: bool = True) -> Self:
         """Return this block with a given state as its initial state.
 
-        Without ``memory`` of its hysteresis it keeps what is learnt alone: muscles were vented since.
+        Without ``memory`` of the hysteresis only the adaptive part is stored, as after venting.
         """
         numbers = np.array(state, dtype=np.float64)
         for part, own in self.shares(numbers) or [(self, numbers)]:
@@ -475,10 +476,10 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive:
     model : Block
         One with a single adaptive part: pi, gpi, mpi, cpi, balance.
     time : float
-        How long it takes to learn what the motion shows [s].
+        Adaptation time [s].
     noise : float, optional
-        Standard deviation of what is measured [unit of the output]; default is a thousandth of what
-        can be reached.
+        Standard deviation of the measurement noise [unit of the output]; default is a thousandth of the
+        reachable range.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Inverses of blocks: one class for all, which runs the declared inverse kernel.
 
-An inverse takes the outputs of its field ``forward``, then what schedules that one, and gives its
+An inverse takes the outputs of its field ``forward``, then its scheduling inputs, and returns its
 driven inputs. Its state begins with the forward block's, unless it is shorter.
 """
 
@@ -160,7 +160,7 @@ class Inverse(Block):
     Parameters
     ----------
     forward : Block
-        The block undone, which declares how.
+        The inverted block, which declares how.
     """
 
     kind: ClassVar[str] = "inverse"
@@ -211,7 +211,7 @@ class Inverse(Block):
             return self.forward.inverse_state(self.forward.initial_state(first, start))
         state = explicit_state(self, start)
         if n <= self.n_states:
-            self.forward.initial_state(first, state[:n].tolist())  # which knows what states can be
+            self.forward.initial_state(first, state[:n].tolist())  # which checks it
         return state
 
     def coefficients(self, sample_time: float | None) -> Array:
@@ -252,6 +252,7 @@ def drives(channel: Channel) -> bool:
 def commands(block: Block) -> bool:
     """Return whether a block is an inverse whose outputs drive a muscle.
 
-    Not every inverse does: a forward model solved from a law of forces is one, and gives a displacement.
+    Not every inverse does: a forward model solved from a law of forces is an inverse too, and returns a
+    displacement.
     """
     return block.undoing and drives(block.outputs[0])

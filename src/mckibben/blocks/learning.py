@@ -188,10 +188,10 @@ def learn(
     if not UNMOVED < r < np.inf or weight < ABSURD:
         return False
     settled = share / (1.0 - share)
-    lacks = r < settled  # as where errors have grown: what is excited is learnt within the time
-    tells = 1.0 / settled - 1.0 / r
+    lacks = r < settled  # as where errors have grown: then it adapts within the time
+    excess = 1.0 / settled - 1.0 / r
     r *= weight
-    _spread(root, f, g, tells if lacks else weight * (1.0 - share - share / r))
+    _spread(root, f, g, excess if lacks else weight * (1.0 - share - share / r))
     gain = weight * error / scatter / (1.0 + r)
     for i in range(p):
         theta[i] += scales[i] * g[i] * gain

@@ -265,7 +265,7 @@ class Polynomial(Invertible):
     scale : float
         Input per argument; positive.
     input_range : (float, float), optional
-        Where the polynomial holds; its inverse wants it to increase there, and clips there.
+        Where the polynomial holds; its inverse requires that it increases there, and clips there.
     input, output : Channel
         Channel driven and channel given.
     """
@@ -394,7 +394,7 @@ class Exponential(Raised):
 # -- contact ---------------------------------------------------------------------------------
 
 LOST = 0.95
-"""Share of the smallest pressures without effect; keeps the map invertible."""
+"""Share of the smallest pressures without effect; so that the map remains invertible."""
 
 MOST_STEPS = 60
 """Maximum number of Newton steps; four to eight are needed."""

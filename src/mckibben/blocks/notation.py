@@ -1,6 +1,6 @@
 """Notation of models: equations in LaTeX, and symbol and unit of every parameter.
 
-A block declares both once, beside its fields; what a number means its docstring says already.
+A block declares both once, with its fields; their meanings are in its docstring.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ def model_state(compensator: Block, state: Array) -> Array:
     Raises
     ------
     ModelError
-        If the compensator is no exact inverse, or its state does not tell the model's.
+        If the compensator is no exact inverse, or its state does not determine the model's.
     """
     match compensator:
         case Inverse() if compensator.n_states >= compensator.forward.n_states:
@@ -371,8 +371,8 @@ class Predictive(Block):
         model_state(self._undoing, np.zeros(self._undoing.n_states))
         if strange := [c.name for c in self.outputs if not drives(c)]:
             raise ModelError(
-                f"{self.kind!r} plans what drives muscles, and {self.compensator.title!r} "
-                f"gives {', '.join(strange)}",
+                f"{self.kind!r} plans commands of muscles, and the outputs of "
+                f"{self.compensator.title!r} are {', '.join(strange)}",
                 remedy="give the compensator, from references to pressures",
             )
         low, high = self.pressures

@@ -1,20 +1,21 @@
 """Adaptation of a force balance to measurements, within its physical bounds.
 
-Of every muscle a constant force and four factors are learnt: on its springs and elasticity, its area,
-its friction, and what relaxes. Springs of coordinates go with the factors of the muscles that move them,
-in the shares of their work, by the root of both coordinates', so that they stay symmetric and positive.
-With R, the terms of `mckibben.blocks.coupled.balance_law`, coordinates follow by
+Adaptive parameters of every muscle are a constant force and four factors: on its springs and
+elasticity, its area, its friction, and its relaxation. Springs of coordinates change with the factors
+of the muscles that move them, in the shares of their work, by the root of both coordinates' factors, so
+that they remain symmetric and positive. With R, the terms of `mckibben.blocks.coupled.balance_law`,
+coordinates follow by
 
     dq / dtheta = -(dR / dq)^-1 dR / dtheta,
 
-stops and lags left out of dR / dq: a change that stays moves a motion as a whole, and its stops with it.
+without stops and lags in dR / dq: a lasting change moves the whole motion, and its stops with it.
 
-Factors keep to bounds within which areas outweigh friction, and stiffness what areas lose, so that there
-is one equilibrium. Stops and lags are displacements of the muscle, which the reference gives: memory
-stays as it is.
+Factors are bounded so that areas exceed friction, and stiffness exceeds the loss of area, which ensures
+one equilibrium. Stops and lags are displacements of the muscle, which follow from the reference: their
+states do not change.
 
-Where no load is measured, forces are known but for their unit, which is the area of muscle 1: that is
-not learnt, and a loss of area shows as springs and friction that grew.
+Where no load is measured, forces are relative to the area of muscle 1: that is not adapted, and a loss
+of area appears as stiffer springs and more friction.
 """
 
 from __future__ import annotations

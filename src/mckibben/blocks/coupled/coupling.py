@@ -42,8 +42,8 @@ class Coupling(Block):
     Parameters
     ----------
     gains : sequence of n sequences of m floats
-        G: row i is what muscle i gives to every muscle, or to every coordinate; 1 on the diagonal
-        where each gives itself what it gives. Finite; of full rank where an inverse is wanted.
+        G: row i is the contribution of muscle i to every muscle, or to every coordinate; 1 on the
+        diagonal where its own is the unit. Finite; of full rank where an inverse is wanted.
     driven, given : sequence of n and of m Channel
         Channels driven and channels given.
     """
@@ -107,8 +107,8 @@ class Coupling(Block):
                 f"{condition:.1e})",
                 remedy="identify it from runs in which each muscle is driven alone",
             )
-        undone = np.linalg.inv if len(self.driven) == len(self.given) else np.linalg.pinv
-        return Coupling(rows(undone(self.matrix)), self.given, self.driven)
+        invert = np.linalg.inv if len(self.driven) == len(self.given) else np.linalg.pinv
+        return Coupling(rows(invert(self.matrix)), self.given, self.driven)
 
     def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Return the range of each output over a box of inputs."""

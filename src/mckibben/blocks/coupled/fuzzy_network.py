@@ -6,7 +6,7 @@ for every combination, the normalised firing of a rule is the product of members
 by input, which are computed in the log domain, where nothing underflows far from all centres.
 
 For the inverse, known scheduling inputs are contracted away once a sample: what is left are rules of the
-driven inputs alone, each the mean of those it stands for, weighted by their firing. Slopes are exact:
+driven inputs alone, each the mean of those it replaces, weighted by their firing. Slopes are exact:
 with mu_s the normalised memberships of an input x_i, of Gaussian sets at c_s of width w_s,
 
     d ln mu_s / d x_i = sum_r mu_r (x_i - c_r) / w_r^2 - (x_i - c_s) / w_s^2.
@@ -123,7 +123,7 @@ def sloped_answer(
 ) -> None:
     """Fill the outputs at driven inputs, and the slope of every output (row) by each of these.
 
-    ``left`` is what `contract` fills; scratch are the memberships, and beside them their relative
+    ``left`` is what `contract` fills; scratch are the memberships, and their relative
     slopes, with one more for each driven input.
     """
     m, n, n_sets, most = x.size, int(c[0]), int(c[2]), int(c[4])

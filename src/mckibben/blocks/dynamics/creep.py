@@ -54,9 +54,9 @@ def creep_matrix(coefficients: Array, columns: Array, state: Array, found: Array
         for j in range(k):
             found[t, j] = columns[t, j]
         for i in range(n):
-            keeps, compliance = coefficients[i], coefficients[n + i]
+            decay, compliance = coefficients[i], coefficients[n + i]
             for j in range(k):
-                state[i, j] = keeps * state[i, j] + (1.0 - keeps) * columns[t, j]
+                state[i, j] = decay * state[i, j] + (1.0 - decay) * columns[t, j]
                 found[t, j] += compliance * state[i, j]
 
 
@@ -97,7 +97,7 @@ class Creep(Invertible):
         tau_k, how long each creep takes [s]; positive.
     initial : {"first_sample", "virgin", "fitted"}
         Where the elements are before the first sample: at rest at the first input, or at 0, or, on
-        recordings whose output is known, where that tells (else at rest at the first input).
+        recordings whose output is known, where that determines it (else at rest at the first input).
     input, output : Channel
         Channel driven and channel given.
     """

@@ -228,7 +228,7 @@ def _discretised(model: ProcessModel, sample_time: float | None) -> Array:
 def _state_space(model: ProcessModel) -> tuple[Array, Array, Array, float]:
     """Return A, B, C and D of the lags without delay, in controllable form.
 
-    The state is scaled so that it is (u, 0, ..., 0) at rest, which keeps digits of slow lags.
+    The state is scaled so that it is (u, 0, ..., 0) at rest, which preserves the digits of slow lags.
     """
     d = model.denominator()
     n = d.size - 1

@@ -2,8 +2,8 @@
 
 y_t - y_0 = B(q) / F(q) (u_t - u_0),  B = b_0 + b_1 q^-1 + ...,  F = 1 + f_1 q^-1 + ...
 
-Of the models named, B / F is what a free run needs; the noise model beside it, C / D, says what past
-errors tell of coming ones, and only `predict` looks at it. The inverse is F / B. It exists where the
+Of the models named, B / F is what a free run needs; the noise model C / D describes the
+correlation of its errors, and is not simulated. The inverse is F / B. It exists where the
 output answers at once (b_0 is not zero) and all zeros of B lie within the unit circle.
 """
 

@@ -123,7 +123,7 @@ class PI(Invertible):
     thresholds : sequence of float, length N
         Thresholds of the play operators, in the unit of the input: 0 <= r_0 < r_1 < ...
     weights : sequence of float, length N
-        Weights, output per input. The exact inverse wants r_0 = 0 and positive partial sums.
+        Weights, output per input. The exact inverse requires r_0 = 0 and positive partial sums.
     offset : float
         Constant of the output.
     input_range : (float, float), optional
@@ -254,7 +254,7 @@ class RateDependentPI(Invertible):
     rate_weights : sequence of float, length N
         k_i, output per input per rate.
     weights : sequence of float, length N
-        d_i, output per input at rest. The inverse wants r_0 = 0 and positive partial sums.
+        d_i, output per input at rest. The inverse requires r_0 = 0 and positive partial sums.
     offset : float
         Constant of the output.
     rate_time_constant : float

@@ -42,7 +42,7 @@ from peers_libraries import PEERS, Array, Peer, Run, Settings, Trial
 
 OURS = (
     *("balance", "balance-force", "gpi", "cpi", "preisach", "coupled-memory", "force-chou"),
-    "narx-play",
+    *("state-network", "narx-play", "bouc-wen-oscillator"),
 )
 
 BUDGET = 30.0

@@ -231,6 +231,51 @@ def gru(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate
     return simulate
 
 
+def jax_rnn(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
+    """Fit jax-sysid's recurrent network as its authors' script for the Bouc-Wen benchmark does.
+
+    Three states and 16 hidden units each for state and output, beside a linear model that starts it;
+    200 epochs of Adam, then L-BFGS. The test's start is learned from its known outputs alone.
+    """
+    del trials
+    jax, models = import_module("jax"), import_module("jax_sysid.models")
+    jax.config.update("jax_enable_x64", True)
+    gelu, states, hidden = jax.nn.gelu, 3, 16
+    inputs, outputs = runs[0][0].shape[1], runs[0][1].shape[1]
+    u, y = [u for u, _ in runs], [y for _, y in runs]
+
+    def step(x: Any, u: Any, params: Any) -> Any:
+        p = params
+        return p[0] @ x + p[1] @ u + p[5] @ gelu(p[3] @ x + p[4] @ u + p[6]) + p[7]
+
+    def output(x: Any, u: Any, params: Any) -> Any:
+        del u
+        p = params
+        return p[2] @ x + p[9] @ gelu(p[8] @ x + p[10]) + p[11]
+
+    linear = models.LinearModel(states, outputs, inputs, feedthrough=False)
+    linear.loss(rho_x0=1e-3, rho_th=1e-2)
+    linear.optimization(adam_epochs=0, lbfgs_epochs=1000, iprint=-1)
+    linear.fit(y, u)
+    rng = np.random.default_rng(how["seed"])
+    shapes: list[Any] = [(hidden, states), (hidden, inputs), (states, hidden), hidden, states]
+    shapes += [(hidden, states), (outputs, hidden), hidden, outputs]
+    small = [
+        0.1 * rng.standard_normal(n) if isinstance(n, tuple) else np.zeros((n,)) for n in shapes
+    ]
+    model = models.Model(states, outputs, inputs, state_fcn=step, output_fcn=output)
+    model.init([*linear.params, *small])
+    model.loss(rho_x0=1e-8, rho_th=1e-12)
+    model.optimization(adam_epochs=200, lbfgs_epochs=how["epochs"], iprint=-1)
+    model.fit(y, u)
+
+    def simulate(u: Array, known: Array) -> Array:
+        start = model.learn_x0(u[: len(known)], known, RTS_epochs=10, verbosity=False)
+        return np.asarray(model.predict(start, u)[0])
+
+    return simulate
+
+
 MUSCLE = """<mujoco>
   <option timestep="1" gravity="0 0 0"/>
   <worldbody><body><joint name="end" type="slide"/>
@@ -318,6 +363,13 @@ PEERS = (
         grid(lags=[1, 2, 3, 5], degree=[1, 2, 3], present=[True, False]),
     ),
     Peer(f"torch GRU {UNITS}", gru, grid(seed=[0, 1, 2]), seconds=4 * SECONDS, stops_early=True),
+    Peer(
+        "jax-sysid RNN",
+        jax_rnn,
+        grid(seed=[3], epochs=[500]),
+        seconds=1200.0,
+        sets=("bouc_wen_benchmark",),
+    ),
     Peer(
         "MuJoCo sysid", mujoco_sysid, grid(seed=[0]), seconds=300.0, sets=("festo_isometric_20mm",)
     ),

@@ -460,6 +460,38 @@ class _Duhem:
         return self.y
 
 
+def _oscillator(slope: Callable[[Any, float, float], float]) -> Twin:
+    """Return the twin of a mass-spring-damper with an element of a slope, from [block, z, y']."""
+
+    def twin(block: Any, inputs: Rows, sample_time: float) -> Rows:
+        def rates(x: list[float], u: float) -> list[float]:
+            y, v, z = x
+            pull = u - block.damping * v - block.stiffness * y - z
+            return [v, 1000.0 * pull / block.mass, v * slope(block, z, v)]
+
+        given = _column(inputs)
+
+        def taken(_: float, z: float) -> float:
+            f = slope(block, z, given[0])
+            return f / (block.stiffness + f)
+
+        z = _runge_kutta(taken, 0.0, 0.0, given[0], 64)
+        rest = [(given[0] - z) / block.stiffness, 0.0, z]
+        states = _states(rates, rest, given, block, sample_time / block.substeps)
+        return _rows([x[0] + (block.output_offset or 0.0) for x in states])
+
+    return twin
+
+
+def _bouc_wen_slope(block: Any, z: float, v: float) -> float:
+    return float(block.slope - block.gamma * _sign(v) * z - block.delta * abs(z))
+
+
+def _duhem_slope(block: Any, z: float, v: float) -> float:
+    slopes = block.rising if v > 0 else block.falling
+    return _lines(block.knots, slopes, min(max(z, block.knots[0]), block.knots[-1]))
+
+
 # -- dynamic models --------------------------------------------------------------------------
 
 
@@ -1115,6 +1147,21 @@ def pid(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return outputs
 
 
+def state_network(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    def rates(x: list[float], u: float) -> list[float]:
+        known = [*x, u, 1.0]
+        units = [math.tanh(_sum(tuple(row), known)) for row in block.hidden]
+        pairs = zip(block.linear, block.readout, strict=True)
+        return [_sum(own, known) + _sum(read, units) for own, read in pairs]
+
+    given = [(u - block.input_offset) / block.input_scale for u in _column(inputs)]
+    x = [0.0] * len(block.linear)
+    for _ in range(1000):
+        x = _step(rates, x, given[0], given[0], 0.1)
+    states = _states(rates, x, given, block, block.rate * sample_time / block.substeps)
+    return _rows([block.output_offset + block.output_scale * x[0] for x in states])
+
+
 def band(block: Any, inputs: Rows, sample_time: float) -> Rows:
     place = math.ceil(block.level * (len(block.scores[0]) - 1) - 1e-9)
     outputs = []
@@ -1144,6 +1191,7 @@ TWINS: dict[str, Twin] = {
     "balance-inverse": balance_inverse,
     "bouc-wen": stepping(_BoucWen),
     "bouc-wen-inverse": solved(_BoucWen),
+    "bouc-wen-oscillator": _oscillator(_bouc_wen_slope),
     "braid-equilibrium": braid_equilibrium,
     "braid-equilibrium-inverse": memoryless(lambda block, x: _braid_pressure(block.forward, x)),
     "chou-hannaford": memoryless(_chou_hannaford),
@@ -1155,6 +1203,7 @@ TWINS: dict[str, Twin] = {
     "creep-inverse": solved(_Creep),
     "duhem": stepping(_Duhem),
     "duhem-inverse": solved(_Duhem),
+    "duhem-oscillator": _oscillator(_duhem_slope),
     "eupi": stepping(_EUPI),
     "eupi-inverse": solved(_EUPI),
     "exponential": memoryless(lambda block, u: math.exp(u) - block.offset),
@@ -1188,6 +1237,7 @@ TWINS: dict[str, Twin] = {
     "prompt": prompt,
     "rate-dependent-pi": stepping(_RateDependentPI),
     "rate-dependent-pi-inverse": solved(_RateDependentPI),
+    "state-network": state_network,
     "tondu-lopez": memoryless(_tondu_lopez),
     "recurrent-fuzzy-network": recurrent_fuzzy_network,
     "transfer-function": transfer_function,

@@ -21,12 +21,13 @@ import numpy as np
 
 import mckibben
 from mckibben import registry
+from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
 from mckibben.blocks.saving import load
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 from mckibben.report.figures import write_figure
 from mckibben.rigs import load_rig, record
-from mckibben.signals import decaying_triangle
+from mckibben.signals import decaying_triangle, multisine
 from mckibben.signals.protocol import protocol
 from mckibben.signals.resampling import resample
 
@@ -45,6 +46,7 @@ PROTOCOLS = {
 
 SHORT = {"particles": 6, "iterations": 8, "n_rounds": 1}
 SETTINGS: dict[str, dict[str, object]] = {
+    "state-network": {"n_states": 3, "n_units": 6},
     "tsfnn": {"particles": 6, "iterations": 8},
     **dict.fromkeys(("coupled-pi", "sdchm", "sdchm-published"), SHORT),
 }
@@ -92,6 +94,17 @@ def activated() -> list[Recording]:
     ]
 
 
+@cache
+def benchmark() -> list[Recording]:
+    """Return what the system of the Bouc-Wen benchmark does (Noel and Schoukens, 2016), as printed."""
+    system = BoucWenOscillator(2.0, 0.01, 50.0, 50.0, 0.8, -1.1)
+    clock = np.arange(1500) / 750.0
+    force = multisine(clock, 1.0, 20.0, 120.0, -120.0, "random", seed=0)
+    given = system.simulate(Recording({"force": force}, 1.0 / 750.0))["displacement"]
+    made = {"rig": "Bouc-Wen benchmark (virtual)"}
+    return [Recording({"force": force, "displacement": given}, 1.0 / 750.0, meta=made)]
+
+
 MUSCLES = tuple(f"pressure_{place}" for place in (1, 2, 3))
 MOVED = tuple(f"displacement_{place}" for place in (1, 2, 3))
 
@@ -99,6 +112,7 @@ TASKS: dict[str, Callable[[], Task]] = {
     "muscle": lambda: Task(lifted(), ("pressure",), ("displacement",)),
     "force": lambda: Task(recorded("multistate-friction"), ("length",), ("force",)),
     "activation": lambda: Task(activated(), ("contraction",), ("pressure",)),
+    "mass": lambda: Task(benchmark(), ("force",), ("displacement",), picture="fit"),
     "load": lambda: Task(recorded("mpi-narmax"), ("voltage",), ("displacement",), ("force",)),
     "air": lambda: Task(recorded("mpi-narmax"), ("voltage",), ("pressure",)),
     "arm": lambda: Task(recorded("sdchm"), MUSCLES, MOVED, ("pressure_extensor",)),

@@ -1,4 +1,4 @@
-"""Hysteresis as differential equations: bounds and energy.
+"""Hysteresis as differential equations: bounds, energy, oscillators solved by others.
 
 Kernels agree with their twins in `tests.contracts.test_twins`.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,10 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mckibben import Parallel, Recording
+from mckibben import ModelError, Parallel, Recording
 from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.multistate_friction import EIGHTEEN, MultistateFriction
 from mckibben.blocks.hysteresis.differential import BoucWen, GeneralizedBoucWen
+from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator, DuhemOscillator
 from mckibben.papers.paper import printed
 
 Array = NDArray[np.float64]
@@ -31,6 +33,45 @@ def test_hysteretic_states_stay_within_their_bounds(turns: list[float], sigma: f
     wide = replace(GeneralizedBoucWen.example(), polynomial=(0.0,), weight=1.0)
     bound = (1.0 - np.abs(wide.shape).sum()) ** (-1.0 / wide.exponent)
     assert np.abs(wide.simulate(turns)).max() <= bound + 1e-12
+
+
+STEP = 1 / 750
+HARD = BoucWenOscillator(2.0, 0.01, 50.0, 50.0, 0.8, -1.1)
+"""Whose loops harden, of 35 Hz."""
+
+
+@pytest.mark.parametrize("model", [HARD, DuhemOscillator.example()])
+@pytest.mark.parametrize("force", [-3.0, 2.0])
+def test_it_rests_where_a_slow_force_leads(model: Any, force: float) -> None:
+    held = model.simulate(np.full(200, force), sample_time=STEP)
+    np.testing.assert_allclose(held, held[0], rtol=1e-12)
+    ramp = np.interp(np.arange(40_000), [0, 30_000], [0.0, force])
+    slow = replace(model, damping=2.0).simulate(ramp, sample_time=0.002, initial="virgin")
+    assert slow[-1] == pytest.approx(held[0], rel=2e-3)
+
+
+def test_steady_state_is_what_a_force_that_repeats_leads_to() -> None:
+    """A band-limited period gives the response of the same one sampled more finely."""
+    rng, n, ratio = np.random.default_rng(0), 300, 5
+    lines = np.zeros(n // 2 + 1, dtype=complex)
+    lines[4:30] = np.exp(2j * np.pi * rng.random(26))
+    u = np.fft.irfft(lines, n) * 600.0
+    steady = HARD.steady_state(Recording({"force": u}, STEP))["displacement"]
+    fine = np.fft.irfft(np.append(lines, np.zeros((20 * ratio - 1) * n // 2)), 20 * ratio * n)
+    fine *= 600.0 * 20 * ratio
+    finely = replace(HARD, substeps=1)
+    long = finely.simulate(np.tile(fine, 8), sample_time=STEP / (20 * ratio))
+    late = long[-fine.size :: 20 * ratio]
+    np.testing.assert_allclose(steady, late, atol=2e-4 * np.ptp(late))
+    from_rest = HARD.simulate(u, sample_time=STEP)
+    assert np.abs(from_rest - late).max() > 0.05 * np.ptp(late)
+
+
+def test_a_response_that_never_repeats_is_told() -> None:
+    undamped = BoucWenOscillator(2.0, 0.0, 50.0, 50.0, 0.0, 0.0)
+    shaken = Recording({"force": np.sin(np.arange(40.0))}, STEP)
+    with pytest.raises(ModelError):
+        undamped.steady_state(shaken)
 
 
 # -- friction of several elements ----------------------------------------------------------------

@@ -10,7 +10,7 @@ import pytest
 from mckibben import GPI, PI, RateDependentPI, Recording, Series
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.creep import Creep
-from mckibben.blocks.free_run import measured_start, run_free
+from mckibben.blocks.free_run import PERIODIC, measured_start, run_free
 
 T = np.linspace(0, 1, 800)
 U = 2.5 + 2.0 * np.sin(17 * T) * (1 - 0.5 * T) - 0.4 * np.sin(50 * T)
@@ -64,6 +64,16 @@ def test_only_the_first_measured_output_is_looked_at() -> None:
         run_free(block, recording.with_channels(displacement=spoilt), "displacement"),
         run_free(block, recording, "displacement"),
     )
+
+
+def test_of_a_period_that_comes_again_no_start_counts() -> None:
+    block = RateDependentPI.example()
+    wave = 2.5 + 2.0 * np.sin(2 * np.pi * np.arange(200) / 200)
+    recording = recorded(block, np.tile(wave, 3)).slice(200, 400)
+    found = run_free(block, recording.with_meta(**{PERIODIC: True}), "displacement")
+    expected = block.simulate(np.tile(wave, 2), sample_time=0.01)[200:]
+    np.testing.assert_array_equal(found, expected)
+    assert not np.array_equal(found, block.simulate(wave, sample_time=0.01))
 
 
 def test_the_blocks_own_rule_starts_what_has_come_just_now() -> None:

@@ -26,9 +26,11 @@ from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
 from mckibben.blocks.dynamics.narx import NarxPolynomial
+from mckibben.blocks.dynamics.state_network import StateNetwork
 from mckibben.blocks.fields import vector
 from mckibben.blocks.force.multistate_friction import deflected
 from mckibben.blocks.hysteresis.differential import flow
+from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
 from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach, _output, _solve, everett
 from mckibben.blocks.laws import wander
 from mckibben.blocks.solving import eliminate, solve_near
@@ -314,6 +316,8 @@ VARIANTS: dict[str, tuple[Any, float, list[float]]] = {
         )
         for exponent in (1, 2)
     },
+    "held force, Bouc-Wen": (replace(BoucWenOscillator.example(), hold="zero"), 0.01, [5.0]),
+    "held force, network": (replace(StateNetwork.example(), hold="zero"), 0.01, [5.0]),
 }
 
 

@@ -22,8 +22,10 @@ from mckibben import (
 )
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.dynamics.air import Air
+from mckibben.blocks.dynamics.state_network import StateNetwork
 from mckibben.blocks.fields import LONGEST_DELAY, vector
 from mckibben.blocks.hysteresis.envelopes import Exponential, Tanh
+from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
 from mckibben.blocks.laws import examples
 
 EXAMPLES = examples()
@@ -62,6 +64,8 @@ UNUSUAL: list[Block] = [
     replace(AIR, ambient=None, supply=None),
     replace(AIR, dead_time=0.01 * LONGEST_DELAY),
     replace(AIR, dead_time=0.01 * LONGEST_DELAY).inverse(),
+    replace(BoucWenOscillator.example(), hold="zero"),
+    replace(StateNetwork.example(), hold="zero"),
     TIMELESS,
     TIMELESS.inverse(),
 ]

@@ -63,6 +63,7 @@ KINDS = {
     "activated": Kind(("contraction",), ("pressure",), "activated", ("force",)),
     "commanded": Kind(("voltage",), ("pressure",), "commanded"),
     "loaded": Kind(("pressure",), ("displacement",), "lifted", ("force",)),
+    "shaken": Kind(("force",), ("displacement",), "shaken"),
     "two muscles": Kind(
         ("pressure_1", "pressure_2"),
         ("displacement_1", "displacement_2"),

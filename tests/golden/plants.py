@@ -108,6 +108,26 @@ def commanded(run: int) -> Recording:
     return Recording({"voltage": volts, "pressure": p}, STEP)
 
 
+def shaken(run: int) -> Recording:
+    """A mass on a spring beside a Bouc-Wen element, shaken by a force from rest."""
+    t, fine = np.arange(N) * STEP, 20
+    force = sum(
+        a * np.sin(w * t + run)
+        for a, w in zip((9.0, 6.0, 5.0, 3.0), (1.9, 4.1, 6.8, 11.0), strict=True)
+    )
+    h, y, v, z = STEP / fine, 0.0, 0.0, 0.0
+    out = np.empty(N)
+    for k in range(N):
+        out[k] = y
+        end = force[min(k + 1, N - 1)]
+        for s in range(fine):
+            f = force[k] + (end - force[k]) * (s + 0.5) / fine
+            z += h * (8.0 * v - 4.0 * abs(v) * z - 2.0 * v * abs(z))
+            v += h * (f - 0.8 * v - (20.0 - 6.0 * (run // 2)) * y - 4.0 * z)
+            y += h * v
+    return Recording({"force": force, "displacement": out + noise(run, 0.002)}, STEP)
+
+
 def arm(run: int, levels: int = 2) -> Recording:
     """Two muscles round an extensor: of three runs each muscle alone, then both; by stiffness."""
     alone = ((1.0, 0.0), (0.0, 1.0), (1.0, 0.7))[run % 3]
@@ -153,6 +173,8 @@ PLANTS: dict[str, tuple[Callable[[int], Recording], range]] = {
     "activated-rougher": (activated, range(2, 4)),
     "commanded": (commanded, range(2)),
     "commanded-slower": (commanded, range(2, 4)),
+    "shaken": (shaken, range(2)),
+    "shaken-softer": (shaken, range(2, 4)),
     "lifted": (lifted, range(4)),
     "lifted-stiffer": (lifted, range(4, 8)),
     "arm": (arm, range(6)),

@@ -17,6 +17,9 @@ from mckibben.recording import Recording
 
 Mask = NDArray[np.bool_]
 
+PERIODIC = "periodic"
+"""Key in the ``meta`` of a recording that is one period of a periodic motion."""
+
 AWAY = 1e3
 """Error, in ranges of the measured output, above which a model has diverged."""
 
@@ -53,6 +56,9 @@ def run_free(
         If the output is not finite.
     """
     outputs = (output,) if isinstance(output, str) else output
+    if recording.meta.get(PERIODIC):
+        repeated = _repeated(block, recording, outputs)
+        return repeated[:, 0] if isinstance(output, str) else repeated
     before = predecessor(recording, known)
     rows = [np.ones(len(r), dtype=bool) for r in known] if known_rows is None else known_rows
     if before is not None:
@@ -84,6 +90,17 @@ def refuse_runaway(block: Block, recording: Recording, modelled: Array, measured
             remedy="see whether units are those that it was identified in; if so, this "
             "model does not suit these data: identify it again",
         )
+
+
+def _repeated(block: Block, recording: Recording, outputs: Sequence[str]) -> Array:
+    """Return the periodic response to a repeated period: at least the second."""
+    if hasattr(block, "steady_state"):
+        return block.steady_state(recording).matrix(outputs)
+    names = [channel.name for channel in block.inputs]
+    twice = np.tile(recording.matrix(names), (2, 1))
+    found = block.simulate(twice, sample_time=recording.sample_time)[len(recording) :]
+    given = [channel.name for channel in block.outputs]
+    return np.asarray(found[:, [given.index(name) for name in outputs]])
 
 
 def known_start(

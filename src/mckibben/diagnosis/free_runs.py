@@ -10,7 +10,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, check_units
-from mckibben.blocks.free_run import measured_start, refuse_runaway, run_free
+from mckibben.blocks.free_run import PERIODIC, measured_start, refuse_runaway, run_free
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError
 from mckibben.recording import Recording
@@ -111,7 +111,7 @@ def _modelled(
     tried, and the block's own rule.
     """
     free = run_free(block, recording, outputs, recordings)
-    if block.n_states == 0:
+    if block.n_states == 0 or recording.meta.get(PERIODIC):
         return free
     tried = [block.simulate(recording).matrix(outputs), free]
     if not np.mean((tried[0] - free) ** 2) > 0:

@@ -6,7 +6,7 @@ A folder without that file, and of a name in ``known``, is read by the descripti
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from importlib import resources
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
+from mckibben.blocks.free_run import PERIODIC
 from mckibben.comparison.planning import N_FOLDS
 from mckibben.comparison.splits import FEWEST
 from mckibben.errors import DataError
@@ -103,6 +104,11 @@ class Split(_Strict):
         Sample time of all [s].
     gaps : {"error", "split", "interpolate"}
         As of `mckibben.read`.
+    period : int, optional
+        Samples after which the motion repeats itself: recordings are cut into periods, in which no
+        start counts.
+    periodic : list of str
+        Patterns of the names of recordings that do; default all.
     tasks : list of Task
         Default one, with the last quarter to test on.
     """
@@ -111,6 +117,8 @@ class Split(_Strict):
     about: str = ""
     resample: Annotated[float, Field(gt=0)] | None = None
     gaps: Literal["error", "split", "interpolate"] = "interpolate"
+    period: Annotated[int, Field(ge=FEWEST)] | None = None
+    periodic: list[str] = ["*"]
     tasks: Annotated[list[Task], Field(min_length=1)] = [Task()]
 
     @field_validator("tasks")
@@ -154,7 +162,9 @@ class Set:
         with describing(self.folder, self.description):
             for path in inside(self.folder):
                 for one in read(path, gaps=split.gaps, informative=False):
-                    found.append(one if split.resample is None else resample(one, split.resample))
+                    even = one if split.resample is None else resample(one, split.resample)
+                    periodic = split.period is not None and matches(one.name, split.periodic)
+                    found += _periods(even, split.period or 0) if periodic else [even]
         return found
 
     def tasks(self) -> Iterator[Task]:
@@ -168,6 +178,14 @@ class Set:
 def matches(name: str, patterns: Sequence[str]) -> bool:
     """Return whether a name matches one of some patterns."""
     return any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def _periods(one: Recording, length: int) -> list[Recording]:
+    if len(one) % length:
+        problem = f"{len(one)} samples are not a whole number of periods of {length}"
+        raise DataError(problem, file=one.source, remedy="correct period in [split]")
+    parts = (one.slice(start, start + length) for start in range(0, len(one), length))
+    return [replace(part, start_time=0.0).with_meta(**{PERIODIC: True}) for part in parts]
 
 
 def sets_in(folder: Path) -> list[Set]:

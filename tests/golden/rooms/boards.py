@@ -65,8 +65,11 @@ MEASURED: Mapping[str, str] = {
     "festo_isometric_20mm": "force-petrovic,force-schindele",
     "sma_wing": "pi,mpi,kp,preisach",
     "soft_arm_three_muscles": "coupled-memory",
+    "bouc_wen_benchmark": "pi,p2uz",
 }
 """Set of shared recordings -> models."""
+
+SLOW = {"bouc_wen_benchmark"}
 
 TIED = {"muscle-thinned", "festo_dmsp10_levels", "festo_isometric_20mm"}
 """Boards on which two models are as good, and the last bits choose."""
@@ -147,5 +150,6 @@ def cases() -> Iterator[Case]:
             partial(measured, name, models),
             TOLERANCES,
             needs=(name,),
+            slow=name in SLOW,
             one_machine=name in TIED,
         )

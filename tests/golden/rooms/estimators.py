@@ -24,6 +24,7 @@ SENT = {"input": "voltage", "output": "pressure"}
 STOPS = {"n_stops": 3, "n_lags": 1, "elasticity": 3}
 MEMORY = {"memory": "pi", "memory_settings": {"n_operators": 4}, "n_sets": 1, "n_friction": 2}
 SWARM = {"particles": 6, "iterations": 4, "search_samples": 400}
+SHAKEN = {"substeps": 4}
 
 SINGLE: Mapping[str, Mapping[str, Any]] = {
     "armax": {},
@@ -84,6 +85,11 @@ SHOWN: Mapping[tuple[str, str], Mapping[str, Mapping[str, Any]]] = {
         "narx": SENT | {"n_terms": 6},
         "narx-network": SENT | {"n_units": 2, "n_starts": 4},
     },
+    ("shaken", "shaken-softer"): {
+        "bouc-wen-oscillator": SHAKEN,
+        "duhem-oscillator": SHAKEN,
+        "state-network": {"substeps": 1, "n_states": 2, "n_units": 1, "n_steps": 100},
+    },
     ("lifted", "lifted-stiffer"): {
         "balance": STOPS | LOADED,
         "coupled-memory": LOADED,
@@ -93,7 +99,7 @@ SHOWN: Mapping[tuple[str, str], Mapping[str, Mapping[str, Any]]] = {
 }
 """Two plants -> the estimators fitted to both, with settings that make it quick."""
 
-CHANCE: Mapping[str, float] = {"narx-network": 0.05, "sdchm-published": 0.05}
+CHANCE: Mapping[str, float] = {"narx-network": 0.05, "sdchm-published": 0.05, "state-network": 0.05}
 """Model -> how far its errors and response may move: trained from chance, last bits choose."""
 
 SAMPLES = 30

@@ -6,13 +6,14 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, get_type_hints
 from unittest.mock import patch
 
 import numpy as np
+from scipy.io import loadmat
 
 import mckibben
 from mckibben import MckibbenError, Recording, registry
@@ -70,6 +71,51 @@ def _loops_in_steps() -> list[Recording]:
     p = 3 - 3 * np.abs(2 * ((t / 10) % 1) - 1)
     y = 4 * play(p, 0.3) + 2 * play(p, 0.8) + noise(0, 0.02, len(p))
     return [Recording({"pressure": p, "displacement": y}, STEP)]
+
+
+def small_black_box(folder: Path) -> Tree:
+    """A network of states that is better by cross-validation is chosen."""
+    del folder
+    return _chosen(runs("shaken"))
+
+
+def black_box(folder: Path) -> Tree:
+    """The same on half a period of the Bouc-Wen benchmark, and half of its test."""
+    del folder
+    parts = []
+    for u, y in (("uest", "yest"), ("uval", "yval")):
+        found = []
+        for name in (u, y):
+            content = loadmat(recordings.MEASURED / "bouc_wen_benchmark" / f"{name}_multisine.mat")
+            (key,) = (key for key in content if not key.startswith("_"))
+            found.append(content[key][0, :4096].astype(float))
+        channels = {"force": found[0], "displacement": 1000.0 * found[1]}
+        parts.append(Recording(channels, 1 / 750))
+    return _chosen(parts[0], parts[1], n_folds=1, n_units=5)
+
+
+def _chosen(
+    train: Recording | Sequence[Recording],
+    test: Recording | Sequence[Recording] = (),
+    n_folds: int = 5,
+    n_units: int = 2,
+) -> Tree:
+    """Return which of a network and a linear model is better where they are validated, and chosen."""
+    board = mckibben.compare(
+        train,
+        test,
+        inputs="force",
+        outputs="displacement",
+        models=("state-network", "p2uz"),
+        settings={"state-network": {"n_units": n_units, "n_steps": 60, "substeps": 1}},
+        n_folds=n_folds,
+        jobs=1,
+    ).to_dict()
+    errors = {row["model"]: row["validation_rmse"] for row in board["rows"]}
+    return {
+        "network is better": errors["state-network"] < errors["p2uz"],
+        "chosen": board["chosen"],
+    }
 
 
 def damper(folder: Path) -> Tree:
@@ -282,6 +328,12 @@ CASES: Mapping[str, tuple[str, Callable[[Path], Tree], Mapping[str, Any]]] = {
         )
         for model in SCALED
     },
+    "state-network": ("mckibben.compare, a network beside p2uz", small_black_box, {}),
+    "state-network-benchmark": (
+        "mckibben.compare, a network beside p2uz",
+        black_box,
+        {"needs": ("bouc_wen_benchmark",), "slow": True},
+    ),
     "damper": ("mckibben characterize damper.csv", damper, {}),
     "seal": ("mckibben study seal.csv", seal, {"needs": ("foreign_friction",)}),
     "contraction": ("track(compensator of contraction, rig, mm)", contraction, {}),

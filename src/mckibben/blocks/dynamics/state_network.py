@@ -1,0 +1,236 @@
+"""Nonlinear state-space model in continuous time: a linear part and a layer of tanh units.
+
+x' = rate (L [x, u, 1] + R tanh(H [x, u, 1])),
+output = offset + scale x_1,
+
+with u the input less its offset, over its scale. From sample to sample the input goes in a straight
+line or stays; the equations are integrated by the classic Runge-Kutta method in substeps. Nothing is
+known of what is modelled but the number of its states.
+
+Source: Suykens, De Moor and Vandewalle, "Nonlinear system identification using neural state space
+models", 1995; in continuous time, as neural ordinary differential equations.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Self
+
+import numpy as np
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks import fields
+from mckibben.blocks.base import Block, Cost, needs_sample_time, one_per
+from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.errors import ModelError
+
+HEAD = 9
+"""Number of coefficients before the weights."""
+
+SETTLING, SETTLING_STEP = 1000, 0.1
+"""Number of steps in which an initial equilibrium is reached, and their length in units of 1 /
+rate.
+"""
+
+FASTEST = 2.5
+"""Largest substep, in units of 1 / rate."""
+
+
+@kernel
+def rates(weights: Array, n: int, units: int, x: Array, u: float, found: Array) -> None:
+    """Fill in x', in units of the rate; weights are [L, H, R], row by row."""
+    width = n + 2
+    hidden, readout = n * width, n * width + units * width
+    for i in range(n):
+        found[i] = weights[i * width + n] * u + weights[i * width + n + 1]
+        for j in range(n):
+            found[i] += weights[i * width + j] * x[j]
+    for h in range(units):
+        row = hidden + h * width
+        s = weights[row + n] * u + weights[row + n + 1]
+        for j in range(n):
+            s += weights[row + j] * x[j]
+        a = math.tanh(s)
+        for i in range(n):
+            found[i] += weights[readout + i * units + h] * a
+
+
+@kernel
+def advance(
+    weights: Array, n: int, units: int, x: Array, start: float, rise: float, h: float, work: Array
+) -> None:
+    """Take a Runge-Kutta step; work has room for 3 n numbers."""
+    at, k, total = work[:n], work[n : 2 * n], work[2 * n : 3 * n]
+    rates(weights, n, units, x, start, k)
+    for i in range(n):
+        total[i] = k[i]
+        at[i] = x[i] + 0.5 * h * k[i]
+    rates(weights, n, units, at, start + 0.5 * rise, k)
+    for i in range(n):
+        total[i] += 2.0 * k[i]
+        at[i] = x[i] + 0.5 * h * k[i]
+    rates(weights, n, units, at, start + 0.5 * rise, k)
+    for i in range(n):
+        total[i] += 2.0 * k[i]
+        at[i] = x[i] + h * k[i]
+    rates(weights, n, units, at, start + rise, k)
+    for i in range(n):
+        x[i] += h / 6.0 * (total[i] + k[i])
+
+
+@step
+def state_network_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
+    """Advance the model; the state is [x, last input].
+
+    Coefficients are [substep by rate, how many, 1 for zero-order hold, states, units, offset and scale
+    of the input, of the output, weights].
+    """
+    h, count, held = coefficients[0], int(coefficients[1]), coefficients[2] > 0.0
+    n, units = int(coefficients[3]), int(coefficients[4])
+    weights = coefficients[HEAD:]
+    last = (state[n] - coefficients[5]) / coefficients[6]
+    now = (inputs[0] - coefficients[5]) / coefficients[6]
+    rise = 0.0 if held else (now - last) / count
+    for s in range(count):
+        advance(weights, n, units, state, last + s * rise, rise, h, scratch)
+    state[n] = inputs[0]
+    outputs[0] = coefficients[7] + coefficients[8] * state[0]
+
+
+@kernel
+def state_network_start(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start in equilibrium with the first input, or with zeros."""
+    state[:] = 0.0
+    if not virgin:
+        n, units = int(coefficients[3]), int(coefficients[4])
+        u = (inputs[0] - coefficients[5]) / coefficients[6]
+        for _ in range(SETTLING):
+            advance(coefficients[HEAD:], n, units, state, u, 0.0, SETTLING_STEP, scratch)
+        state[n] = inputs[0]
+
+
+@dataclass(frozen=True, kw_only=True, config=fields.STRICT)
+class StateNetwork(Block):
+    """State-space model of a linear part and tanh units.
+
+    Parameters
+    ----------
+    linear : rows of float, shape (n, n + 2)
+        L: for every state the weights of all, of the input, and a constant.
+    hidden : rows of float, shape (units, n + 2)
+        H: the same for every unit.
+    readout : rows of float, shape (n, units)
+        R: for every state the weights of the units.
+    rate : float
+        Of time [1/s]; positive.
+    input_offset, input_scale, output_offset, output_scale : float
+        Scales positive.
+    substeps : int
+        Runge-Kutta steps from sample to sample.
+    hold : {"first", "zero"}
+        What the input does between samples: go on in a straight line, or stay.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: as after the first input has long been held, or states
+        and input 0.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind = "state-network"
+    kernel = state_network_step
+    start_kernel = state_network_start
+    rate_dependent = True
+    steady_state = steady_state
+    parameters = ("linear", "hidden", "readout")
+    n_states = one_per("linear", 1)  # states, and the last input
+    notation = Notation(
+        r"\dot{x} = \lambda \left(L v + R \tanh(H v)\right),\quad v = \left(x,\, \frac{u "
+        r"- u_0}{u_s},\, 1\right)",
+        "y = y_0 + y_s x_1",
+        linear="L_{ij}",
+        hidden="H_{ij}",
+        readout="R_{ij}",
+        rate=r"\lambda [1/s]",
+        input_offset="u_0 [{u}]",
+        input_scale="u_s [{u}]",
+        output_offset="y_0 [{y}]",
+        output_scale="y_s [{y}]",
+    )
+
+    linear: fields.Rows
+    hidden: fields.Rows
+    readout: fields.Rows
+    rate: fields.Positive
+    input_offset: FiniteFloat = 0.0
+    input_scale: fields.Positive = 1.0
+    output_offset: FiniteFloat = 0.0
+    output_scale: fields.Positive = 1.0
+    substeps: Substeps = 1
+    hold: Hold = "first"
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        n, units = len(self.linear), len(self.hidden)
+        wide = [len(row) for row in (*self.linear, *self.hidden)]
+        read = [len(row) for row in self.readout]
+        if not n or not units or {*wide} != {n + 2} or read != [units] * n:
+            raise ModelError(
+                f"{self.kind!r} has rows of weights of lengths {wide} and {read} for {n} "
+                f"states and {units} units",
+                remedy=f"give {n + 2} weights a state, {n + 2} a unit, and for every state "
+                f"{units} weights of units",
+            )
+
+    @property
+    def n_scratch(self) -> int:
+        """Scratch: a state, its rates, and their sum."""
+        return 3 * len(self.linear)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return the coefficients for a sample time."""
+        step = self.rate * needs_sample_time(self.kind, sample_time) / self.substeps
+        if not step <= FASTEST:
+            raise ModelError(
+                f"{self.kind!r} of a rate of {self.rate:.3g} 1/s is too fast for "
+                f"{self.substeps} substep(s) of {sample_time:g} s together",
+                remedy=f"at least {np.ceil(3 * step * self.substeps):.0f} substeps, or a "
+                "shorter sample time",
+            )
+        head = [step, self.substeps, self.hold == "zero", len(self.linear), len(self.hidden)]
+        scales = [self.input_offset, self.input_scale, self.output_offset, self.output_scale]
+        return np.array([*head, *scales, *self.pack()])
+
+    def cost(self, sample_time: float | None) -> Cost:
+        """Return the cost of a step: every weight four times per substep, and activations."""
+        operations = self.substeps * 4 * (2 * self.n_parameters + 20 * len(self.hidden))
+        return Cost(operations, operations)
+
+    def start_numbers(self) -> Array:
+        """Return the coefficients at an admissible sample time."""
+        return self.coefficients(1.0 / self.rate)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return an oscillator with a hardening spring."""
+        linear = ((0.0, 1.0, 0.0, 0.0), (-1.5, -0.4, 1.0, 0.0))
+        return cls(
+            linear=linear,
+            hidden=((1.0, 0.1, 0.0, 0.1), (0.2, 1.0, 0.1, -0.2)),
+            readout=((0.0, 0.02), (0.6, -0.2)),
+            rate=15.0,
+            input_offset=1.0,
+            input_scale=3.0,
+            output_offset=0.5,
+            output_scale=2.0,
+            substeps=2,
+        )

@@ -1,0 +1,335 @@
+"""A mass with spring, damper and a hysteretic element inside the dynamic loop.
+
+m y'' + c y' + k y + z = u,
+z' = f(z, y') y'.
+
+The force u drives, the displacement y is given, and the force z of the element moves with y alone, at
+whatever pace: its slope f depends on z and on the direction of y'. Models differ in f.
+
+The Bouc-Wen element has f = a - gamma sgn(y') z - delta |z|; of the common form,
+z' = alpha y' - beta (gamma |y'| z + delta y' |z|), gamma and delta are the products with beta. Both may
+have either sign; gamma makes loops, and where gamma + delta < 0 they harden.
+
+Duhem's element has f = r(z) while y rises, and s(z) while it falls, straight between knots of z, and
+constant beyond them. A knot at z = 0 is useful, where loading turns into unloading.
+
+Sources: Bouc 1967; Wen, "Method of random vibration of hysteretic systems", 1976; as a benchmark of
+identification, Noel and Schoukens, "Hysteretic benchmark with a dynamic nonlinearity", 2016; on Duhem's
+model, Visintin, "Differential models of hysteresis", 1994.
+
+From sample to sample the input goes in a straight line (first-order hold) or stays (zero-order); the
+equations are integrated by the classic Runge-Kutta method in substeps of equal length. f jumps only
+where y' passes 0, so that z' has corners and no jumps; steps over these leave errors of second order.
+Straight lines take (omega T)^2 / 12 off a sine of the input, T being the sample time: `steady_state` has
+the input band-limited between samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks import fields
+from mckibben.blocks.base import Block, Cost, Run, Start, needs_sample_time
+from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
+from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import gathered
+from mckibben.errors import ModelError
+
+HEAD = 7
+"""Number of coefficients before those of the hysteretic element."""
+
+SETTLING = 64
+"""Number of steps in which an initial equilibrium is reached."""
+
+STABLE = 2.5
+"""Angle of the fastest oscillation per substep [rad] above which Runge-Kutta steps may be unstable.
+"""
+
+
+def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[Step, Start]:
+    """Return step and start of an oscillator with ``slope(z, velocity, numbers)``.
+
+    Coefficients are [substep, how many, 1 for zero-order hold, m, c, k, offset, numbers of the
+    element]; the state is [y, y', z, last input].
+    """
+
+    def oscillator_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+        """Advance an oscillator in Runge-Kutta substeps."""
+        h, n, held = coefficients[0], int(coefficients[1]), coefficients[2] > 0.0
+        m, c, k, offset = coefficients[3], coefficients[4], coefficients[5], coefficients[6]
+        own = coefficients[HEAD:]
+        y, v, z = state[0], state[1], state[2]
+        rise = 0.0 if held else (inputs[0] - state[3]) / n
+        for s in range(n):
+            u = state[3] + s * rise
+            v1 = v
+            a1 = (u - c * v1 - k * y - z) / m
+            z1 = v1 * slope(z, v1, own)
+            u += 0.5 * rise
+            v2 = v + 0.5 * h * a1
+            x = z + 0.5 * h * z1
+            a2 = (u - c * v2 - k * (y + 0.5 * h * v1) - x) / m
+            z2 = v2 * slope(x, v2, own)
+            v3 = v + 0.5 * h * a2
+            x = z + 0.5 * h * z2
+            a3 = (u - c * v3 - k * (y + 0.5 * h * v2) - x) / m
+            z3 = v3 * slope(x, v3, own)
+            u += 0.5 * rise
+            v4 = v + h * a3
+            x = z + h * z3
+            a4 = (u - c * v4 - k * (y + h * v3) - x) / m
+            z4 = v4 * slope(x, v4, own)
+            y += h / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4)
+            v += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+            z += h / 6.0 * (z1 + 2.0 * z2 + 2.0 * z3 + z4)
+        state[3] = inputs[0]
+        outputs[0] = y + offset
+        state[0], state[1], state[2] = y, v, z
+
+    @kernel
+    def share(z: float, force: float, k: float, own: Array) -> float:
+        """Return the element's share of a slowly applied force."""
+        stiffness = slope(z, force, own)
+        return stiffness / (k + stiffness)
+
+    def oscillator_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+        """Start in equilibrium with the first force, or, virgin, without force."""
+        force = 0.0 if virgin else inputs[0]
+        k, own = coefficients[5], coefficients[HEAD:]
+        step = force / SETTLING
+        z = 0.0
+        for _ in range(SETTLING):
+            share1 = share(z, force, k, own)
+            share2 = share(z + 0.5 * step * share1, force, k, own)
+            share3 = share(z + 0.5 * step * share2, force, k, own)
+            share4 = share(z + step * share3, force, k, own)
+            z += step / 6.0 * (share1 + 2.0 * share2 + 2.0 * share3 + share4)
+        state[0], state[1], state[2], state[3] = (force - z) / k, 0.0, z, force
+
+    return step(oscillator_step), kernel(oscillator_start)
+
+
+class Oscillator(Block):
+    """Mass, damper and spring with a hysteretic element of a subclass, from force to displacement.
+
+    Parameters
+    ----------
+    mass : float
+        m, the moving mass [kg]; positive.
+    damping : float
+        c, force by velocity [N s/mm]; not negative.
+    stiffness : float
+        k, force by displacement [N/mm]; positive.
+    output_offset : float or None
+        Added to the displacement [mm]; None for none.
+    substeps : int
+        Runge-Kutta steps from sample to sample.
+    hold : {"first", "zero"}
+        What the input does between samples: go on in a straight line, or stay.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: at rest where the first input leads slowly, or at rest
+        without any force, from which the input then goes to the first sample within one sample time.
+    input, output : Channel
+        Force and displacement.
+    """
+
+    rate_dependent = True
+    steady_state = steady_state
+    n_states = 4  # displacement, velocity, force of the element, last input
+    slope_by: ClassVar[Any]
+    """Slope of the element's force over y, from [force, velocity, `element`]; compiled."""
+
+    elements: ClassVar[tuple[str, ...]]
+    """Fields of the hysteretic element."""
+
+    mass: float
+    damping: float
+    stiffness: float
+    output_offset: float | None
+    substeps: int
+    hold: Hold
+    initial: Any
+
+    @property
+    def element(self) -> Array:
+        """Parameters of the hysteretic element, one-dimensional."""
+        return gathered(self, self.elements)
+
+    @property
+    def fastest(self) -> float:
+        """Angular frequency of small motions about zero force [rad/s]."""
+        slopes = [type(self).slope_by(0.0, way, self.element) for way in (1.0, -1.0)]
+        return float(np.sqrt((self.stiffness + max(*slopes, 0.0)) / self.inertia))
+
+    @property
+    def inertia(self) -> float:
+        """The mass in N s^2/mm."""
+        return 1e-3 * self.mass
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        step = needs_sample_time(self.kind, sample_time)
+        head = [step / self.substeps, self.substeps, self.hold == "zero"]
+        springs = [self.inertia, self.damping, self.stiffness, self.output_offset or 0.0]
+        return np.array([*head, *springs, *self.element])
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs the kernel in place; raise an error for too few substeps."""
+        step = needs_sample_time(self.kind, sample_time)
+        angle = self.fastest * step
+        if not angle <= STABLE * self.substeps:
+            raise ModelError(
+                f"{self.kind!r} oscillates by {angle:.3g} rad in a sample of {step:g} s, "
+                f"too fast for {self.substeps} substep(s)",
+                remedy=f"at least {np.ceil(10 * angle):.0f} substeps, or a shorter sample time",
+            )
+        return super().bind(sample_time, state, inputs, outputs)
+
+    def cost(self, sample_time: float | None) -> Cost:
+        """Return the cost of a step: four slopes per substep."""
+        operations = self.substeps * 4 * (18 + self.element.size)
+        return Cost(operations, operations)
+
+
+@kernel
+def bouc_wen_slope(z: float, velocity: float, numbers: Array) -> float:
+    """Return dz/dy; numbers are [slope, gamma, delta]."""
+    along = z if velocity > 0.0 else -z
+    return numbers[0] - numbers[1] * along - numbers[2] * abs(z)
+
+
+@dataclass(frozen=True, config=fields.STRICT)
+class BoucWenOscillator(Oscillator):
+    """Mass, damper and spring with a Bouc-Wen element, from force to displacement.
+
+    Parameters
+    ----------
+    slope : float
+        Stiffness of the element about z = 0 [N/mm]; positive.
+    gamma, delta : float
+        Shape of the element: how fast it loses its stiffness, on the whole and by direction [1/mm].
+    **others
+        As of `Oscillator`.
+    """
+
+    kind = "bouc-wen-oscillator"
+    kernel, start_kernel = oscillator_kernels(bouc_wen_slope)
+    slope_by = bouc_wen_slope
+    elements = ("slope", "gamma", "delta")
+    parameters = ("mass", "damping", "stiffness", "slope", "gamma", "delta", "output_offset")
+    typical = (2.0, 0.004, 0.3, 0.2, 0.12, -0.15)
+    notation = Notation(
+        r"m \ddot{q} + c \dot{q} + k q + z = u,\quad y = q + y_0",
+        r"\dot{z} = a \dot{q} - \gamma |\dot{q}| z - \delta \dot{q} |z|",
+        mass="m [kg]",
+        damping="c [N s/mm]",
+        stiffness="k [N/mm]",
+        slope="a [N/mm]",
+        gamma=r"\gamma [1/mm]",
+        delta=r"\delta [1/mm]",
+        output_offset="y_0 [{y}]",
+    )
+
+    mass: fields.Positive
+    damping: fields.NotNegative
+    stiffness: fields.Positive
+    slope: fields.Positive
+    gamma: FiniteFloat
+    delta: FiniteFloat
+    output_offset: FiniteFloat | None = None
+    substeps: Substeps = 10
+    hold: Hold = "first"
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.DISPLACEMENT
+
+
+@kernel
+def knot_before(z: float, numbers: Array, n: int) -> int:
+    """Return the knot at which the piece around z starts."""
+    j = 0
+    while j < n - 2 and z >= numbers[j + 1]:
+        j += 1
+    return j
+
+
+@kernel
+def duhem_slope(z: float, velocity: float, numbers: Array) -> float:
+    """Return dz/dy; numbers are [knots, rising slopes, falling slopes], equally many."""
+    n = numbers.size // 3
+    j = knot_before(z, numbers, n)
+    share = (z - numbers[j]) / (numbers[j + 1] - numbers[j])
+    share = min(max(share, 0.0), 1.0)
+    j += n if velocity > 0.0 else 2 * n
+    return numbers[j] + share * (numbers[j + 1] - numbers[j])
+
+
+@dataclass(frozen=True, config=fields.STRICT)
+class DuhemOscillator(Oscillator):
+    """Mass, damper and spring with a piecewise hysteretic element, from force to displacement.
+
+    Parameters
+    ----------
+    rising, falling : sequence of float
+        Slopes of the element's force by the displacement while that rises, or falls, at every knot
+        [N/mm].
+    knots : sequence of float
+        Forces of the element [N], increasing, at least two.
+    **others
+        As of `Oscillator`.
+    """
+
+    kind = "duhem-oscillator"
+    kernel, start_kernel = oscillator_kernels(duhem_slope)
+    increasing = ("knots",)
+    slope_by = duhem_slope
+    elements = ("knots", "rising", "falling")
+    typical = (2.0, 0.004, 0.3, (0.5, 0.2, 0.25), (0.25, 0.2, 0.5), (-2.0, 0.0, 2.0))
+    parameters = ("mass", "damping", "stiffness", "rising", "falling", "output_offset")
+    notation = Notation(
+        r"m \ddot{q} + c \dot{q} + k q + z = u,\quad y = q + y_0",
+        r"\dot{z} = \begin{cases} r(z)\, \dot{q} & q \text{ rises} \\ s(z)\, \dot{q} & q "
+        r"\text{ falls} \end{cases}",
+        r"r, s \text{ straight between the knots } \zeta_k,\; r(\zeta_k) = r_k,\; "
+        r"s(\zeta_k) = s_k",
+        mass="m [kg]",
+        damping="c [N s/mm]",
+        stiffness="k [N/mm]",
+        knots=r"\zeta_k [N]",
+        rising="r_k [N/mm]",
+        falling="s_k [N/mm]",
+        output_offset="y_0 [{y}]",
+    )
+
+    mass: fields.Positive
+    damping: fields.NotNegative
+    stiffness: fields.Positive
+    rising: fields.Vector
+    falling: fields.Vector
+    knots: fields.Vector
+    output_offset: FiniteFloat | None = None
+    substeps: Substeps = 10
+    hold: Hold = "first"
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        n = len(self.knots)
+        if (
+            n < 2
+            or not len(self.rising) == len(self.falling) == n
+            or np.diff(self.knots).min() <= 0
+        ):
+            raise ModelError(
+                f"{self.kind!r} has {n} knots, {len(self.rising)} slopes rising and "
+                f"{len(self.falling)} falling",
+                remedy="give two knots or more, in increasing order, and a slope of either "
+                "kind for each",
+            )

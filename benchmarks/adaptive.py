@@ -1,11 +1,10 @@
 """Inverses that learn, on a rig that drifts and on a measured muscle.
 
-    python benchmarks/adaptive.py [--motions 3] [--levels FOLDER] [--alarms] [--instructions]
+    python benchmarks/adaptive.py [--motions 3] [--levels FOLDER] [--instructions]
 
 Without an option: tracking errors [mm] of a `gpi` model of `mas20-hanging` on random motions; the rig
 changes at 120 s. `--levels`: errors [mm] of `balance` models of the first 150 and 100 levels of
 `festo_dmsp10_levels` in FOLDER, on the last 50; every level is predicted from those before it.
-`--alarms`: how far what is learnt goes from a fit to slow decaying triangles, and alarms.
 `--instructions`: a `gpi` model of ten operators on an emulated Cortex-M4F.
 """
 
@@ -146,34 +145,6 @@ def levels(folder: Path) -> None:
         print(f"fitted to {first}: " + ", ".join(f"{k} {v:.3f} mm" for k, v in errors.items()))
 
 
-def alarms() -> None:
-    slow = decaying_triangle(np.arange(6000) * STEP, low=0.0, high=5.0, period=20.0)
-    shown = RIG.run(Recording({"pressure": slow}, STEP))
-    model: Block = load("estimators", "gpi")().fit([shown]).model_
-    low, high = (float(end[0]) for end in model.reachable())
-    t = np.arange(round(300.0 / STEP)) * STEP
-    print("| change | period, time [s] | looks, alarms | largest changes | in standard errors |")
-    for change in CHANGES:
-        for period, time in ((20.0, 60.0), (10.0, 60.0), (20.0, 20.0), (5.0, 20.0)):
-            plant, block = drifting(change, 60.0), adaptive(model, time)
-            swing = np.sin(2 * np.pi * t / period) * (0.6 + 0.4 * np.cos(0.0731 * t))
-            asked = low + (high - low) * (0.5 + 0.35 * swing)
-            stream, seen = block.stream(STEP), plant.reset(1)
-            out, looks = plant.outputs.index("displacement"), []
-            for k, y in enumerate(asked):
-                pressure = float(stream.step([y, seen[out]])[0])
-                seen = plant.step({"pressure": min(max(pressure, 0.0), 6.0)})
-                if k % 250 == 249:
-                    looks.append(block.drift(stream.state))
-            largest = (
-                ", ".join(f"{x:.2f}" for x in np.abs(values).max(axis=0))
-                for values in ([look.changes for look in looks], [look.by_errors for look in looks])
-            )
-            counts = f"{len(looks)}, {sum(look.alarm for look in looks)}"
-            cells = (change, f"{period:g}, {time:g}", counts, *largest)
-            print(f"| {' | '.join(cells)} |", flush=True)
-
-
 def instructions() -> None:
     thresholds, weights = tuple(0.05 * k for k in range(10)), tuple(12 / (1 + k) for k in range(10))
     model = replace(GPI.example(), thresholds=thresholds, weights=weights)
@@ -186,13 +157,10 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--motions", type=int, default=3)
     parser.add_argument("--levels", type=Path)
-    parser.add_argument("--alarms", action="store_true")
     parser.add_argument("--instructions", action="store_true")
     chosen = parser.parse_args()
     if chosen.instructions:
         instructions()
-    elif chosen.alarms:
-        alarms()
     elif chosen.levels is not None:
         levels(chosen.levels)
     else:

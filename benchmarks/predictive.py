@@ -24,7 +24,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.planning import clipped_to
+from mckibben.blocks.planning import clip_path
 from mckibben.blocks.predictive import Predictive
 from mckibben.export.c.emulation import emulate, missing_tools
 from mckibben.export.c.project import export_c
@@ -63,11 +63,12 @@ def followed(
 def clipped(inverse: Block, references: Array, **limits: float) -> Array:
     """Return what the model makes of the inverse's pressures, clipped to the limits one by one."""
     block = Predictive(inverse, **limits)  # type: ignore[arg-type]
-    n, rows = len(block.outputs), block.rows(STEP)
+    n, (low, high) = len(block.outputs), block.pressures
     held = np.concatenate([np.repeat(references[:1], HORIZON, axis=0), references])
     pressures = np.asarray(inverse.simulate(held, sample_time=STEP))
     pressures = pressures.reshape(-1, n)
-    clipped_to(n, rows.ravel(), pressures.reshape(-1))
+    change = limits.get("rate_limit", np.inf) * STEP
+    clip_path(np.concatenate([[change], low, high]), pressures.reshape(-1))
     start = block.initial_state(held[0])[: block.forward_model.n_states].tolist()
     driven = np.hstack([pressures, held[:, n:]])
     given = block.forward_model.simulate(driven, initial=start, sample_time=STEP)
@@ -116,13 +117,6 @@ def cases() -> Iterator[tuple[str, Block, tuple[float, ...], dict[str, float]]]:
         yield "pi", pi, (), {"rate_limit": rate}
         yield "gpi", gpi, (), {"rate_limit": rate}
         yield "balance, 2 muscles", arm, (1.0, 5.0), {"rate_limit": rate}
-    for flow in (20.0, 14.0, 8.0):
-        yield "balance, 2 muscles", arm, (1.0, 5.0), {"flow_limit": flow}
-    yield "balance, 2 muscles", arm, (1.0, 5.0), {"total_limit": 6.0}
-    yield (
-        *("balance, 2 muscles", arm, (1.0, 5.0)),
-        {"rate_limit": 12.0, "flow_limit": 14.0, "total_limit": 7.0},
-    )
 
 
 TIMING = """
@@ -155,7 +149,6 @@ int main(void) {
 def compensators() -> dict[str, tuple[Block, str]]:
     """Return what is timed, and the swing of its references."""
     arm = replace(Balance.example(), pressure_range=(0.0, 6.0))
-    limits = {"rate_limit": 8.0, "flow_limit": 10.0, "total_limit": 7.0}
     ten = replace(
         GPI.example(),
         thresholds=tuple(0.1 * k for k in range(10)),
@@ -166,7 +159,7 @@ def compensators() -> dict[str, tuple[Block, str]]:
     return {
         "pi, 4 operators": (Predictive(PI.example().inverse(), rate_limit=6.0), one),
         "gpi, 10 operators": (Predictive(ten.inverse(), rate_limit=6.0), one),
-        "balance, 2 muscles": (Predictive(arm, **limits), two),  # type: ignore[arg-type]
+        "balance, 2 muscles": (Predictive(arm, rate_limit=8.0), two),
     }
 
 
@@ -197,8 +190,6 @@ def on_a_microcontroller() -> None:
     print("| model | horizon | median | at most | RAM [bytes] | stack | flash | off |")
     print("|---|---:|---:|---:|---:|---:|---:|---:|")
     for name, (block, _) in compensators().items():
-        if block.needs_double:
-            continue
         for horizon in (HORIZON, 10):
             found = emulate(replace(block, horizon=horizon), sample_time=STEP)  # type: ignore[type-var]
             steps = found.instructions[1:]

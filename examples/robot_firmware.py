@@ -21,7 +21,6 @@ from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from multiprocessing.connection import Connection
 from pathlib import Path
-from textwrap import fill
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -143,7 +142,7 @@ def spans(n: int) -> tuple[slice, slice]:
     return slice(3 * n // 10, n // 2), slice(4 * n // 5, n)
 
 
-def draw(path: Path, reference: np.ndarray, runs: dict[str, np.ndarray], told: str) -> None:
+def draw(path: Path, reference: np.ndarray, runs: dict[str, np.ndarray]) -> None:
     """Draw the errors over time, and the motion before and after the drift."""
     n, window = len(reference), max(len(reference) // 120, 1)
     time = np.arange(n) * PERIOD
@@ -172,7 +171,6 @@ def draw(path: Path, reference: np.ndarray, runs: dict[str, np.ndarray], told: s
             axis.plot(time[part], measured[part], color=colours[run], lw=1.0, label=run)
         axis.set(title=f"{name} the drift", xlabel="time [s]", ylabel="displacement [mm]")
     axes["before"].legend()
-    figure.suptitle(fill(f"what the firmware learnt: {told}", 90), fontsize="medium")
     figure.savefig(path, dpi=120)
 
 
@@ -212,12 +210,12 @@ def main() -> None:
     for name, found in runs.items():
         before, after = (rms((found - reference)[span]) for span in spans(len(reference)))
         print(f"{name}: followed within {before:.4f} mm RMS before the drift, {after:.4f} after it")
-    told = str(block.drift(state))
-    print(told)
+    model = block.present(state)
+    print(model)
     if chosen.save:
         block.resumed(state).save(chosen.save)
     if chosen.picture:
-        draw(chosen.picture, reference, runs, told)
+        draw(chosen.picture, reference, runs)
 
 
 if __name__ == "__main__":

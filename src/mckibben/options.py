@@ -424,13 +424,6 @@ class InvertOptions:
         tuple[float, float] | None,
         Option("With --predictive: lowest and highest pressure [bar].", "LOW HIGH"),
     ] = None
-    total_limit: Annotated[
-        float | None, Option("With --predictive: highest sum of pressures [bar].", "X")
-    ] = None
-    flow_limit: Annotated[
-        float | None,
-        Option("With --predictive: fastest rise of the sum of pressures [bar/s].", "X"),
-    ] = None
     learned: Annotated[
         tuple[Path, ...],
         Option(
@@ -470,7 +463,7 @@ class InvertOptions:
         return given
 
 
-PREDICTIVE = ("horizon", "rate_limit", "pressures", "total_limit", "flow_limit")
+PREDICTIVE = ("horizon", "rate_limit", "pressures")
 
 
 @dataclass(frozen=True)

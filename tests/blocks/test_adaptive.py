@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import Block, ModelError, ModelWarning, Series, load
-from mckibben.blocks.adaptive import Adaptive, adaptive, alarm_limit
+from mckibben.blocks.adaptive import Adaptive, adaptive
 from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
+from mckibben.blocks.learning import READY, SENSES
 
 Array = NDArray[np.float64]
 
@@ -149,9 +150,9 @@ def test_a_memory_that_never_came_of_running_is_refused() -> None:
     block = Adaptive(PI.example(), 10.0, 0.05)
     memory = block.resumed(experienced(block, 2.0)[0]).memory
     assert memory is not None
-    for place in (0, block.fixed.n_states + 1):
+    for place in (-block.n_learnt + 2 * block.learnable.fitted.size, -SENSES + READY):
         spoilt = np.array(memory)
-        spoilt[place] = 1e18
+        spoilt[place] = -1.0
         with pytest.raises(ModelError, match="'adaptive'"):
             replace(block, memory=tuple(spoilt.tolist()))
 
@@ -163,32 +164,9 @@ def test_a_gain_that_drifts_is_found_and_nothing_else() -> None:
     reading, rng = 0.0, np.random.default_rng(5)
     for y in references(model, 60.0):
         reading = plant.step(stream.step([y, reading or y])[0])[0] + 0.02 * rng.standard_normal()
-    assert not block.drift(block.initial_state(np.zeros(2))).alarm
-    found = block.drift(stream.state)
-    assert found.alarm
-    assert found.changes[0] == pytest.approx(0.2, abs=0.005)
-    assert (np.abs(found.by_errors[1:]) < 2.0).all()
-
-
-def test_alarms_are_false_no_more_often_than_told() -> None:
-    """Where the form is right, few groups pass two standard errors by chance."""
-    model = PI.example()
-    block = adaptive(model, 5.0, 0.05)
-    beyond = looks = 0
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        asked = references(model, 40.0, seed=seed)
-        noise = np.zeros(asked.size)
-        for t in range(1, asked.size):
-            noise[t] = 0.95 * noise[t - 1] + 0.05 * np.sqrt(1 - 0.95**2) * rng.standard_normal()
-        stream, plant, given = block.stream(STEP), model.stream(STEP), asked[0]
-        for t, y in enumerate(asked):
-            given = plant.step(stream.step([y, given + noise[t]])[0])[0]
-            if t % 500 == 499:
-                sizes = np.abs(block.drift(stream.state).by_errors)
-                beyond, looks = beyond + int(np.sum(sizes > 1.96)), looks + sizes.size
-    assert beyond <= 0.05 * looks
-    assert alarm_limit(60.0, 3) == pytest.approx(4.54, abs=0.01)
+    found: Any = block.present(stream.state)
+    assert np.sum(found.weights) == pytest.approx(1.2 * np.sum(model.weights), rel=0.005)
+    assert found.offset == pytest.approx(model.offset, abs=0.1)
 
 
 @pytest.mark.kernel

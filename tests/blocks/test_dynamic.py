@@ -1,15 +1,13 @@
-"""Dynamic models against SciPy and python-control: simulated by them, and handed over to them."""
+"""Dynamic models against SciPy."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
-from importlib.util import find_spec
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pytest
-from scipy.signal import dlsim, lsim
+from scipy.signal import lsim
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Parallel, Series
@@ -18,6 +16,7 @@ from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import DISPLACEMENT
 from mckibben.blocks.memoryless import Affine, Negative
+from mckibben.diagnosis.responses import linear_response
 from mckibben.papers.paper import printed
 
 STEP = 0.01
@@ -65,9 +64,6 @@ def test_delays_between_samples_are_exact(delay: float) -> None:
     np.testing.assert_allclose(y, expected, atol=1e-9 * np.ptp(expected))
 
 
-# -- handed over -----------------------------------------------------------------------------------
-
-
 LINEAR = {
     "transfer function": TransferFunction.example(),
     "delays": TransferFunction((0.0, 0.0, 1.5), (-0.9,), STEP, 1.0, 2.0),
@@ -87,29 +83,17 @@ LINEAR = {
 
 
 @pytest.mark.parametrize("name", LINEAR)
-def test_scipy_and_python_control_simulate_the_same(name: str) -> None:
+def test_frequency_responses_are_those_of_an_impulse(name: str) -> None:
     block: Block = LINEAR[name]
-    system, u = block.linear_system(STEP), np.random.default_rng(3).uniform(0.0, 5.0, 300)
-    u0, y0 = float(system.input_offset[0]), float(system.output_offset[0])
-    # from the operating point, at rest there
-    expected = np.asarray(block.simulate([u0, *u], sample_time=STEP))[1:] - y0
-    discrete: Any = block.to_scipy(STEP)
-    found = [dlsim(discrete, u - u0)[1][:, 0]]
-    if find_spec("control"):
-        control = import_module("control")
-        response = control.forced_response(block.to_control(STEP), U=u - u0)
-        found.append(np.squeeze(response.outputs))
-    for one in found:
-        assert np.abs(one - expected).max() < 1e-10 * np.abs(expected).max()
-
-
-def test_a_continuous_model_comes_as_it_is_written() -> None:
-    model = ProcessModel(2.0, (0.1,), 0.4, 0.3)
-    system = model.to_scipy()
-    w, found = system.freqresp(np.array([0.5, 3.0, 20.0]))
-    s = 1j * w
-    expected = 2.0 * (0.3 * s + 1) / (0.01 * s**2 + 2 * 0.4 * 0.1 * s + 1)
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    rest = getattr(block, "input_offset", 0.0)
+    impulse = np.full(6000, rest)
+    impulse[1] += 1.0
+    answer = np.asarray(block.simulate(impulse, sample_time=STEP))
+    frequency = np.array([0.2, 3.0, 20.0])
+    powers = np.exp(-2j * np.pi * STEP * np.outer(frequency, np.arange(5999)))
+    expected = powers @ (answer - answer[0])[1:]
+    found = linear_response(block, STEP, frequency)[:, 0, 0]
+    np.testing.assert_allclose(found, expected, rtol=1e-4)
 
 
 def test_printed_numbers() -> None:

@@ -88,7 +88,6 @@ BAD = [
     ("simulate model.json run.csv -o out.csv --interval 0.9", "--interval"),
     ("simulate banded.json run.csv -o out.csv --interval 0.9", "66.7 %"),
     ("simulate banded.json run.csv -o out.csv --interval 1.5", "1.5"),
-    ("simulate banded.json run.csv -o out.csv --interval 0.5 --horizon 3", "--horizon"),
     ("invert banded.json -o out.json", "banded"),
     ("calibrate inverse.json run.csv -o out.json", "inverse"),
     ("calibrate model.json run.csv --fitted run.csv -o out.json", "run.csv"),

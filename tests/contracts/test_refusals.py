@@ -74,11 +74,6 @@ NO_MODEL: list[tuple[str, dict[str, Any], str]] = [
         "pressure_range",
     ),
     ("predictive", {"compensator": ARM.inverse(), "pressure_range": OPEN}, "'predictive'"),
-    (
-        "predictive",
-        {"compensator": ARM, "pressure_range": (1.0, 2.0), "total_limit": 1.5},
-        "total_limit",
-    ),
     ("adaptive", {"memory": (0.0, 1.0, 2.0)}, "3"),
     ("balance", {"friction": ((3.0, -1.5), (2.5, 2.0))}, "friction"),
     ("balance", {"relaxation": ((1.0, -0.6), (0.8, 0.5))}, "relaxation"),
@@ -170,11 +165,6 @@ OTHERS: dict[str, tuple[Make, str]] = {
         "254",
     ),
     "too fast": (lambda: example("state-network").simulate(U, sample_time=1.0), "2 substep"),
-    "not linear": (lambda: PI.example().to_scipy(0.01), "'pi'"),
-    "linear but for its delay": (
-        lambda: ProcessModel(1.0, (0.1,), None, None, 0.05).to_scipy(),
-        "sample time",
-    ),
     "learns several channels": (lambda: adaptive(PerChannel.example(), 20.0), "'per-channel'"),
     "learns creep alone": (lambda: adaptive(example("creep"), 10.0), "'creep'"),
     "learns a learner": (lambda: adaptive(example("adaptive"), 20.0, 0.02), "'pi-adaptive'"),

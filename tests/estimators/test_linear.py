@@ -227,21 +227,6 @@ def test_what_is_delivered_is_what_was_optimised(initial: Any) -> None:
     assert fits[1].diagnostics_.rmse <= fits[1].model_.noise_deviation * (1 + 1e-9)
 
 
-def test_prediction_goes_from_one_step_errors_to_the_free_run() -> None:
-    recording = recorded(12, 1000, c=C, d=D)
-    fit = load("estimators", "bj")().fit(recording)
-    model = fit.model_
-    assert isinstance(model, TransferFunction)
-    measured = recording["displacement"]
-    rms = [
-        float(np.std(model.predict(recording, k)["displacement"] - measured)) for k in (1, 5, 50)
-    ]
-    assert rms[0] == pytest.approx(model.noise_deviation, rel=1e-3)
-    assert rms[0] < rms[1] < rms[2] * 1.001
-    beyond, whole = (model.predict(recording, n) for n in (10**9, len(recording)))
-    np.testing.assert_array_equal(beyond["displacement"], whole["displacement"])
-
-
 def test_starts_that_explain_everything_are_not_believed() -> None:
     """A drift that no input made: a slow pole with a free start takes it, and leads nowhere."""
     rng = np.random.default_rng(4)

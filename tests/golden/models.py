@@ -66,7 +66,6 @@ RANGES: dict[str, tuple[tuple[float, float], ...]] = {
     "recurrent-fuzzy-network with lags": ((0.0, 45.0), (0.0, 150.0)),
     "load-estimate, settled": ((0.0, 8.0), (0.0, 8.0), (0.0, 4.0), (0.0, 4.0), (0.0, 3.0)),
     "load-estimate with tare": ((0.0, 8.0), (0.0, 8.0), (0.0, 4.0), (0.0, 4.0), (0.0, 3.0)),
-    "predictive balance, short of air": ((0.0, 9.0), (0.0, 9.0), (0.0, 3.0), (0.0, 9.0)),
     "adaptive gpi, forgetting": ((-7.0, 10.0), (0.0, 0.0)),
     "adaptive balance, forgetting": (
         *((0.0, 6.0), (0.0, 6.0), (0.0, 3.0)),
@@ -248,12 +247,8 @@ def _compositions() -> dict[str, Block]:
             10,
             rate_limit=30.0,
             pressure_range=(0.2, 4.6),
-            total_limit=4.2,
-            flow_limit=20.0,
         ),
-        "predictive balance": block(
-            "predictive", balance, 6, 40.0, (0.0, 4.0), total_limit=6.0, volumes=(1.0, 2.0)
-        ),
+        "predictive balance": block("predictive", balance, 6, 40.0, (0.0, 4.0)),
         "pi from a given memory": replace(pi, initial=(0.1, 0.2, 0.3, 0.4)),
         "force after known friction": replace(
             feedforward, friction=replace(feedforward.friction, initial=(0.5, -0.2, 0.1, 2.0))
@@ -355,9 +350,6 @@ def _variants() -> dict[str, Block]:
         "settled balance": replace(balance, settled=True),
         "load-estimate, settled": block("load-estimate", replace(balance, settled=True)),
         "load-estimate with tare": block("load-estimate", replace(balance, tare=True)),
-        "predictive balance, short of air": block(
-            "predictive", balance, 4, pressure_range=(0.0, 4.0), total_limit=2.0, flow_limit=12.0
-        ),
         "adaptive gpi, forgetting": block("adaptive", GPI.example(), 1.0, 0.05),
         "adaptive balance, forgetting": block("adaptive", balance.inverse(), 1.0, 0.05),
     }

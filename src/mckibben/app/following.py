@@ -49,7 +49,7 @@ USES = {
 
 SETTINGS = {
     "adaptive": ("time", "noise"),
-    "predictive": ("horizon", "rate_limit", "pressures", "total_limit", "flow_limit"),
+    "predictive": ("horizon", "rate_limit", "pressures"),
 }
 """Fields of `InvertOptions`, by the compensator that they are of."""
 

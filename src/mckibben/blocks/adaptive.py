@@ -1,23 +1,22 @@
 """Adaptive inverses, which estimate parameters from measurements and remain exact.
 
-Inputs are those of the inverse, then what is measured of the references; outputs are the inverse's. With
-every measured sample the parameters of the model follow, see `mckibben.blocks.learning`; the
-inverse runs with them as they are, so that model and inverse match at every step.
+Inputs are those of the inverse, then the measurements of the references; outputs are the inverse's.
+Every measured sample updates the parameters of the model, see `mckibben.blocks.learning`. The inverse
+uses the updated parameters, so that model and inverse match at every step.
 
-A measurement answers the reference of the step before, as behind a compensator: since the model gives
-exactly what was asked for, what it predicts is known from the inverse's own memory. One part of a series
-learns (mpi, cpi, a balance behind its valves): parts behind it are undone on what is measured as on the
-reference, each with a memory of its own, and parts before it on what the inverse gives. What comes late
-by a dead time is moved on first by as much as the reference has gone on since (`Prompt`).
+A measurement belongs to the reference of the step before, as behind a compensator: the model's output
+equals the reference, so the prediction follows from the inverse's own state. In a series one part is
+adaptive (mpi, cpi, a balance behind its valves): the parts after it are inverted both for the
+measurement and for the reference, each with its own state; the parts before it are inverted for the
+output of the adaptive inverse. A measurement delayed by a dead time is first corrected by the change of
+the reference since then (`Prompt`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass as plain_dataclass
 from dataclasses import replace
 from functools import cached_property
-from statistics import NormalDist
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -28,7 +27,6 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import (
     Block,
-    Cost,
     Ports,
     Run,
     Start,
@@ -48,18 +46,7 @@ from mckibben.blocks.fields import (
 )
 from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, kernel, remember, step
-from mckibben.blocks.learning import (
-    LARGEST,
-    READY,
-    SENSES,
-    SQUARED,
-    STOOD,
-    USUAL,
-    Group,
-    Learnable,
-    covariance_of,
-    start_root,
-)
+from mckibben.blocks.learning import READY, SENSES, USUAL, Learnable, start_root
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
@@ -73,79 +60,6 @@ TIMES = 1e-3, 1e9
 """Shortest and longest adaptation time [s]."""
 NOISES = 1e-9, 1e3
 """Smallest and largest noise, relative to the reachable range."""
-
-FARTHEST = 1e6
-"""Bounds of scales and variances of all parameters."""
-MOST = 1e12
-"""Bound of the inverse's state and of sample counts."""
-
-FALSE_ALARMS = 1e-3
-"""Expected false alarms per hour without drift."""
-FIT_ERROR = 0.01
-"""Assumed standard error of the fit itself, by group."""
-
-
-@plain_dataclass(frozen=True)
-class Drift:
-    """Changes of the model since the fit, by groups of parameters.
-
-    Parameters
-    ----------
-    groups : tuple of Group
-        Which changes are reported.
-    changes, errors : tuple of float
-        Relative change of every group, and its standard error: that of the learner's covariance, a
-        little of every group, and whatever moves the output no further than its usual error.
-    limit : float
-        Standard errors at which an alarm is given, see `alarm_limit`.
-    measured : bool
-        Whether anything was, by now.
-    """
-
-    groups: tuple[Group, ...]
-    changes: tuple[float, ...]
-    errors: tuple[float, ...]
-    limit: float
-    measured: bool = True
-
-    @property
-    def by_errors(self) -> tuple[float, ...]:
-        """Changes in standard errors."""
-        return tuple(c / e for c, e in zip(self.changes, self.errors, strict=True))
-
-    @property
-    def alarms(self) -> tuple[bool, ...]:
-        """Whether the change of each group is significant."""
-        return tuple(abs(size) > self.limit for size in self.by_errors)
-
-    @property
-    def alarm(self) -> bool:
-        """Whether any change is significant."""
-        return any(self.alarms)
-
-    def __str__(self) -> str:
-        if not self.measured:
-            return "nothing measured yet"
-        changed, same = [], []
-        for group, change, alarm in zip(self.groups, self.changes, self.alarms, strict=True):
-            if alarm:
-                way = group.more if change > 0 else group.less
-                changed.append(f"{group.name} {100 * abs(change):.0f} % {way}")
-            else:
-                same.append(group.name)
-        if not changed:
-            return f"{' and '.join(same)} unchanged since the day of the fit"
-        text = f"{', '.join(changed)} than on the day of the fit"
-        return f"{text}; {', '.join(same)} unchanged" if same else text
-
-
-def alarm_limit(time: float, n_groups: int, rate: float = FALSE_ALARMS) -> float:
-    """Return the threshold, in standard errors, for a rate of false alarms [1/h].
-
-    Looks are independent of each other after the ``time`` to learn in [s].
-    """
-    looks = n_groups * 3600.0 / time
-    return -NormalDist().inv_cdf(min(rate / looks, 0.5) / 2.0)
 
 
 def learnable_of(block: Block) -> Learnable | None:
@@ -207,7 +121,7 @@ class Prompt(Block):
     late : float
         Dead time [s].
     reference, measured : Channel
-        What is asked for, and measured of it.
+        Reference, and its measurement.
     """
 
     kind: ClassVar[str] = "prompt"
@@ -243,15 +157,15 @@ class Adaptive(Block):
     Parameters
     ----------
     forward : Block
-        The block undone, which declares what of it is learnt, or whose inverse does, as of a balance; or
-        a series of blocks, exactly one of which does.
+        The inverted block, which declares its adaptive parameters, or whose inverse does, as of a
+        balance; or a series of blocks, exactly one of which is adaptive.
     time : float
-        How long it takes to learn what the motion shows [s]; positive.
+        Adaptation time [s]; positive.
     noise : float
-        Standard deviation of what is measured [unit of the output]; smaller errors are not
+        Standard deviation of the measurement noise [unit of the output]; smaller errors are not
         distinguished.
     memory : sequence of float, optional
-        State to go on from, or what is learnt of it, as `resumed` keeps it; default is to start from
+        State to continue from, or its adaptive part, as `resumed` stores it; default is to start from
         the fit.
     """
 
@@ -304,29 +218,15 @@ class Adaptive(Block):
                     part.initial_state(np.zeros(len(part.inputs)), share.tolist())
             return
         own, theta, used, root, senses = self._split(state)
-        learnable, p = self.learnable, theta.size
-        senses = senses.reshape(-1, SENSES)
-        with np.errstate(all="ignore"):
-            far = np.abs(np.array([theta, used]) - learnable.fitted) > FARTHEST * learnable.scales
-            variances = np.diag(covariance_of(root, p))
-            wide = variances > FARTHEST * np.diag(learnable.spread)
-        ready, usual = senses[:, READY], senses[:, USUAL]
-        wrong = {
-            "hysteresis": (np.abs(own) > MOST).any(),
-            "parameters": far.any(),
-            "covariance": not (root[:p] > 0).all() or wide.any(),
-            "readings": not ((ready >= 0) & (ready <= p) & (ready == np.round(ready))).all(),
-            "errors": not (senses[:, [USUAL, SQUARED, STOOD]] > 0).all()
-            or (usual > 2 * LARGEST * self.core.noise).any(),
-        }
-        for name, found in wrong.items():
-            if found:
-                raise ModelError(
-                    f"the {name} in the memory of {self.kind!r} cannot result from running it",
-                    remedy="save the model afresh, or resume what was saved unchanged",
-                )
+        p, senses = theta.size, senses.reshape(-1, SENSES)
+        counts = (senses[:, READY] >= 0) & (senses[:, READY] <= p) & (senses[:, USUAL] > 0)
+        if not (counts.all() and (root[:p] > 0).all()):
+            raise ModelError(
+                f"the covariance or errors in the memory of {self.kind!r} are not positive",
+                remedy="save the model afresh, or resume what was saved unchanged",
+            )
         for parameters in (theta, used):
-            learnable.with_parameters(parameters).inverse()
+            self.learnable.with_parameters(parameters).inverse()
         if own.size:
             fixed = self.fixed
             fixed.initial_state(np.zeros(len(fixed.inputs)), own[: fixed.n_states].tolist())
@@ -452,7 +352,7 @@ class Adaptive(Block):
             return explicit_state(self, start)
         if len(start) == self.n_learnt:
             learnt = np.array(start)
-            self._split(learnt)[4][READY::SENSES] = 0.0  # the next measurement answers nothing
+            self._split(learnt)[4][READY::SENSES] = 0.0  # the next measurement has no prediction
             own = self.fixed.initial_state(asked, self.forward.start)
             return np.concatenate([own, np.zeros(self.learnable.n_more_states), learnt])
         state = self.initial_state(first, "first_sample")
@@ -472,7 +372,7 @@ class Adaptive(Block):
     def resumed(self, state: Array, memory: bool = True) -> Self:
         """Return this block with a given state as its initial state.
 
-        Without ``memory`` of its hysteresis it keeps what is learnt alone: muscles were vented since.
+        Without ``memory`` of the hysteresis only the adaptive part is stored, as after venting.
         """
         numbers = np.array(state, dtype=np.float64)
         for part, own in self.shares(numbers) or [(self, numbers)]:
@@ -497,10 +397,9 @@ class Adaptive(Block):
         if self.parts:
             return super().coefficients(sample_time)
         step, learnable = needs_sample_time(self.kind, sample_time), self.learnable
-        settings = [min(step / self.time, 0.5), self.noise, 1.0 / len(self.measured)]
         return np.concatenate(
             [
-                [float(learnable.fitted.size), *settings],
+                [float(learnable.fitted.size), min(step / self.time, 0.5), self.noise],
                 learnable.scales,
                 np.diag(learnable.spread),
                 learnable.fitted,
@@ -508,12 +407,6 @@ class Adaptive(Block):
                 learnable.numbers(sample_time),
             ]
         )
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of the inverse, plus three operations per number of the covariance."""
-        p = self.learnable.fitted.size
-        learnt = 6 * p * p + 20 * p
-        return self.fixed.cost(sample_time) + Cost(learnt, learnt)
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         run = Layout(self).bind if self.parts else super().bind
@@ -552,31 +445,13 @@ class Adaptive(Block):
             return super().n_clipped(state)
         return self.fixed.n_clipped(state[: self.fixed.n_states])
 
-    # -- what is learnt ----------------------------------------------------------------------
+    # -- present model ------------------------------------------------------------------------
 
     def present(self, state: Array) -> Block:
         """Return the forward block with the parameters of a state, shape (n_states,)."""
         found = self.learnable.with_parameters(self._split(self._core_state(state))[2])
         before, _, behind = learning_part(self.forward)
         return Series((*before, found, *behind)) if isinstance(self.forward, Series) else found
-
-    def drift(self, state: Array) -> Drift:
-        """Return the change of the parameters since the fit, from a state, shape (n_states,)."""
-        learnable, groups = self.learnable, self.learnable.groups
-        limit = alarm_limit(self.time, len(groups))
-        _, theta, _, root, senses = self._split(self._core_state(state))
-        if not senses[READY::SENSES].any():
-            none = (0.0,) * len(groups)
-            return Drift(groups, none, (FIT_ERROR,) * len(none), limit, measured=False)
-        there = learnable.group_changes(theta)
-        steps = 1e-6 * np.diag(learnable.scales)
-        slopes = np.array([(learnable.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
-        usual, moved = float(senses[USUAL::SENSES].max()), learnable.whole_changes
-        left = np.divide(usual, moved, out=np.zeros(moved.size), where=moved > 0)
-        covariance = covariance_of(root, theta.size)
-        learnt = np.einsum("gi,ij,gj->g", slopes, covariance, slopes)
-        errors = np.sqrt(learnt + FIT_ERROR**2 + left**2)
-        return Drift(groups, vector(there), vector(errors), limit)
 
     def equations(self) -> tuple[str, ...]:
         """Return the equations of the inverse and of the parameter update."""
@@ -601,10 +476,10 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive:
     model : Block
         One with a single adaptive part: pi, gpi, mpi, cpi, balance.
     time : float
-        How long it takes to learn what the motion shows [s].
+        Adaptation time [s].
     noise : float, optional
-        Standard deviation of what is measured [unit of the output]; default is a thousandth of what
-        can be reached.
+        Standard deviation of the measurement noise [unit of the output]; default is a thousandth of the
+        reachable range.
 
     Raises
     ------

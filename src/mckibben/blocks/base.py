@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 from reprlib import Repr
@@ -24,7 +23,6 @@ from mckibben.arrays import Array
 from mckibben.blocks import saving
 from mckibben.blocks.fields import Channel, Initial
 from mckibben.blocks.kernels import Step, in_scratch
-from mckibben.blocks.linear import LinearSystem, Polynomials, as_control, as_scipy
 from mckibben.blocks.parameters import Parametrised, gathered
 from mckibben.blocks.running import Stream, refuse_time, run_many
 from mckibben.errors import DataError, ModelError
@@ -51,23 +49,6 @@ Ports = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
 
 SEVERAL: Ports = ("driven",), ("scheduled",), ("given",)
 """Channel fields of blocks with several channels."""
-
-
-@dataclass(frozen=True)
-class Cost:
-    """Approximate number of arithmetic operations of a step: typical and maximum."""
-
-    usual: int
-    worst: int
-
-    def __add__(self, other: Cost) -> Cost:
-        return Cost(self.usual + other.usual, self.worst + other.worst)
-
-    @classmethod
-    def of(cls, numbers: Array, n_states: int) -> Cost:
-        """Return the cost of one pass: about two operations per coefficient, four per state."""
-        operations = 2 * numbers.size + 4 * n_states
-        return cls(operations, operations)
 
 
 class Block(DrawsItself, Parametrised):
@@ -121,6 +102,9 @@ class Block(DrawsItself, Parametrised):
     increasing: ClassVar[tuple[str, ...]] = ()
     """Fields that must be strictly increasing, also after rounding to single precision."""
 
+    is_linear: ClassVar[bool] = False
+    """Whether outputs are linear in inputs and state, but for constant offsets."""
+
     filters: ClassVar[bool] = False
     """Whether the block is a linear filter, whose poles may be too slow for single precision."""
 
@@ -128,6 +112,9 @@ class Block(DrawsItself, Parametrised):
     """Fields that are not identified and can be set on a saved model: each with the field of the
     lowest and highest value in its identification, or None; see `mckibben.blocks.setting`.
     """
+
+    retired: ClassVar[Mapping[str, Any]] = {}
+    """Fields of older files, with the value of each that had no effect."""
 
     sample_time: float | None = None
     """Sample time of a discrete block [s]; None if it has no fixed one."""
@@ -142,11 +129,6 @@ class Block(DrawsItself, Parametrised):
     def title(self) -> str:
         """Title of the block: its kind, and for an inverse also the kind of the inverted block."""
         return self.kind
-
-    @property
-    def needs_double(self) -> str:
-        """Why double precision is needed, as part of a sentence; empty if single precision suffices."""
-        return ""
 
     # -- channels ----------------------------------------------------------------------------
 
@@ -309,10 +291,6 @@ class Block(DrawsItself, Parametrised):
             return ()
         return (step, start) if self.n_states and start is not None else (step,)
 
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of a step."""
-        return Cost.of(self.coefficients(sample_time), self.n_states)
-
     def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Yield name and values of every `increasing` field."""
         for name in self.increasing:
@@ -351,25 +329,6 @@ class Block(DrawsItself, Parametrised):
             first, second = np.sort(self.simulate(np.array([low, high])), axis=0)
             return first, second
         return self.reachable()
-
-    # -- linear blocks -----------------------------------------------------------------------
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return a linear block as a state-space system about its operating point.
-
-        The time between samples [s] is needed by blocks that are continuous in time.
-        """
-        raise ModelError(
-            f"{self.kind!r} is not linear, so it has no transfer function",
-            remedy="use a linear model (oe, arx, armax, bj, p1 to p3)",
-        )
-
-    def continuous(self) -> Polynomials | None:
-        """Return the continuous transfer function without dead time, or None."""
-        return None
-
-    to_scipy = as_scipy
-    to_control = as_control
 
     @classmethod
     def example(cls) -> Self:

@@ -10,7 +10,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass as plain_dataclass
 from dataclasses import replace
-from functools import cached_property, partial, reduce
+from functools import cached_property, partial
 from itertools import groupby, pairwise
 from typing import Annotated, Any, ClassVar, Self
 
@@ -21,14 +21,10 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Run, explicit_state
 from mckibben.blocks.fields import STRICT, Channel, Initial
-from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 from mckibben.registry import load
 from mckibben.system.compiling import in_turn
-
-DEEPEST, MOST_BLOCKS = 32, 1000
-"""Maximum depth of nested compositions, and maximum number of blocks."""
 
 AT_REST = ("first_sample", "fitted")
 """Start rules by which a block is at rest at its first input if no output is known."""
@@ -194,28 +190,18 @@ class Composition(Block):
     undoing = _of_any("undoing")
 
     @property
+    def is_linear(self) -> bool:  # type: ignore[override]
+        """Whether all parts are linear."""
+        return all(part.is_linear for part in self.parts)
+
+    @property
     def dead_time(self) -> float:  # type: ignore[override]
         return type(self).together(part.dead_time for part in self.parts)
 
-    @property
-    def depth(self) -> int:
-        """Nesting depth of compositions, including this one."""
-        return 1 + max(getattr(part, "depth", 0) for part in self.parts)
-
-    @property
-    def n_blocks(self) -> int:
-        """Number of blocks, including compositions."""
-        return 1 + sum(getattr(part, "n_blocks", 1) for part in self.parts)
-
     def check_parts(self) -> None:
-        """Raise an error for no parts, or for more or more deeply nested parts than allowed."""
+        """Raise an error for no parts."""
         if not self.parts:
             raise ModelError(f"{self.kind!r} has no parts", remedy="give at least one block")
-        if self.depth > DEEPEST or self.n_blocks > MOST_BLOCKS:
-            raise ModelError(
-                f"{self.kind!r} is nested {self.depth} deep and made of {self.n_blocks} blocks",
-                remedy=f"compose at most {MOST_BLOCKS} blocks, at most {DEEPEST} deep",
-            )
 
     @cached_property
     def wiring(self) -> Layout:
@@ -305,9 +291,6 @@ class Series(Composition):
             low, high = part.passes(low, high)
         return low, high
 
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        return reduce(LinearSystem.then, [part.linear_system(sample_time) for part in self.parts])
-
     def joined(self, parts: Sequence[str]) -> str:
         """Return the nested expression of the series."""
         return rf"y = {'['.join(reversed(parts))}[u{']' * len(parts)}"
@@ -378,13 +361,6 @@ class Parallel(Composition):
             for place, signal in zip(places, signals, strict=True):
                 terms[place].append(signal)
         return [board.add(own) for own in terms]
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        n, m = len(self.inputs), len(self.outputs)
-        systems = [
-            part.linear_system(sample_time).among(*self._places(part), n, m) for part in self.parts
-        ]
-        return reduce(LinearSystem.beside, systems)
 
     def joined(self, parts: Sequence[str]) -> str:
         """Return their sum."""

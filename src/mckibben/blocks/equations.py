@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.blocks.inverse import Inverse, commands
 from mckibben.blocks.notation import (
-    FEW,
     MANY,
     Symbol,
     Written,
@@ -20,7 +19,6 @@ from mckibben.blocks.notation import (
     resolved,
     short,
     tex,
-    unit_tex,
     with_unit,
 )
 from mckibben.blocks.parameters import Parametrised, leaves
@@ -151,7 +149,7 @@ def written(part: Parametrised, title: str = "", units: Units | None = None) -> 
         for index, value in leaves(getattr(part, field.name))
         if isinstance(value, Parametrised)
     ]
-    numbers = (*part.worked(), *_channels(part), *_numbers(part, units))
+    numbers = (*_channels(part), *_numbers(part, units))
     remark = f"More than {MANY} numbers are not listed here; see the model file."
     large = any(r"\mathbb{R}" in line for line in numbers)
     equations = part.equations()
@@ -185,19 +183,17 @@ def _channels(part: Any) -> Iterator[str]:
 
 
 def _numbers(part: Parametrised, units: Units) -> Iterator[str]:
-    """Yield the values of parameters: as scalars, row vectors, or tables."""
-
-    def unit(field: str, *index: int) -> str:
-        return unit_of(part, field, index, units) or ""
-
-    scalars: list[str] = []
-    vectors: dict[int, dict[str, Symbol]] = {}
+    """Yield the values of numbers, vectors and matrices; of large ones their shape."""
     for field, symbol in part.notation.symbols.items():
-        value = getattr(part, field, None)
+        value: Any = getattr(part, field, None)
         if isinstance(value, float):
-            scalars.append(f"{symbol.letter} = {with_unit(tex(value), unit(field))}")
+            text = f"{symbol.letter} = {tex(value)}"
         elif isinstance(value, tuple) and value and isinstance(value[0], float):
-            vectors.setdefault(len(value), {})[field] = symbol
+            if len(value) > MANY:
+                yield symbol.of_shape(len(value))
+                continue
+            values = r",\; ".join(map(tex, value))
+            text = f"{symbol.stem} = ({values})"
         elif isinstance(value, tuple) and any(isinstance(row, tuple) and row for row in value):
             n, width = len(value), max(map(len, value))
             if n * width > MANY:
@@ -205,26 +201,8 @@ def _numbers(part: Parametrised, units: Units) -> Iterator[str]:
                 continue
             rows = r" \\ ".join(" & ".join(map(tex, row)) for row in value)
             yield rf"{symbol.stem} = \begin{{pmatrix}} {rows} \end{{pmatrix}}"
-    for place in range(0, len(scalars), 4):
-        yield r",\quad ".join(scalars[place : place + 4])
-    for size, symbols in vectors.items():
-        if FEW < size <= MANY:
-            first = next(iter(symbols.values())).first
-            columns = [["i", *map(str, range(first, first + size))]]
-            for field, symbol in symbols.items():
-                named = unit_tex(unit(field, 0))
-                head = rf"{symbol.letter}\,[{named}]" if named else symbol.letter
-                columns.append([head, *map(tex, getattr(part, field))])
-            heads, *lines = (" & ".join(line) for line in zip(*columns, strict=True))
-            body = rf"{heads} \\ \hline " + r" \\ ".join(lines)
-            yield rf"\begin{{array}}{{{'r' * len(columns)}}} {body} \end{{array}}"
             continue
-        for field, symbol in symbols.items():
-            if size > MANY:
-                yield symbol.of_shape(size)
-                continue
-            alike = {unit(field, place) for place in range(size)}
-            values = r",\; ".join(map(tex, getattr(part, field)))
-            ends = [indexed(symbol.letter, (place,), symbol.first) for place in (0, size - 1)]
-            letters = (r",\ldots," if size > 2 else r",\,").join(dict.fromkeys(ends))
-            yield f"{letters} = {with_unit(values, alike.pop() if len(alike) == 1 else '')}"
+        else:
+            continue
+        alike = {unit_of(part, field, at, units) or "" for at, _ in leaves(value)}
+        yield with_unit(text, alike.pop() if len(alike) == 1 else "")

@@ -205,9 +205,9 @@ class PIDFeedback(Block):
         named = {_sent(channel): channel for channel in outputs}
         given = tuple(named[_sent(self.given[place])] for place in order)
         kp, ki, kd = (tuple(gains[k] for k in order) for gains in (self.kp, self.ki, self.kd))
-        beside = (*_called(references, MEASURED), *_called(given, BASE))
+        scheduled = (*_called(references, MEASURED), *_called(given, BASE))
         made = replace(self, kp=kp, ki=ki, kd=kd, late=True)
-        return replace(made, driven=references, scheduled=beside, given=given)
+        return replace(made, driven=references, scheduled=scheduled, given=given)
 
     @classmethod
     def example(cls) -> Self:
@@ -244,7 +244,7 @@ class FeedforwardFeedback(Composition):
     compensator : Block
         From references, and what schedules it, to pressures.
     feedback : PIDFeedback
-        Whose references are the compensator's, and whose bases are what the compensator gives.
+        Whose references are the compensator's, and whose bases are its outputs.
     """
 
     kind: ClassVar[str] = "feedforward-feedback"

@@ -1,6 +1,6 @@
 """Inverses of blocks: one class for all, which runs the declared inverse kernel.
 
-An inverse takes the outputs of its field ``forward``, then what schedules that one, and gives its
+An inverse takes the outputs of its field ``forward``, then its scheduling inputs, and returns its
 driven inputs. Its state begins with the forward block's, unless it is shorter.
 """
 
@@ -14,10 +14,9 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Cost, Start, explicit_state
+from mckibben.blocks.base import Block, Start, explicit_state
 from mckibben.blocks.fields import STRICT, Channel, Initial
 from mckibben.blocks.kernels import Step, kernel
-from mckibben.blocks.notation import lettered
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError, ModelWarning
@@ -25,10 +24,6 @@ from mckibben.registry import load
 
 if TYPE_CHECKING:
     from mckibben.blocks.learning import Learnable
-
-USUAL_TRIALS, MOST_TRIALS = 12, 600
-"""Trials per step of an inverse without a closed form: typical on smooth references, and maximum.
-"""
 
 COMMANDS = ("pressure", "voltage")
 """Names of channels that drive a muscle."""
@@ -127,14 +122,6 @@ class Invertible(Block):
         """Adaptive parameters of the inverse; None if it has none."""
         return None
 
-    def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of a step of the inverse; by default one pass, or several trials."""
-        if self.solved:
-            once = self.cost(sample_time).usual
-            return Cost(USUAL_TRIALS * once, MOST_TRIALS * once)
-        numbers = self.inverse_numbers(self.coefficients(sample_time))
-        return Cost.of(numbers, self.n_inverse_states)
-
     def reachable(self) -> tuple[Array, Array]:
         """Return the lowest and highest outputs that are reachable from every state.
 
@@ -173,7 +160,7 @@ class Inverse(Block):
     Parameters
     ----------
     forward : Block
-        The block undone, which declares how.
+        The inverted block, which declares how.
     """
 
     kind: ClassVar[str] = "inverse"
@@ -190,7 +177,6 @@ class Inverse(Block):
     n_states = same_as("forward.n_inverse_states")
     n_scratch = same_as("forward.n_inverse_scratch")
     start = same_as("forward.start")
-    cost = same_as("forward.inverse_cost")
     strictly_increasing = same_as("forward.strictly_increasing")
 
     def __post_init__(self) -> None:
@@ -225,7 +211,7 @@ class Inverse(Block):
             return self.forward.inverse_state(self.forward.initial_state(first, start))
         state = explicit_state(self, start)
         if n <= self.n_states:
-            self.forward.initial_state(first, state[:n].tolist())  # which knows what states can be
+            self.forward.initial_state(first, state[:n].tolist())  # which checks it
         return state
 
     def coefficients(self, sample_time: float | None) -> Array:
@@ -253,11 +239,6 @@ class Inverse(Block):
         """Return the equation of the inverse; those of the forward block follow."""
         return (r"\hat{u} = P^{-1}[y] \quad\text{such that}\quad P[\hat{u}] = y",)
 
-    def worked(self) -> tuple[str, ...]:
-        """Return the channels of the inverse; P is the forward block."""
-        letters = lettered("y", self.forward.outputs) + lettered(r"\hat{u}", self.outputs)
-        return (r",\quad ".join([*letters, r"P\text{: the model below}"]),)
-
     @classmethod
     def example(cls) -> Self:
         return cls(load("blocks", "pi").example())
@@ -271,6 +252,7 @@ def drives(channel: Channel) -> bool:
 def commands(block: Block) -> bool:
     """Return whether a block is an inverse whose outputs drive a muscle.
 
-    Not every inverse does: a forward model solved from a law of forces is one, and gives a displacement.
+    Not every inverse does: a forward model solved from a law of forces is an inverse too, and returns a
+    displacement.
     """
     return block.undoing and drives(block.outputs[0])

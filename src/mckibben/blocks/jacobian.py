@@ -201,7 +201,7 @@ def _coefficient_slopes(
 
     tried: list[Array] = []
     ends = np.cumsum([numbers.size for numbers in moved(0.0)])
-    found, apart = np.zeros(ends[-1]), np.full(ends[-1], np.inf)
+    found, nearest = np.zeros(ends[-1]), np.full(ends[-1], np.inf)
     for share in CHANGES:
         change = share * (abs(values[place]) or 1.0)
         slopes = np.zeros(found.size)
@@ -211,9 +211,9 @@ def _coefficient_slopes(
             slopes[moves] += weight * (above[moves] - below[moves]) / change
         if tried:
             gap = np.abs(slopes - tried[-1])
-            found = np.where(gap < apart, tried[-1], found)
-            apart = np.minimum(gap, apart)
-            if (apart <= AGREEING * np.abs(found)).all():
+            found = np.where(gap < nearest, tried[-1], found)
+            nearest = np.minimum(gap, nearest)
+            if (nearest <= AGREEING * np.abs(found)).all():
                 break
         tried.append(slopes)
     return np.split(found, ends[:-1])

@@ -1,29 +1,27 @@
 """Online estimation of a block's parameters in its inverse: recursive least squares.
 
-With slopes phi of a measured output over the parameters, each in its scale and by the scatter of errors,
-and P the parameters' covariance,
+With slopes phi of a measured output over the parameters, each in its scale and divided by the scatter of
+errors, and P the parameters' covariance,
 
     r = phi' P phi,   theta <- theta + P phi e / (1 + r),   P^-1 <- P^-1 + b phi phi',
     b = l - (1 - l) / r,   l = 1 - sample time / time:
 
-what is known is forgotten along phi alone, as much as comes in (Kulhavy, "Restricted exponential
-forgetting in real-time identification", Automatica 23 (1987), 589): r settles at (1 - l) / l, and no
-variance passes the widest. P is held as U D U', changed by Bierman's recursion, and so stays positive in
-single precision.
+Information is forgotten along phi alone, as much as arrives (Kulhavy, "Restricted exponential
+forgetting in real-time identification", Automatica 23 (1987), 589): r settles at (1 - l) / l, and
+no variance exceeds the widest. P is factored as U D U' and updated by Bierman's recursion, so that
+it stays positive in single precision.
 
-The scatter is the usual size of errors (it follows their median), times the root of how many that follow
-one another tell as much as an independent one. Errors beyond a few times that size count as that size;
-where many are too large, the plant has stepped, and the covariance is made as wide as at the start.
-Measurements that are not a number teach nothing, nor does one that stands still while the reference
+The scatter is the usual size of errors, which follows their median, times a constant, since errors
+of successive samples are correlated. Errors beyond a few times that size count as that size; if
+many are too large, the plant has changed suddenly, and the covariance is reset to that of the
+start. Measurements that are NaN are ignored, and so is a sensor that is frozen while the reference
 moves.
 
-What is learnt is used as far as it helps: the inverse runs with parameters between the fitted and the
-learnt ones, where late errors would have been least.
-
-Of weighted sums of play operators the slopes are the operators and 1, so nothing is linearised. They
-play in the space of the input, and stay as they are where weights move. There, what is learnt is taken
-over as far as the input then goes on in the direction of the reference, unless it differs by more than
-the usual error: a change of weights is never mistaken for a reversal, and noise does not chatter.
+For weighted sums of play operators the slopes are the operators and 1, so nothing is linearised.
+The operators' states are in units of the input, and do not change with the weights. There, the
+inverse adopts new weights as far as its input then continues in the direction of the reference,
+unless the difference exceeds the usual error: a change of weights never acts as a reversal, and
+noise does not cause chatter.
 """
 
 from __future__ import annotations
@@ -46,50 +44,34 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Group:
-    """Parameters that drift together: their name, and the names of an increase and a decrease."""
-
-    name: str
-    more: str = "higher"
-    less: str = "lower"
-
-
-@dataclass(frozen=True)
 class Learnable:
     """Linear parameters of a block that are adapted while its inverse runs.
 
     Parameters
     ----------
     step, start : callable
-        Kernels of the adaptive inverse. Inputs of the step are those of the inverse, then the outputs
-        that answer the references of the step before, NaN where absent; it computes in scratch. The
-        state is [the inverse's, ``n_more_states``, theta, used, root, senses]: the parameters as
-        learnt, those that the inverse runs with, the covariance as U D U', and what is remembered
-        of every sensor.
+        Kernels of the adaptive inverse. Inputs of the step are those of the inverse, then the measured
+        outputs for the references of the step before, NaN where absent. The state is [the inverse's,
+        ``n_more_states``, theta, used, root, senses]: the estimated parameters, those that the inverse
+        uses, the covariance as U D U', and the memory of every sensor.
     fitted : array, shape (p,)
         The parameters as fitted, in their units.
     scales : array, shape (p,)
-        Size of a change of each that counts as a whole; positive.
+        Unit of changes of each; positive.
     spread : array, shape (p, p)
-        Covariance of changes to be expected, in squares of the scales; definite.
+        Covariance of expected changes, in squares of the scales; positive definite.
     with_parameters : callable
         Returns the forward block with other parameters, shape (p,).
     numbers : callable
         Returns the coefficients that follow the learner's (see `family_at`), given the sample time.
-    groups : tuple of Group
-        In which drift is reported.
-    group_changes : callable
-        Returns the relative change of every group from the fitted one, given parameters.
-    whole_changes : array, shape (n_groups,)
-        How far an output moves where a group changes by the whole of it; infinite if unknown.
     known : array, shape (n_outputs, 2), optional
         Lowest and highest outputs where it was fitted, if known.
     compensates : bool
         Whether the block is itself the compensator that runs, and its inverse the model.
     n_more_states : int
-        Numbers of the last sample that the step remembers behind the inverse's state.
+        Number of states after the inverse's.
     n_more_scratch : int
-        Numbers it computes in, beside three a parameter and those of the inverse.
+        Scratch in addition to three numbers a parameter and that of the inverse.
     """
 
     step: Step
@@ -99,26 +81,23 @@ class Learnable:
     spread: Array
     with_parameters: Callable[[Array], Block]
     numbers: Callable[[float | None], Array]
-    groups: tuple[Group, ...]
-    group_changes: Callable[[Array], Array]
-    whole_changes: Array
     known: Array | None = None
     compensates: bool = False
     n_more_states: int = 1
     n_more_scratch: int = 0
 
 
-SENSES = 12
-"""Number of stored values per sensor: whether it was read, usual error, surprise, last measurement,
-the prediction when that changed, product and square of errors, last error, whether ignored, squared
-scatter of the covariance, product of misfit and correction, and square of the correction.
+SENSES = 5
+"""Stored values per sensor: number of updates modulo p, usual size of its errors, their mean square
+relative to that, last measurement, and the prediction when that changed.
 """
 
-READY, USUAL, SURPRISE, LAST, THEN, RELATED, SQUARED, BEFORE, IGNORED, STOOD = range(10)
-HELPED, APART = 10, 11
+READY, USUAL, SURPRISE, LAST, THEN = range(SENSES)
 
 GATE = 3.0
-"""Innovation, in usual errors, above which a measurement is rejected."""
+"""Innovation, in usual errors, beyond which a measurement counts as one of that size."""
+CORRELATED = 10.0
+"""Square root of how many errors, each like the last, count as one independent error."""
 QUARTILE = 0.6745
 """Median absolute error of a unit-variance normal distribution."""
 SINGLE = {"ABSURD": 1e-6, "STILL": 1e-9, "UNMOVED": 1e-12}
@@ -127,8 +106,6 @@ NEAR = 0.1
 """Width of the transition at the gate, so that single and double precision decide alike."""
 ABSURD = 1e-6
 """Weight of an error too large to be plausible."""
-ALIKE, MOST_ALIKE = 0.98, 0.9995
-"""Correlation of successive errors: initial value, and maximum."""
 LARGEST = 1e9
 """Largest usual error, relative to the noise."""
 NEVER = 1e30
@@ -137,8 +114,6 @@ STILL, UNMOVED = 1e-9, 1e-12
 """Smallest information, and squared slope relative to the noise, below which parameters do not
 change.
 """
-LATE = 3.0
-"""Recent errors are averaged over the adaptation time divided by this."""
 SURPRISED = 5.0
 """Mean squared error (clipped at the gate), relative to the usual one, above which adaptation
 restarts.
@@ -155,7 +130,6 @@ def learn(
     measured: float,
     predicted: float,
     asked: float,
-    fitted: float,
 ) -> bool:
     """Update the parameters by one measured output; return whether they changed.
 
@@ -170,17 +144,16 @@ def learn(
     slopes : array, shape (p,)
         Of the output over the parameters.
     work : array, shape (2 p,)
-        To compute in.
-    measured, predicted, asked, fitted : float
-        The output, what it is by ``theta``, by what the inverse runs with, and by what was fitted.
+        Scratch.
+    measured, predicted, asked : float
+        The output, its prediction by ``theta``, and by the parameters that the inverse uses.
     """
     p, share, noise = int(c[0]), c[1], c[2]
-    scales, widest, fresh = c[4 : 4 + p], c[4 + p : 4 + 2 * p], c[4 + 3 * p : family_at(c)]
+    scales, widest, fresh = c[3 : 3 + p], c[3 + p : 3 + 2 * p], c[3 + 3 * p : family_at(c)]
     theta, root = learnt[:p], learnt[2 * p : 2 * p + fresh.size]
     first = 2 * p + fresh.size + place * SENSES
     sense = learnt[first : first + SENSES]
     if measured - measured != 0.0:
-        sense[IGNORED] += 1.0
         return False
     if sense[READY] == 0.0:
         sense[READY], sense[LAST], sense[THEN] = 1.0, measured, asked
@@ -189,8 +162,7 @@ def learn(
     if measured != sense[LAST]:
         sense[LAST], sense[THEN] = measured, asked
     elif abs(asked - sense[THEN]) > GATE * usual:
-        sense[THEN] = NEVER  # it stands until it changes
-        sense[IGNORED] += 1.0
+        sense[THEN] = NEVER  # frozen until it changes
         return False
     if sense[SURPRISE] > SURPRISED:  # the plant has stepped
         for i in range(fresh.size):
@@ -199,31 +171,28 @@ def learn(
     error = measured - predicted
     f, g = work[:p], work[p : 2 * p]
     r = 0.0
-    told = usual * math.sqrt(fewer(sense))
-    _stand_by(told * told, share, c[3], root[:p], sense)
+    scatter = CORRELATED * usual
     for j in range(p):
-        f[j] = slopes[j] * scales[j] / told
+        f[j] = slopes[j] * scales[j] / scatter
     for j in range(p - 1, -1, -1):  # U' phi in place
         first = p + (j * (j - 1)) // 2
         for i in range(j):
             f[j] += root[first + i] * f[i]
         g[j] = root[j] * f[j]
         r += f[j] * g[j]
-    expected = math.sqrt(usual * usual + r * told * told)
+    expected = math.sqrt(usual * usual + r * scatter * scatter)
     weight = 1.0
     if abs(error) > GATE * expected:
         weight = GATE * expected / abs(error)
-        sense[IGNORED] += 1.0
-    _feel(share, noise, weight * error / expected, sense)
-    _compare(share, noise, weight * error, predicted - fitted, sense)
+    update_size(share, noise, weight * error / expected, sense)
     if not UNMOVED < r < np.inf or weight < ABSURD:
         return False
     settled = share / (1.0 - share)
-    lacks = r < settled  # as where errors have grown: what is excited is learnt within the time
-    tells = 1.0 / settled - 1.0 / r
+    lacks = r < settled  # as where errors have grown: then it adapts within the time
+    excess = 1.0 / settled - 1.0 / r
     r *= weight
-    _spread(root, f, g, tells if lacks else weight * (1.0 - share - share / r))
-    gain = weight * error / told / (1.0 + r)
+    _spread(root, f, g, excess if lacks else weight * (1.0 - share - share / r))
+    gain = weight * error / scatter / (1.0 + r)
     for i in range(p):
         theta[i] += scales[i] * g[i] * gain
     turn = int(sense[READY]) % p
@@ -233,53 +202,13 @@ def learn(
 
 
 @kernel
-def _stand_by(square: float, share: float, part: float, diagonal: Array, sense: Array) -> None:
-    """Scale the covariance with the scatter, at once if that grows, to follow slow drift."""
-    stood = sense[STOOD]
-    stands = square if square > stood else stood + share * (square - stood)
-    grows = 1.0 + part * (stands / stood - 1.0)
-    for i in range(diagonal.size):
-        diagonal[i] *= grows
-    sense[STOOD] = stands
-
-
-@kernel
-def fewer(sense: Array) -> float:
-    """Return the number of correlated errors equivalent to one independent error."""
-    alike = min(max(sense[RELATED] / sense[SQUARED], 0.0), MOST_ALIKE)
-    return (1.0 + alike) / (1.0 - alike)
-
-
-@kernel
-def _feel(share: float, noise: float, relative: float, sense: Array) -> None:
-    """Store an error, normalised by its expected size."""
+def update_size(share: float, noise: float, relative: float, sense: Array) -> None:
+    """Update the usual size of errors, near their median, by one relative to its expected size."""
     usual = sense[USUAL]
     quick = min(20.0 * share, 0.5)
     side = min(max((abs(relative) - QUARTILE) / NEAR, -1.0), 1.0)
     sense[USUAL] = min(max(usual * (1.0 + 0.5 * quick * side), noise), LARGEST * noise)
-    square = relative * relative
-    sense[SURPRISE] += quick * (square - sense[SURPRISE])
-    sense[RELATED] += share * (relative * sense[BEFORE] - sense[RELATED])
-    sense[SQUARED] += share * (square - sense[SQUARED])
-    sense[BEFORE] = relative
-
-
-@kernel
-def _compare(share: float, noise: float, left: float, made_up: float, sense: Array) -> None:
-    """Store how adaptation would have helped: the remaining and the corrected error."""
-    late = min(LATE * share, 0.5)
-    sense[HELPED] += late * (made_up * (left + made_up) - sense[HELPED])
-    sense[APART] += late * (made_up * made_up + noise * noise - sense[APART])
-
-
-@kernel
-def trusted(senses: Array) -> float:
-    """Return the step from fitted to adapted parameters that would have minimised the errors."""
-    helped, apart = 0.0, 0.0
-    for first in range(0, senses.size, SENSES):
-        helped += senses[first + HELPED]
-        apart += senses[first + APART]
-    return min(max(helped / apart, 0.0), 1.0)
+    sense[SURPRISE] += quick * (relative * relative - sense[SURPRISE])
 
 
 @kernel
@@ -334,10 +263,10 @@ def pull_back(c: Array, learnt: Array, along: Array, work: Array) -> None:
     """
     p = along.size
     for i in range(p):
-        work[i] = c[1] * (c[4 + 2 * p + i] - learnt[i]) / (c[4 + i] * c[4 + p + i])
+        work[i] = c[1] * (c[3 + 2 * p + i] - learnt[i]) / (c[3 + i] * c[3 + p + i])
     covariant(learnt, work, along)
     for i in range(p):
-        learnt[i] += c[4 + i] * along[i]
+        learnt[i] += c[3 + i] * along[i]
 
 
 @kernel
@@ -371,15 +300,6 @@ def start_root(covariance: Array) -> Array:
     return np.concatenate([diagonal, *(upper[:j, j] for j in range(p))])
 
 
-def covariance_of(root: Array, p: int) -> Array:
-    """Return U D U', shape (p, p)."""
-    upper, first = np.eye(p), p
-    for j in range(p):
-        upper[:j, j] = root[first : first + j]
-        first += j
-    return np.asarray((upper * root[:p]) @ upper.T)
-
-
 @kernel
 def root_size(p: int) -> int:
     """Return the number of entries of the factored covariance of p parameters."""
@@ -390,19 +310,19 @@ def root_size(p: int) -> int:
 def family_at(c: Array) -> int:
     """Return the index of the family's coefficients in an adaptive block.
 
-    These are [p, sample time / time, noise, share of one output among those measured, scales (p),
-    widest variances in squares of them (p), fitted parameters (p), covariance at the start as root],
-    then the family's. A root is [D, columns of U above its diagonal of ones], p (p + 1) / 2 numbers.
+    These are [p, sample time / time, noise, scales (p), widest variances in squares of them (p), fitted
+    parameters (p), covariance at the start as root], then the family's. A root is [D, columns of U above
+    its diagonal of ones], p (p + 1) / 2 numbers.
     """
     p = int(c[0])
-    return 4 + 3 * p + root_size(p)
+    return 3 + 3 * p + root_size(p)
 
 
 @kernel
 def start_learning(c: Array, learnt: Array) -> None:
     """Start adaptation, [theta, used, root, senses], with the fitted parameters."""
     p, noise = int(c[0]), c[2]
-    fitted, fresh = c[4 + 2 * p : 4 + 3 * p], c[4 + 3 * p : family_at(c)]
+    fitted, fresh = c[3 + 2 * p : 3 + 3 * p], c[3 + 3 * p : family_at(c)]
     fill(learnt[:p], fitted)
     fill(learnt[p : 2 * p], fitted)
     fill(learnt[2 * p : 2 * p + fresh.size], fresh)
@@ -410,21 +330,12 @@ def start_learning(c: Array, learnt: Array) -> None:
     senses[:] = 0.0
     for first in range(0, senses.size, SENSES):
         senses[first + USUAL], senses[first + SURPRISE] = 3.0 * noise, 1.0
-        senses[first + SQUARED], senses[first + RELATED] = 1.0, ALIKE
-        senses[first + STOOD] = (3.0 * noise) ** 2 * (1.0 + ALIKE) / (1.0 - ALIKE)
-        senses[first + APART] = noise**2
 
 
 # -- of weighted sums of play operators ---------------------------------------------------------------
 
 LEAST = 0.1
 """Smallest share of a fitted partial sum of weights that adaptation leaves."""
-
-GROUPS = (
-    Group("gain", "higher (softer springs, or more area)", "lower (stiffer springs, or less area)"),
-    Group("friction"),
-    Group("offset", "up", "down"),
-)
 
 
 @kernel
@@ -451,27 +362,22 @@ def follow_learning(
     """
     n, p, family = r.size, r.size + 1, family_at(c)
     limits, least = c[family : family + 2], c[family + 2 : inverse_at(c)]
-    fitted = c[4 + 2 * p : 4 + 3 * p]
     theta, used = learnt[:p], learnt[p : 2 * p]
-    sense = learnt[family - 4 - p :]
+    sense = learnt[family - 3 - p :]
     work, slopes = scratch[: 2 * p], scratch[2 * p : 3 * p]
-    believed, asked, expected = theta[n], used[n], fitted[n]
+    predicted, asked = theta[n], used[n]
     for i in range(n):
         slopes[i] = s[i]
-        believed += theta[i] * s[i]
+        predicted += theta[i] * s[i]
         asked += used[i] * s[i]
-        expected += fitted[i] * s[i]
     slopes[n] = 1.0
-    if learn(c, learnt, 0, slopes, work, measured, believed, asked, expected):
+    if learn(c, learnt, 0, slopes, work, measured, predicted, asked):
         keep_rising(theta, least)
     if y > last[0]:
         last[2] = 1.0
     elif y < last[0]:
         last[2] = -1.0
-    share = trusted(sense)
-    for i in range(p):
-        slopes[i] = fitted[i] + share * (theta[i] - fitted[i])
-    take_over(slopes, used, s, y, last[2], GATE * sense[USUAL])
+    take_over(theta, used, s, y, last[2], GATE * sense[USUAL])
     total = 0.0
     for i in range(n):
         total += used[i] * s[i]
@@ -567,13 +473,6 @@ def learnable_operators(
         own = model.inverse_numbers(model.coefficients(sample_time))
         return np.concatenate([limits, least, own])
 
-    def group_changes(theta: Array) -> Array:
-        """Return the changes of sum w, of sum w r over sum w, and of the offset over the span."""
-        new = theta[:-1]
-        width_new, width_old = new @ r / new.sum(), w @ r / w.sum()
-        friction = width_new / width_old - 1 if width_old > 0 else 0.0
-        return np.array([new.sum() / w.sum() - 1, friction, (theta[-1] - offset) / span])
-
     return Learnable(
         step,
         start,
@@ -582,7 +481,4 @@ def learnable_operators(
         spread=together + np.diag([*np.full(n, 0.1**2), 0.3**2]),
         with_parameters=with_parameters,
         numbers=numbers,
-        groups=GROUPS,
-        group_changes=group_changes,
-        whole_changes=np.array([span, 2 * np.dot(w, r), span]),
     )

@@ -17,8 +17,7 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block
 from mckibben.blocks.inverse import Invertible, nothing_clipped
 from mckibben.blocks.kernels import DERIVED, SLACK, improved, inlined, kernel, step
-from mckibben.blocks.linear import LinearSystem
-from mckibben.blocks.notation import Notation, summed
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton
 from mckibben.errors import ModelError
 
@@ -50,6 +49,7 @@ class Affine(Block):
 
     kind = "affine"
     kernel = affine_step
+    is_linear = True
     parameters = ("gain", "offset")
     typical = (6.8, -1.5)
     notation = Notation("y = K u + y_0", gain="K [{y}/{u}]", offset="y_0 [{y}]")
@@ -65,12 +65,6 @@ class Affine(Block):
                 "'affine' of gain 0 has no inverse", remedy="give a gain that is not 0"
             )
         return Affine(1 / self.gain, -self.offset / self.gain, self.output, self.input)
-
-    def worked(self) -> tuple[str, ...]:
-        return (f"y = {summed([(self.gain, 'u'), (self.offset, '')])}",)
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        return LinearSystem.gain(self.gain, self.offset)
 
 
 @step
@@ -91,6 +85,7 @@ class Negative(Block):
 
     kind = "negative"
     kernel = negative_step
+    is_linear = True
     typical = ()
     notation = Notation("y = -u")
 
@@ -99,9 +94,6 @@ class Negative(Block):
 
     def inverse(self) -> Negative:
         return Negative(self.output, self.input)
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        return LinearSystem.gain(-1.0)
 
 
 # -- straight pieces -------------------------------------------------------------------------
@@ -273,7 +265,7 @@ class Polynomial(Invertible):
     scale : float
         Input per argument; positive.
     input_range : (float, float), optional
-        Where the polynomial holds; its inverse wants it to increase there, and clips there.
+        Where the polynomial holds; its inverse requires that it increases there, and clips there.
     input, output : Channel
         Channel driven and channel given.
     """
@@ -319,10 +311,6 @@ class Polynomial(Invertible):
     def _arguments(self) -> tuple[float, float]:
         low, high = self.input_limits
         return (low - self.centre) / self.scale, (high - self.centre) / self.scale
-
-    def worked(self) -> tuple[str, ...]:
-        powers = ["", "x", *(f"x^{{{k}}}" for k in range(2, len(self.polynomial)))]
-        return (f"y = {summed(list(zip(self.polynomial, powers, strict=False)))}",)
 
 
 # -- logarithm and exponential ---------------------------------------------------------------
@@ -406,7 +394,7 @@ class Exponential(Raised):
 # -- contact ---------------------------------------------------------------------------------
 
 LOST = 0.95
-"""Share of the smallest pressures without effect; keeps the map invertible."""
+"""Share of the smallest pressures without effect; so that the map remains invertible."""
 
 MOST_STEPS = 60
 """Maximum number of Newton steps; four to eight are needed."""

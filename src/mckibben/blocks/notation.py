@@ -1,6 +1,6 @@
 """Notation of models: equations in LaTeX, and symbol and unit of every parameter.
 
-A block declares both once, beside its fields; what a number means its docstring says already.
+A block declares both once, with its fields; their meanings are in its docstring.
 """
 
 from __future__ import annotations
@@ -15,10 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from mckibben.blocks.fields import Channel
 
-FEW = 8
-"""Longest vector that is written in one line; longer ones are tables."""
-
-MANY = 30
+MANY = 12
 """Number of entries above which only the shape is written."""
 
 
@@ -80,7 +77,7 @@ class Written:
     equations : tuple of str
         Its general form, in LaTeX.
     numbers : tuple of str
-        The same of this model: equations with numbers, and what symbols are, in LaTeX.
+        Channels and values of the symbols, in LaTeX.
     remark : str
         What is not written, and why; empty for nothing.
     parts : tuple of Written
@@ -167,20 +164,6 @@ def tex(value: float, digits: int = 4) -> str:
     text = f"{value:.{digits}g}"
     mantissa, _, exponent = text.partition("e")
     return rf"{mantissa} \times 10^{{{int(exponent)}}}" if exponent else mantissa
-
-
-def summed(terms: Sequence[tuple[float, str]]) -> str:
-    r"""Return a sum in LaTeX of numbers times symbols.
-
-    >>> summed([(2.0, ""), (-1.5, "x"), (1.0, "y")])
-    '2 - 1.5\\,x + y'
-    """
-    text = ""
-    for value, factor in terms:
-        size = tex(abs(value))
-        size = factor if factor and size == "1" else rf"{size}\,{factor}" if factor else size
-        text += (" - " if value < 0 else " + " if text else "") + size
-    return text.removeprefix(" - ") if not text.startswith(" - ") else f"-{text[3:]}"
 
 
 def unit_tex(unit: str) -> str:

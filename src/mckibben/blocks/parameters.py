@@ -99,10 +99,6 @@ class Parametrised(metaclass=Checked):
         """Return the equations of this structure, in LaTeX; by default those of its class."""
         return self.notation.equations
 
-    def worked(self) -> tuple[str, ...]:
-        """Return equations with numerical values in LaTeX, if short."""
-        return ()
-
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
         """Return the unit of a number of a field, as `Notation` writes it; None if none is declared."""
         del index

@@ -1,17 +1,17 @@
-"""Model-predictive compensators with limits of pressure, its rate, and the supply.
+"""Model-predictive compensators with limits of pressure and its rate.
 
-In every sample the exact inverse runs over the references of a horizon from the memory that the muscles
-really have. What it gives is used where limits let it: then this is the exact inverse. Where they do
-not, all pressures of the horizon are planned together (`mckibben.blocks.planning`), along the
-model's own prediction, hysteresis and all; the first is given, and the model takes that step. So a
-reversal that the supply is too slow for begins early, and errors are shared before and after.
+In every sample the exact inverse runs over the references of a horizon, from the model's present state.
+If its pressures are within all limits, they are the output: then this is the exact inverse. Otherwise
+all pressures of the horizon are optimised together (`mckibben.blocks.planning`), with the model as
+prediction, hysteresis included; the first of them is the output, and the model advances by it. So a
+reversal that is too fast for the supply begins early, and the error is shared before and after.
 
-References come ``horizon - 1`` samples ahead, one a sample, and are kept until they are due.
+References arrive ``horizon - 1`` samples ahead, one a sample, and are stored until they are due.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, cached_property
 from typing import Annotated, Any, ClassVar, Self
@@ -22,25 +22,17 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Cost, Run, Start, explicit_state, needs_sample_time
+from mckibben.blocks.base import Block, Run, Start, explicit_state, needs_sample_time
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.fields import STRICT, Initial, Vector
+from mckibben.blocks.fields import STRICT, Initial
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.inverse import Inverse, drives
 from mckibben.blocks.kernels import Step, fill, in_scratch, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
-from mckibben.blocks.planning import (
-    MOST_STEPS,
-    allowed,
-    clipped_to,
-    limit_rows,
-    plan_one,
-    plan_scratch,
-    plan_several,
-)
+from mckibben.blocks.planning import clip_path, plan_path, plan_scratch
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
@@ -48,9 +40,9 @@ NUDGE = 1e-3
 """Step of pressure for slopes of the model, relative to the pressure range."""
 
 MOST = 1e6
-"""Largest limit [bar or bar/s]."""
+"""Largest limit [bar/s]."""
 
-HEAD = 8
+HEAD = 7
 """Number of coefficients before the pressure steps."""
 
 PASSES = 2
@@ -71,7 +63,7 @@ def model_state(compensator: Block, state: Array) -> Array:
     Raises
     ------
     ModelError
-        If the compensator is no exact inverse, or its state does not tell the model's.
+        If the compensator is no exact inverse, or its state does not determine the model's.
     """
     match compensator:
         case Inverse() if compensator.n_states >= compensator.forward.n_states:
@@ -191,18 +183,18 @@ def _start_in_room(function: Any) -> Any:
 
 @cache
 def predictive_kernels(
-    model_step: Step, undo_step: Step, undo_start: Start, resume: Resume, *, one: bool
+    model_step: Step, undo_step: Step, undo_start: Start, resume: Resume
 ) -> tuple[Step, Start]:
-    """Return step and start of a predictive compensator, for one muscle or several.
+    """Return step and start of a predictive compensator.
 
-    They are made of the kernels of a model and of its inverse; ``resume`` fills the inverse's state
-    from the model's. Coefficients are [n, horizon, limits, the model's states, the inverse's, the
-    model's coefficients, the inverse's, references m], nudges (n), lowest pressures (n), limits, and the
-    coefficients of both. The state is [the model's, references to come (horizon by m), last pressures
-    (n), whether there are some, plans made].
+    They are composed of the kernels of a model and of its inverse; ``resume`` fills the inverse's state
+    from the model's. Coefficients are [n, horizon, the model's states, the inverse's, the model's
+    coefficients, the inverse's, references m], nudges (n), limits (1 + 2 n), and the coefficients of
+    both. The state is [the model's, references to come (horizon by m), last pressures (n), whether there
+    are some, plans made].
     """
     answers, undoes, begins = _in_room(model_step), _in_room(undo_step), _start_in_room(undo_start)
-    predictive_step = step_of(answers, undoes, resume, one=one, decorate=kernel)
+    predictive_step = step_of(answers, undoes, resume, decorate=kernel)
 
     @kernel
     def predictive_start(
@@ -210,23 +202,22 @@ def predictive_kernels(
     ) -> None:
         """Start as the inverse does: as if its first reference had always been applied."""
         c = coefficients
-        numbers = c[HEAD + 2 * int(c[0]) + int(c[2]) * (int(c[0]) + 2) + int(c[5]) :]
-        undoing = scratch[: int(c[4])]
-        begins(numbers, undoing, scratch[int(c[4]) :], inputs, virgin)
+        undoing = scratch[: int(c[3])]
+        numbers = c[HEAD + 1 + 3 * int(c[0]) + int(c[4]) :]
+        begins(numbers, undoing, scratch[int(c[3]) :], inputs, virgin)
         state[:] = 0.0
-        fill(state[: int(c[3])], undoing)
+        fill(state[: int(c[2])], undoing)
 
     return step(predictive_step), predictive_start
 
 
 def step_of(
-    answers: Any, undoes: Any, resume: Any, *, one: bool, decorate: Callable[[Any], Any]
+    answers: Any, undoes: Any, resume: Any, *, decorate: Callable[[Any], Any]
 ) -> Callable[..., None]:
     """Return the step of `predictive_kernels`, uncompiled; its callees are compiled, or decorated.
 
     Where a model is of several kernels, ``answers``, ``undoes`` and ``resume`` are not compiled either.
     """
-    planner: Any = plan_one if one else plan_several
 
     @decorate
     def linearise(
@@ -279,12 +270,11 @@ def step_of(
     ) -> None:
         """Compute the first pressures of a horizon within all limits, and take that step."""
         c = coefficients
-        n, m, length, size, n_undoing = int(c[0]), int(c[7]), int(c[1]), int(c[3]), int(c[4])
+        n, m, length, size, n_undoing = int(c[0]), int(c[6]), int(c[1]), int(c[2]), int(c[3])
         planned, count = length * n, length * m
-        nudges, lowest, numbers = c[HEAD : HEAD + n], c[HEAD + n : HEAD + 2 * n], c[HEAD + 2 * n :]
-        n_limits = int(c[2]) * (n + 2)
-        rows, own = numbers[:n_limits], numbers[n_limits:]
-        model, undo = own[: int(c[5])], own[int(c[5]) : int(c[5]) + int(c[6])]
+        nudges, limits = c[HEAD : HEAD + n], c[HEAD + n : HEAD + 3 * n + 1]
+        own = c[HEAD + 3 * n + 1 :]
+        model, undo = own[: int(c[4])], own[int(c[4]) : int(c[4]) + int(c[5])]
         memory, desired, last = state[:size], state[size : size + count], state[size + count :]
         states, undoing = scratch[: 3 * size], scratch[3 * size : 3 * size + n_undoing]
         more = scratch[3 * size + n_undoing :]
@@ -304,19 +294,17 @@ def step_of(
             fill(asked[:m], desired[t * m : (t + 1) * m])
             undoes(undo, undoing, room, asked, path[(t + 1) * n : (t + 2) * n])
         if first:  # whatever the rate
-            fill(nominal[:n], lowest)
-            fill(nominal[n : 2 * n], path[n : 2 * n])
-            _ = allowed(n, rows, nominal, 0, True)
-            fill(last[:n], nominal[n : 2 * n])
+            for k in range(n):
+                last[k] = min(max(path[n + k], limits[1 + k]), limits[1 + n + k])
             last[n] = 1.0
         fill(path[:n], last[:n])
         fill(nominal, path)
-        if not clipped_to(n, rows, path):
+        if not clip_path(limits, path):
             slopes, errors = tables[: n * count], tables[n * count : (n + 1) * count]
             for _ in range(PASSES):
                 linearise(n, model, nudges, memory, desired, nominal, given, tables, states, room)
-                _ = planner(n, rows, slopes, nominal[n:], errors, path, room)
-                _ = clipped_to(n, rows, path)
+                _ = plan_path(limits, slopes, nominal[n:], errors, path, room)
+                _ = clip_path(limits, path)
                 fill(nominal, path)
             last[n + 1] += 1.0
         fill(last[:n], path[n : 2 * n])
@@ -356,36 +344,24 @@ class Predictive(Block):
         Fastest change of every pressure [bar/s].
     pressure_range : (float, float), optional
         Lowest and highest pressure [bar]; default the compensator's own.
-    total_limit : float, optional
-        Highest sum of all pressures [bar].
-    flow_limit : float, optional
-        Most air that the supply gives: rates of all pressures that rise, by volumes, together [bar/s].
-    volumes : sequence of n float
-        Of muscles, relative to one another, positive; 1 each by default.
     """
 
     kind: ClassVar[str] = "predictive"
     undoing: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("compensator",)
+    retired: ClassVar[Mapping[str, Any]] = {"total_limit": None, "flow_limit": None, "volumes": ()}
     rate_dependent: ClassVar[bool] = True
     path_dependent: ClassVar[bool] = True
     notation: ClassVar[Notation] = Notation(
         r"\min_{p} \sum_{t=0}^{N-1} \left(r_t - P[p]_t\right)^2 \quad\text{such that}\quad "
-        r"p_{\min} \le p_t \le p_{\max},\quad |p_t - p_{t-1}| \le \rho T,\quad "
-        r"\sum_k p_{k,t} \le S,\quad \sum_k V_k \max(p_{k,t} - p_{k,t-1}, 0) \le Q T",
+        r"p_{\min} \le p_t \le p_{\max},\quad |p_t - p_{t-1}| \le \rho T",
         rate_limit=r"\rho [bar/s]",
-        total_limit="S [bar]",
-        flow_limit="Q [bar/s]",
-        volumes="V_k",
     )
 
     compensator: Annotated[InstanceOf[Block], BeforeValidator(nested)]
     horizon: Annotated[int, Interval(ge=1, le=200)] = 20
     rate_limit: Limit | None = None
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
-    total_limit: Limit | None = None
-    flow_limit: Limit | None = None
-    volumes: Vector = ()
 
     inputs = same_as("compensator.inputs")
     scheduling = same_as("compensator.scheduling")
@@ -393,29 +369,17 @@ class Predictive(Block):
 
     def __post_init__(self) -> None:
         model_state(self._undoing, np.zeros(self._undoing.n_states))
-        n = len(self.outputs)
         if strange := [c.name for c in self.outputs if not drives(c)]:
             raise ModelError(
-                f"{self.kind!r} plans what drives muscles, and {self.compensator.title!r} "
-                f"gives {', '.join(strange)}",
+                f"{self.kind!r} plans commands of muscles, and the outputs of "
+                f"{self.compensator.title!r} are {', '.join(strange)}",
                 remedy="give the compensator, from references to pressures",
-            )
-        if self.volumes and (len(self.volumes) != n or min(self.volumes) <= 0):
-            raise ModelError(
-                f"volumes of {self.kind!r} are {self.volumes}",
-                remedy=f"give {n} positive ones, or none",
             )
         low, high = self.pressures
         if not (np.isfinite([*low, *high]).all() and (low < high).all()):
             raise ModelError(
                 f"{self.kind!r} plans pressures between {low.tolist()} and {high.tolist()} bar",
                 remedy="give pressure_range, the lower end first",
-            )
-        if self.total_limit is not None and self.total_limit <= low.sum():
-            raise ModelError(
-                f"all pressures at their lowest add up to {low.sum():g} bar, but "
-                f"total_limit is {self.total_limit:g}",
-                remedy="give a higher one",
             )
 
     @cached_property
@@ -452,14 +416,6 @@ class Predictive(Block):
         n, m = len(self.outputs), self.compensator.n_driven
         return self._planned.n_states + self.horizon * m + n + 2
 
-    def rows(self, sample_time: float) -> Array:
-        """Return all limits, as in `mckibben.blocks.planning`."""
-        low, high = self.pressures
-        most = [self.rate_limit, self.total_limit, self.flow_limit]
-        rate, total, flow = (np.inf if limit is None else limit for limit in most)
-        volumes = np.array(self.volumes or np.ones(len(low)).tolist())
-        return limit_rows(low, high, rate * sample_time, total, flow * sample_time, volumes)
-
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the initial state: as if its reference had always been applied."""
         if initial is not None and not isinstance(initial, str):
@@ -476,10 +432,9 @@ class Predictive(Block):
         """Scratch: trial states, pressures, slopes, and the working memory of a plan."""
         model, undo = self._planned, self._undoing
         n, m = len(self.outputs), undo.n_driven
-        planned = plan_scratch(self.horizon, n, len(self.rows(1.0)))
         given = len(model.inputs) + len(undo.inputs)
         own = 3 * model.n_states + undo.n_states + given + 2 * n + n + 2 * m
-        room = max(planned, model.n_scratch, undo.n_scratch)
+        room = max(plan_scratch(self.horizon), model.n_scratch, undo.n_scratch)
         return own + self.horizon * (2 * n + m * (1 + n)) + room
 
     @cached_property
@@ -492,8 +447,7 @@ class Predictive(Block):
             self._undoing.c_kernels,
             self._planned.c_kernels,
         )
-        one = len(self.outputs) == 1
-        return predictive_kernels(model_step, undo_step, undo_start, resume, one=one)
+        return predictive_kernels(model_step, undo_step, undo_start, resume)
 
     @property
     def kernel(self) -> Step | None:  # type: ignore[override]
@@ -515,33 +469,12 @@ class Predictive(Block):
 
     def _numbers(self, sample_time: float | None, own: list[Array]) -> Array:
         """Return the coefficients, with those of the model and the inverse."""
-        rows = self.rows(needs_sample_time(self.kind, sample_time))
         low, high = self.pressures
-        head = [
-            len(low),
-            self.horizon,
-            len(rows),
-            self._planned.n_states,
-            self._undoing.n_states,
-        ]
-        sizes = [*map(len, own), self.compensator.n_driven]
-        return np.concatenate([[*head, *sizes], NUDGE * (high - low), low, rows.ravel(), *own])
-
-    @property
-    def needs_double(self) -> str:
-        """Why several muscles need double precision: in single precision their plan is off by 0.2 %."""
-        return "plans several muscles, for which single precision is too coarse" * (
-            len(self.outputs) > 1
-        )
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of the inverse over the horizon; at worst of all plans too."""
-        n, length = len(self.outputs), self.horizon
-        inverse = self.compensator.cost(sample_time).usual
-        answers = PASSES * (n + 1) * self._planned.cost(sample_time).usual
-        step = 2 * n**3 + len(self.rows(1.0)) * (4 * n * n + 12 * n + 20)
-        planned = PASSES * (4 * length if n == 1 else MOST_STEPS * step)
-        return Cost(length * inverse, length * (inverse + answers + planned))
+        rate = np.inf if self.rate_limit is None else self.rate_limit
+        change = rate * needs_sample_time(self.kind, sample_time)
+        sizes = [self._planned.n_states, self._undoing.n_states, *map(len, own)]
+        head = [len(low), self.horizon, *sizes, self.compensator.n_driven]
+        return np.concatenate([head, NUDGE * (high - low), [change], low, high, *own])
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         if self._kernels is not None:
@@ -555,8 +488,7 @@ class Predictive(Block):
             del model
             own[:] = undoing(memory)
 
-        one = len(self.outputs) == 1
-        advance = step_of(answers, undoes, resume, one=one, decorate=lambda function: function)
+        advance = step_of(answers, undoes, resume, decorate=lambda function: function)
 
         def run() -> None:
             for t in range(len(inputs)):

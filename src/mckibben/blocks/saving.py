@@ -75,6 +75,9 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
         kind = older.get(kind, "inverse" if undone else kind)
     cls = load_plugin(group, kind)
     values = {key: _tuples(value) for key, value in content.items() if key != "kind"}
+    for name, unused in getattr(cls, "retired", {}).items():
+        if values.get(name) == unused:
+            values.pop(name, None)
     unknown = sorted(set(values) - {field.name for field in fields(cls)}, key=str)
     if unknown:
         remedy = getattr(cls, "made_again", "save the model again")

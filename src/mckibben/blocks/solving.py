@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Cost, Start
+from mckibben.blocks.base import Start
 from mckibben.blocks.kernels import (
     BRACKET,
     DERIVED,
@@ -193,15 +193,6 @@ def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> 
         state[-1] = 0.0
 
     return kernel(inverse_start)
-
-
-USUAL_NEWTON, MOST_NEWTON = 3, 60
-"""Steps of Newton's method: typical on smooth references, and maximum."""
-
-
-def newton_cost(step: int) -> Cost:
-    """Return the cost of a sample solved by Newton's method, from that of one step."""
-    return Cost(USUAL_NEWTON * step, MOST_NEWTON * step)
 
 
 @kernel

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
-from mckibben.errors import ModelError
 from mckibben.estimators.core.uncertainty import DIFFERENCE, relative_sizes
 from mckibben.recording import Recording
 
@@ -63,22 +62,16 @@ def frequency_responses(
         Half an interval, in standard errors.
     """
     step = recordings[0].sample_time
-    if step is None:
-        return ()
-    try:
-        system = block.linear_system(step)
-    except ModelError:
-        return ()
-    if not len(system.a):
+    if step is None or not block.is_linear or block.n_states == 0:
         return ()
     frequency = np.geomspace(2 / (max(map(len, recordings)) * step), 0.5 / step, FREQUENCIES)
-    base = system.response(frequency)
+    base = linear_response(block, step, frequency)
     values, known = block.pack(), np.flatnonzero(np.isfinite(np.diag(covariance)))
     steps = DIFFERENCE * relative_sizes(values)
     slopes = np.zeros((known.size, *base.shape), dtype=complex)
     for slope, place in zip(slopes, known, strict=True):
         moved = block.unpack(values + steps * (np.arange(values.size) == place))
-        slope[:] = np.log(moved.linear_system(step).response(frequency) / base) / steps[place]
+        slope[:] = np.log(linear_response(moved, step, frequency) / base) / steps[place]
     small, found = covariance[np.ix_(known, known)], []
     for j, output in enumerate(block.outputs):
         i = j if len(block.inputs) - len(block.scheduling) == len(block.outputs) else 0
@@ -96,6 +89,25 @@ def frequency_responses(
             )
         )
     return tuple(found)
+
+
+def linear_response(block: Block, step: float, frequency: Array) -> NDArray[np.complex128]:
+    """Return the response of a linear block at frequencies [Hz], shape (f, outputs, inputs).
+
+    A sample is x+ = A x + B u, y = C x + D u, whose matrices are the kernel's answers to a unit of every
+    state and input.
+    """
+    n, k, m = block.n_states, len(block.inputs), len(block.outputs)
+    given, state, outputs = np.zeros((1, k)), np.zeros(n), np.zeros((1, m))
+    run, columns = block.bind(step, state, given, outputs), []
+    for unit in np.vstack([np.zeros(n + k), np.eye(n + k)]):
+        state[:], given[0] = unit[:n], unit[n:]
+        run()
+        columns.append(np.concatenate([state, outputs[0]]))
+    table = np.transpose(np.array(columns[1:]) - columns[0])
+    a, b, c, d = table[:n, :n], table[:n, n:].astype(complex), table[n:, :n], table[n:, n:]
+    z = np.exp(2j * np.pi * step * frequency)[:, np.newaxis, np.newaxis]
+    return np.asarray(c @ np.linalg.solve(z * np.eye(n) - a, b) + d)
 
 
 def _welch(

@@ -222,8 +222,7 @@ def simulation(found: Simulation) -> list[Item]:
     ]
     items: list[Item] = []
     if rows:
-        ahead = "" if found.horizon is None else f"{found.horizon} samples ahead: "
-        items.append(Table([f"{ahead}output", "RMSE", "MAE", "Largest", "R²"], rows))
+        items.append(Table(["output", "RMSE", "MAE", "Largest", "R²"], rows))
     if found.interval is not None:
         items.append(Text([
             f"{name}: the band for {percent(found.interval, 3)} holds {percent(one['coverage'], 3)} of "

@@ -30,8 +30,6 @@ class Simulation:
         Inputs, what was measured, and ``OUTPUT_model``; of a band, ``OUTPUT_lower`` and ``_upper``.
     metrics : mapping of str to mapping of str to float
         Measured output -> its errors; of a band also ``coverage`` and ``band_width``.
-    horizon : int or None
-        Samples predicted ahead; None of a free run.
     interval : float or None
         Level of the band.
     notes : tuple of str
@@ -42,7 +40,6 @@ class Simulation:
 
     recording: Recording
     metrics: Mapping[str, Mapping[str, float]]
-    horizon: int | None
     interval: float | None
     notes: tuple[str, ...]
     outside: tuple[tuple[Channel, float, Array, tuple[float, float]], ...] = ()
@@ -51,7 +48,6 @@ class Simulation:
         """Return the errors, for JSON."""
         return {
             "n_samples": len(self.recording),
-            "horizon": self.horizon,
             "interval": self.interval,
             "metrics": {name: dict(figures) for name, figures in self.metrics.items()},
             "notes": list(self.notes),
@@ -63,7 +59,6 @@ def simulated(
     read: Callable[[list[str]], list[Recording]],
     *,
     initial: str = "model",
-    horizon: int | None = None,
     interval: float | None = None,
 ) -> Simulation:
     """Run a model over a recording.
@@ -75,8 +70,6 @@ def simulated(
         Returns the recordings with some channels.
     initial : str
         Memory before the first sample: ``model``, ``first_sample``, ``virgin`` or ``measured``.
-    horizon : int, optional
-        Predict so many samples ahead from measured outputs, instead of free.
     interval : float, optional
         Level of the band of a calibrated model.
 
@@ -86,9 +79,6 @@ def simulated(
         On a recording, or options, that do not suit the model.
     """
     banded, block = _with_band(model, interval)
-    if banded is not None and horizon is not None:
-        problem = "bands are of free runs"
-        raise ModelError(problem, parameter="horizon", remedy="leave it out, or `interval`")
     inputs = [channel.name for channel in block.inputs]
     outputs = [channel.name for channel in block.outputs]
     try:
@@ -101,10 +91,7 @@ def simulated(
             file=recording.source,
             remedy="cut it first, or give `gaps=interpolate`",
         )
-    if horizon is not None:
-        modelled = _predicted(block, recording, horizon)
-    else:
-        modelled = (banded or block).simulate(recording, initial=_start(initial, block, recording))
+    modelled = (banded or block).simulate(recording, initial=_start(initial, block, recording))
     notes = beyond_known(block, recording)
     beyond: tuple[tuple[Channel, float, Array, tuple[float, float]], ...] = ()
     if banded is not None:
@@ -133,7 +120,7 @@ def simulated(
                     ((lower <= measured) & (measured <= upper)).mean()
                 )
                 metrics[name]["band_width"] = float((upper - lower).mean())
-    return Simulation(found, metrics, horizon, interval, tuple(notes), beyond)
+    return Simulation(found, metrics, interval, tuple(notes), beyond)
 
 
 def _with_band(block: Block, interval: float | None) -> tuple[Any, Any]:
@@ -145,18 +132,6 @@ def _with_band(block: Block, interval: float | None) -> tuple[Any, Any]:
         remedy = "calibrate it on recordings that it was not fitted to, with `calibrate()`"
         raise ModelError(problem, parameter="interval", remedy=remedy)
     return block.at(interval), block.forward
-
-
-def _predicted(block: Block, recording: Recording, horizon: int) -> Recording:
-    from mckibben.blocks.dynamics.transfer_function import TransferFunction
-
-    if not isinstance(block, TransferFunction):
-        raise ModelError(
-            f"{block.kind!r} has no noise model, so it cannot predict from measured outputs",
-            parameter="horizon",
-            remedy="leave it out, or fit arx, armax, oe or bj",
-        )
-    return block.predict(recording, horizon)
 
 
 def _start(rule: str, block: Block, recording: Recording) -> Any:

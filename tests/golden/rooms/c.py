@@ -23,10 +23,7 @@ TOLERANCES: dict[Precision, float] = {"double": 1e-12, "float32": 1e-6}
 
 WITHOUT_C: dict[Precision, tuple[str, ...]] = {
     "double": ("published mpi-narmax-mpi",),
-    "float32": (
-        *("published mpi-narmax-mpi", "predictive balance"),
-        *("predictive balance, short of air", "predictive crowded muscles"),
-    ),
+    "float32": ("published mpi-narmax-mpi",),
 }
 """Models that are refused."""
 

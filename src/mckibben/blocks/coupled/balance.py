@@ -1,15 +1,15 @@
 """Force balance of muscles in parallel under load, as the minimum of a convex energy.
 
-What a muscle's pressure gives over its effective area holds its load, springs (its own and those that
-couple muscles, which stiffen with whatever schedules them), its rubber's elasticity, friction of the
-braid, relaxation, damping, inertia and what it meets; what has to push harder than it can goes slack.
-The equation is that of `mckibben.blocks.coupled.balance_law`. A load enters once. Springs are symmetric,
-what rubs and relaxes is not negative, areas outweigh friction, and stiffness what areas lose, as
-identification sees to: then pressures hold muscles in one place only, which is found, and friction never
-makes energy.
+Pressure times effective area balances the load, springs (the muscle's own and those that couple
+muscles, which depend on the scheduling inputs), elasticity of the rubber, friction of the braid,
+relaxation, damping, inertia and obstacles; a muscle that would have to push harder than it can goes
+slack. The equation is that of `mckibben.blocks.coupled.balance_law`. A load enters once. Identification
+ensures that springs are symmetric, friction and relaxation are not negative, areas exceed friction, and
+stiffness exceeds the loss of area: then the equilibrium is unique and is always found, and friction
+never generates energy.
 
-This block gives pressures for coordinates, explicitly: the compensator. Its inverse gives coordinates
-for pressures. `mckibben.blocks.coupled.load_estimate` gives loads for both.
+This block computes pressures from coordinates, explicitly: it is the compensator. Its inverse computes
+coordinates from pressures, and `mckibben.blocks.coupled.load_estimate` loads from both.
 
 The form is this package's own. Friction that breaks away after a travel follows "A Multistate Friction
 Model for the Compensation of the Asymmetric Hysteresis in the Mechanical Response of Pneumatic
@@ -29,7 +29,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Cost, Ports, Start, needs_sample_time
+from mckibben.blocks.base import SEVERAL, Block, Ports, Start, needs_sample_time
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.balance_adaptive import learnable_balance
 from mckibben.blocks.coupled.balance_law import (
@@ -49,7 +49,6 @@ from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.learning import Learnable
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import newton_cost
 from mckibben.errors import ModelError, ModelWarning
 
 
@@ -101,9 +100,9 @@ def balance_inverse_start(
 class Balance(Invertible):
     """Force balance: from coordinates of n muscles, scheduling inputs and loads to pressures.
 
-    Forces are in N, or, of a model that knows no force, in bar on muscle 1's area at rest. Coordinates
-    are the displacements of the muscles, or fewer: then each shortens along its direction, and loads and
-    springs act on coordinates.
+    Forces are in N, or, of a model without measured force, in bar on muscle 1's area at rest.
+    Coordinates are the displacements of the muscles, or fewer: then each shortens along its direction,
+    and loads and springs act on coordinates.
 
     Parameters
     ----------
@@ -123,7 +122,7 @@ class Balance(Invertible):
     damping : sequence of n float
         Force by velocity [N s/mm], not negative.
     walls : sequence of n float
-        Stretch of the wall by pressure, which friction feels at held length too [mm/bar].
+        Stretch of the wall by pressure, which acts on friction at constant length too [mm/bar].
     limits : sequence of float
         Travel at which every stop breaks away, of the pressure that friction is proportional to
         [mm/bar], increasing.
@@ -161,8 +160,8 @@ class Balance(Invertible):
         Ratio of the travel at which stops break away while muscles lengthen to that while they shorten;
         positive. Default 1.
     grips : sequence of float
-        How much of all that schedules friction is proportional to, beside pressure; not negative [bar by
-        its unit]. Default none.
+        Friction offset per scheduling input, in addition to pressure; not negative [bar by its unit].
+        Default none.
     obstacles : sequence of m sequences of float
         What every coordinate meets, one after another: 1 on the way up or -1 on the way down, where
         [mm], and its stiffness [N/mm]: a constant, and by each that schedules. Default none.
@@ -492,15 +491,6 @@ class Balance(Invertible):
             f"{self.kind!r} found no equilibrium in {int(state[-1])} samples: the model was not made "
             "for such pressures"
         )
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost: about six operations per number, as friction is evaluated twice."""
-        operations = 6 * self.coefficients(sample_time).size
-        return Cost(operations, 20 * operations)
-
-    def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of the Newton steps."""
-        return newton_cost(4 * self.coefficients(sample_time).size + len(self.driven) ** 3)
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
         """Return the unit of a parameter: forces in N, or in the input's unit for relative areas."""

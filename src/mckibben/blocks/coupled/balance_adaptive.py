@@ -1,20 +1,21 @@
 """Adaptation of a force balance to measurements, within its physical bounds.
 
-Of every muscle a constant force and four factors are learnt: on its springs and elasticity, its area,
-its friction, and what relaxes. Springs of coordinates go with the factors of the muscles that move them,
-in the shares of their work, by the root of both coordinates', so that they stay symmetric and positive.
-With R, the terms of `mckibben.blocks.coupled.balance_law`, coordinates follow by
+Adaptive parameters of every muscle are a constant force and four factors: on its springs and
+elasticity, its area, its friction, and its relaxation. Springs of coordinates change with the factors
+of the muscles that move them, in the shares of their work, by the root of both coordinates' factors, so
+that they remain symmetric and positive. With R, the terms of `mckibben.blocks.coupled.balance_law`,
+coordinates follow by
 
     dq / dtheta = -(dR / dq)^-1 dR / dtheta,
 
-stops and lags left out of dR / dq: a change that stays moves a motion as a whole, and its stops with it.
+without stops and lags in dR / dq: a lasting change moves the whole motion, and its stops with it.
 
-Factors keep to bounds within which areas outweigh friction, and stiffness what areas lose, so that there
-is one equilibrium. Stops and lags are displacements of the muscle, which the reference gives: memory
-stays as it is.
+Factors are bounded so that areas exceed friction, and stiffness exceeds the loss of area, which ensures
+one equilibrium. Stops and lags are displacements of the muscle, which follow from the reference: their
+states do not change.
 
-Where no load is measured, forces are known but for their unit, which is the area of muscle 1: that is
-not learnt, and a loss of area shows as springs and friction that grew.
+Where no load is measured, forces are relative to the area of muscle 1: that is not adapted, and a loss
+of area appears as stiffer springs and more friction.
 """
 
 from __future__ import annotations
@@ -48,7 +49,6 @@ from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.kernels import fill, kernel, step
 from mckibben.blocks.learning import (
     SENSES,
-    Group,
     Learnable,
     covariant,
     family_at,
@@ -56,24 +56,15 @@ from mckibben.blocks.learning import (
     pull_back,
     root_size,
     start_learning,
-    trusted,
 )
 from mckibben.blocks.solving import eliminate
 
 if TYPE_CHECKING:
     from mckibben.blocks.coupled.balance import Balance
 
-OFFSET, STIFFNESS, AREA, FRICTION, RELAXATION = range(5)
-"""Adaptive parameters of a muscle."""
-
-GROUPS = {
-    STIFFNESS: Group("springs", "stiffer", "softer"),
-    AREA: Group("area", "larger", "smaller"),
-    FRICTION: Group("friction"),
-    RELAXATION: Group("relaxation", "more", "less"),
-    OFFSET: Group("pull", "more", "less"),
-}
-"""Names of the adaptive parameters; an added force reduces the pull."""
+KINDS = range(5)
+OFFSET, STIFFNESS, AREA, FRICTION, RELAXATION = KINDS
+"""Adaptive parameters of a muscle; an added force reduces its pull."""
 
 ROW = 9
 """Numbers of a parameter: its muscle, the first of the terms that it is a factor on and the first
@@ -113,25 +104,22 @@ def balance_adaptive_step(
     n_x = int(fitted[2]) + int(fitted[4])
     memory, asked, rest = state[:n_own], state[n_own : n_own + m], state[n_own + m :]
     slopes, learnt = rest[: m * size], rest[m * size :]
-    theta, used, as_fitted = learnt[:size], learnt[size : 2 * size], learner[4 + 2 * size :]
+    theta, used, as_fitted = learnt[:size], learnt[size : 2 * size], learner[3 + 2 * size :]
     work, along, more = scratch[: 2 * size], scratch[2 * size : 3 * size], scratch[3 * size :]
     c, g, room = more[: fitted.size], more[fitted.size : fitted.size + m], more[fitted.size + m :]
-    taught = False
+    changed_any = False
     for j in range(m):
         row = slopes[j * size : (j + 1) * size]
-        believed, expected = asked[j], asked[j]
+        predicted = asked[j]
         for i in range(size):
-            believed += row[i] * (theta[i] - used[i])
-            expected += row[i] * (as_fitted[i] - used[i])
+            predicted += row[i] * (theta[i] - used[i])
         measured = inputs[m + n_x + j]
-        one = learn(learner, learnt, j, row, work, measured, believed, asked[j], expected)
-        taught = taught or one
-    if taught:
+        one = learn(learner, learnt, j, row, work, measured, predicted, asked[j])
+        changed_any = changed_any or one
+    if changed_any:
         pull_back(learner, learnt, along, work)
         keep_balanced(learner, family, learnt, along, work)
-        share = trusted(learnt[2 * size + root_size(size) :])
-        for i in range(size):
-            used[i] = as_fitted[i] + share * (theta[i] - as_fitted[i])
+        fill(used, theta)
     for i in range(size):
         along[i] = used[i] - as_fitted[i]
     retune(fitted, family, along, c, g)
@@ -262,7 +250,7 @@ def keep_balanced(c: Array, family: Array, learnt: Array, along: Array, work: Ar
                     work[j] = 1.0 if j == i else 0.0
                 covariant(learnt, work, along)
                 for j in range(p):
-                    learnt[j] += lacks * c[4 + j] / c[4 + i] * along[j] / along[i]
+                    learnt[j] += lacks * c[3 + j] / c[3 + i] * along[j] / along[i]
 
 
 # -- what a balance can have -----------------------------------------------------------------------
@@ -278,11 +266,6 @@ def learnable_balance(balance: Balance) -> Learnable:
     offsets, at_rest = kinds == OFFSET, np.array(balance.areas)[muscles, 0] * top_of(balance)
     fitted, scales = np.where(offsets, 0.0, 1.0), np.where(offsets, at_rest, 1.0)
 
-    def group_changes(theta: Array) -> Array:
-        """Return means over muscles."""
-        changes = np.where(offsets, -1.0, 1.0) * (theta - fitted) / scales
-        return np.array([changes[kinds == k].mean() if k in kinds else 0.0 for k in GROUPS])
-
     def numbers(sample_time: float | None) -> Array:
         table = family_of(balance, learnt, scales)
         return np.concatenate([[m], table.ravel(), balance.coefficients(sample_time)])
@@ -295,9 +278,6 @@ def learnable_balance(balance: Balance) -> Learnable:
         spread=np.diag(np.where(offsets, 0.1, 0.3) ** 2),
         with_parameters=lambda theta: Inverse(changed(balance, learnt, theta - fitted)),
         numbers=numbers,
-        groups=tuple(GROUPS.values()),
-        group_changes=group_changes,
-        whole_changes=np.full(len(GROUPS), np.ptp(known, axis=1).max() or np.inf),
         known=known,
         compensates=True,
         n_more_states=m + m * fitted.size,
@@ -353,7 +333,7 @@ def shares_of(balance: Balance) -> Array:
 def changed(balance: Balance, learnt: list[tuple[int, int]], changes: Array) -> Balance:
     """Return the balance with changed forces and factors."""
     n, m = balance.moves.shape
-    table = np.zeros((len(GROUPS), n))
+    table = np.zeros((len(KINDS), n))
     table[tuple(np.array(learnt).T[::-1])] = changes
     stiffened = 1.0 + shares_of(balance).T @ table[STIFFNESS]
     springs = np.array(balance.springs).reshape(m, -1, 1 + m)

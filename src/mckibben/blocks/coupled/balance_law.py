@@ -22,7 +22,7 @@ its springs (powers of what schedules by 1 + coordinates), loads, and of every o
 -1), place and stiffness; of every muscle lowest and highest shortening known, w, b, W, then the
 coefficients of its terms: d, l, m, own spring, elasticity, area, friction, relaxation. State:
 coordinates, stretches, stops (muscle by muscle), lags (the same), with mass the last two moves of each
-muscle, the tare of coordinates, whether nothing came before, samples amiss.
+muscle, the tare of coordinates, whether this is the first sample, number of failed samples.
 """
 
 from __future__ import annotations

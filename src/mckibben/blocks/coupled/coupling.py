@@ -17,7 +17,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, rows
 from mckibben.blocks.kernels import step
-from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -43,8 +42,8 @@ class Coupling(Block):
     Parameters
     ----------
     gains : sequence of n sequences of m floats
-        G: row i is what muscle i gives to every muscle, or to every coordinate; 1 on the diagonal
-        where each gives itself what it gives. Finite; of full rank where an inverse is wanted.
+        G: row i is the contribution of muscle i to every muscle, or to every coordinate; 1 on the
+        diagonal where its own is the unit. Finite; of full rank where an inverse is wanted.
     driven, given : sequence of n and of m Channel
         Channels driven and channels given.
     """
@@ -52,6 +51,7 @@ class Coupling(Block):
     kind = "coupling"
     ports = ("driven",), (), ("given",)
     kernel = coupling_step
+    is_linear = True
     parameters = ("gains",)
     notation = Notation(
         r"h_j = \sum_i G_{ij} v_i",
@@ -107,17 +107,13 @@ class Coupling(Block):
                 f"{condition:.1e})",
                 remedy="identify it from runs in which each muscle is driven alone",
             )
-        undone = np.linalg.inv if len(self.driven) == len(self.given) else np.linalg.pinv
-        return Coupling(rows(undone(self.matrix)), self.given, self.driven)
+        invert = np.linalg.inv if len(self.driven) == len(self.given) else np.linalg.pinv
+        return Coupling(rows(invert(self.matrix)), self.given, self.driven)
 
     def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Return the range of each output over a box of inputs."""
         at_low, at_high = self.matrix.T * low, self.matrix.T * high
         return np.minimum(at_low, at_high).sum(axis=1), np.maximum(at_low, at_high).sum(axis=1)
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return the gains."""
-        return LinearSystem.gain(np.array(self.gains).T)
 
     @classmethod
     def example(cls) -> Self:

@@ -6,7 +6,7 @@ for every combination, the normalised firing of a rule is the product of members
 by input, which are computed in the log domain, where nothing underflows far from all centres.
 
 For the inverse, known scheduling inputs are contracted away once a sample: what is left are rules of the
-driven inputs alone, each the mean of those it stands for, weighted by their firing. Slopes are exact:
+driven inputs alone, each the mean of those it replaces, weighted by their firing. Slopes are exact:
 with mu_s the normalised memberships of an input x_i, of Gaussian sets at c_s of width w_s,
 
     d ln mu_s / d x_i = sum_r mu_r (x_i - c_r) / w_r^2 - (x_i - c_s) / w_s^2.
@@ -25,12 +25,12 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Cost
+from mckibben.blocks.base import SEVERAL
 from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import DERIVED, NOTHING, SLACK, fill, kernel, step
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import eliminate, newton_cost
+from mckibben.blocks.solving import eliminate
 from mckibben.errors import ModelError
 
 MOST_STEPS = 40
@@ -123,7 +123,7 @@ def sloped_answer(
 ) -> None:
     """Fill the outputs at driven inputs, and the slope of every output (row) by each of these.
 
-    ``left`` is what `contract` fills; scratch are the memberships, and beside them their relative
+    ``left`` is what `contract` fills; scratch are the memberships, and their relative
     slopes, with one more for each driven input.
     """
     m, n, n_sets, most = x.size, int(c[0]), int(c[2]), int(c[4])
@@ -350,20 +350,6 @@ class FuzzyNetwork(Invertible):
         sets = [len(row) for row in self.centres]
         sizes = [len(sets), len(self.given), sum(sets), int(self.constants), max(sets)]
         return np.concatenate([[*sizes, *sets], self.pack()])
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of memberships and all rules."""
-        n = len(self.centres)
-        each = n + len(self.given) * (2 * n + 2)
-        operations = self._n_rules(n) * each + 10 * sum(map(len, self.centres))
-        return Cost(operations, operations)
-
-    def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of contracting the scheduling inputs, then of Newton steps."""
-        m, n = len(self.driven), len(self.centres)
-        once = self._n_rules(n) * m * (2 * n + 2) + 10 * sum(map(len, self.centres[m:]))
-        step = self._n_rules(m) * (2 * m + m * (6 * m + 2)) + 16 * sum(map(len, self.centres[:m]))
-        return Cost(once, once) + newton_cost(step + m**3)
 
     def _n_rules(self, n: int) -> int:
         """Return the number of combinations of the first inputs' sets."""

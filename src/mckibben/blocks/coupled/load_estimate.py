@@ -103,8 +103,8 @@ class LoadEstimate(Block):
     """Load estimator: from displacements, pressures and scheduling inputs of muscles to their loads.
 
     Its memory begins where the balance's does: at rest without pressure, under the loads that the
-    first sample tells without friction. Of a balance with a tare it tells none: then muscles rest
-    without load, and loads there displace what is estimated for good.
+    first sample implies without friction. A balance with a tare starts without load: loads present at
+    the start then offset the estimate.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ class LoadEstimate(Block):
         return self.forward.n_scratch + len(self.forward.scheduled)
 
     def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Give the balance's."""
+        """Yield the balance's."""
         return self.forward.strictly_increasing()
 
     def coefficients(self, sample_time: float | None) -> Array:
@@ -179,7 +179,7 @@ def load_of(model: Block) -> Block:
     Raises
     ------
     ModelError
-        If the model knows no load, or its coordinates are not measured one by one.
+        If the model has no load, or its coordinates are not measured one by one.
     """
     if isinstance(model, LoadEstimate):
         raise ModelError("this is already a load estimator", remedy="simulate it")

@@ -25,7 +25,7 @@ from annotated_types import Interval
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Cost, own_sample_time
+from mckibben.blocks.base import SEVERAL, Block, own_sample_time
 from mckibben.blocks.fields import STRICT, Channel, Channels, Positive, PositiveRows, Rows, Vector
 from mckibben.blocks.kernels import kernel, remember, step
 from mckibben.blocks.notation import Notation
@@ -236,12 +236,6 @@ class RecurrentFuzzyNetwork(Block):
         own_sample_time(self.kind, self.own_time, sample_time)
         lags = [self.output_lags, self.input_lags, self.scheduling_lags]
         return np.concatenate([lags, [self.n_sets, self.constants], self.pack()])
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of memberships and all rules."""
-        n, sets = self.n_regressors, self.n_sets
-        operations = sets**n * (3 * n + 3) + 10 * n * sets
-        return Cost(operations, operations)
 
     @property
     def _regressor_units(self) -> list[str]:

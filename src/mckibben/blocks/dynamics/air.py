@@ -11,8 +11,8 @@ sample the command is held, so x goes one way only and x <- x + (1 - exp(-T / T_
 any sample time. As of `Creep`, the output of a sample is that at its end; where command and pressure are
 read at one instant, the sample for which the command was held is part of the dead time.
 
-The inverse is in closed form and knows nothing of the dead time: what comes of it comes late by that,
-unless it is given its reference ahead (`mckibben.control.preview`).
+The inverse is in closed form and does not compensate the dead time: the response is delayed by it,
+unless the reference is given ahead (`mckibben.control.preview`).
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ class Air(Invertible):
     filling_time, venting_time : float
         Time constants T_f and T_v [s]; 0 for none.
     dead_time : float
-        By how long the pressure comes late [s]: up to 254 samples. It is rounded to whole samples, with
+        Delay of the pressure [s]: up to 254 samples. It is rounded to whole samples, with
         a warning where that changes it.
     ambient, supply : float or None
         Lowest and highest pressure that the valve can aim for; None for no such limit.

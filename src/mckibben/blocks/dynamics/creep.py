@@ -18,7 +18,6 @@ from mckibben.blocks.base import needs_sample_time, one_per
 from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, PositiveVector, Vector
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -55,9 +54,9 @@ def creep_matrix(coefficients: Array, columns: Array, state: Array, found: Array
         for j in range(k):
             found[t, j] = columns[t, j]
         for i in range(n):
-            keeps, compliance = coefficients[i], coefficients[n + i]
+            decay, compliance = coefficients[i], coefficients[n + i]
             for j in range(k):
-                state[i, j] = keeps * state[i, j] + (1.0 - keeps) * columns[t, j]
+                state[i, j] = decay * state[i, j] + (1.0 - decay) * columns[t, j]
                 found[t, j] += compliance * state[i, j]
 
 
@@ -98,7 +97,7 @@ class Creep(Invertible):
         tau_k, how long each creep takes [s]; positive.
     initial : {"first_sample", "virgin", "fitted"}
         Where the elements are before the first sample: at rest at the first input, or at 0, or, on
-        recordings whose output is known, where that tells (else at rest at the first input).
+        recordings whose output is known, where that determines it (else at rest at the first input).
     input, output : Channel
         Channel driven and channel given.
     """
@@ -109,6 +108,7 @@ class Creep(Invertible):
     inverse_kernel = creep_inverse_step
     inverse_start_kernel = creep_inverse_start
     rate_dependent = True
+    is_linear = True
     counts_clipped = False
     parameters = ("compliances", "time_constants")
     n_states = one_per("compliances")  # one to every Kelvin-Voigt element
@@ -147,10 +147,3 @@ class Creep(Invertible):
         """Return the range of immediate outputs, for any creep state."""
         crept = float(np.sum(self.compliances))
         return low + crept * high, high + crept * low
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return the elements as a state-space system."""
-        decays, c = self.coefficients(sample_time).reshape(2, -1)
-        matrices = (np.diag(decays), (1 - decays)[:, np.newaxis], (c * decays)[np.newaxis])
-        at_once = np.array([[1.0 + c @ (1 - decays)]])
-        return LinearSystem(*matrices, at_once, sample_time, np.zeros(1), np.zeros(1))

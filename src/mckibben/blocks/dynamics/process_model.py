@@ -24,8 +24,7 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block, needs_sample_time
 from mckibben.blocks.dynamics.starts import start_on
 from mckibben.blocks.kernels import kernel, remember, step
-from mckibben.blocks.linear import LinearSystem, Polynomials
-from mckibben.blocks.notation import Notation, tex
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 
@@ -97,6 +96,7 @@ class ProcessModel(Block):
     kernel = process_model_step
     start_kernel = process_model_start
     rate_dependent = True
+    is_linear = True
     filters = True
     start_on = start_on
     typical = (6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
@@ -185,61 +185,12 @@ class ProcessModel(Block):
 
     def equations(self) -> tuple[str, ...]:
         """Return the transfer function of this structure."""
-        lags = [f"T_{{p,{k + 1}}} s + 1" for k in range(len(self.time_constants))]
-        return (
-            self._transfer("K", r"T_z\,s", lags, r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1", "T_d"),
-        )
-
-    def worked(self) -> tuple[str, ...]:
-        """Return the transfer function with numerical values."""
-        a, b = (tex(float(c)) for c in self.denominator()[:2])
-        zero = rf"{tex(self.zero_time or 0.0)}\,s"
-        lags = [rf"{tex(t)}\,s + 1" for t in self.time_constants]
-        pair = rf"{a}\,s^2 + {b}\,s + 1"
-        return (self._transfer(tex(self.gain), zero, lags, pair, tex(self.delay)),)
-
-    def _transfer(self, gain: str, zero: str, lags: list[str], pair: str, delay: str) -> str:
-        below = "".join(f"({lag})" for lag in lags) if self.damping is None else pair
-        above = gain if self.zero_time is None else f"{gain} ({zero} + 1)"
-        late = rf"\, e^{{-{delay}\,s}}" if self.delay else ""
-        return rf"\frac{{Y(s) - y_0}}{{U(s) - u_0}} = \frac{{{above}}}{{{below}}}{late}"
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return the lags after the past inputs of dead time and hold."""
-        found = _discretised(self, sample_time)
-        n, m = int(found[0]), int(found[1])
-        now, before = found[4:6]
-        c, first, second, third = found[6 : 6 + 4 * n].reshape(4, n)
-        lags = found[6 + 4 * n :].reshape(n, n)
-        # [x, u of the last m + 2 samples, latest first]
-        size = n + m + 2
-        driven = np.zeros((n, m + 3))  # by the input now, a sample ago and so on
-        driven[:, m:] = np.transpose([first, second, third])
-        at_once = np.array([*np.zeros(m), now, before, 0.0])
-        a, b = np.zeros((size, size)), np.zeros((size, 1))
-        a[:n, :n], a[:n, n:], b[:n, 0] = lags, driven[:, 1:], driven[:, 0]
-        a[n + 1 :, n:-1], b[n, 0] = np.eye(m + 1), 1.0
-        given = np.concatenate([c @ lags, c @ driven[:, 1:] + at_once[1:]])[np.newaxis]
-        through = np.array([[c @ driven[:, 0] + at_once[0]]])
-        offsets = np.array([self.input_offset]), np.array([self.output_offset])
-        return LinearSystem(a, b, given, through, sample_time, *offsets)
-
-    def continuous(self) -> Polynomials:
-        """Return the lags and the zero as a continuous transfer function.
-
-        Raises
-        ------
-        ModelError
-            If there is a dead time, which polynomials cannot hold.
-        """
-        if self.delay > 0:
-            raise ModelError(
-                f"{self.kind!r} has a dead time of {self.delay:g} s, which a continuous "
-                "transfer function cannot represent",
-                remedy="give a sample time",
-            )
-        zero = [] if self.zero_time is None else [self.gain * self.zero_time]
-        return Polynomials((*zero, self.gain), tuple(self.denominator().tolist()))
+        below = r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1"
+        if self.damping is None:
+            below = "".join(f"(T_{{p,{k + 1}}} s + 1)" for k in range(self.order))
+        above = "K" if self.zero_time is None else r"K (T_z\,s + 1)"
+        late = r"\, e^{-T_d\,s}" if self.delay else ""
+        return (rf"\frac{{Y(s) - y_0}}{{U(s) - u_0}} = \frac{{{above}}}{{{below}}}{late}",)
 
 
 @lru_cache(maxsize=8)  # once for many runs of one model
@@ -277,7 +228,7 @@ def _discretised(model: ProcessModel, sample_time: float | None) -> Array:
 def _state_space(model: ProcessModel) -> tuple[Array, Array, Array, float]:
     """Return A, B, C and D of the lags without delay, in controllable form.
 
-    The state is scaled so that it is (u, 0, ..., 0) at rest, which keeps digits of slow lags.
+    The state is scaled so that it is (u, 0, ..., 0) at rest, which preserves the digits of slow lags.
     """
     d = model.denominator()
     n = d.size - 1

@@ -2,14 +2,12 @@
 
 y_t - y_0 = B(q) / F(q) (u_t - u_0),  B = b_0 + b_1 q^-1 + ...,  F = 1 + f_1 q^-1 + ...
 
-Of the models named, B / F is what a free run needs; the noise model beside it, C / D, says what past
-errors tell of coming ones, and only `predict` looks at it. The inverse is F / B. It exists where the
+Of the models named, B / F is what a free run needs; the noise model C / D describes the
+correlation of its errors, and is not simulated. The inverse is F / B. It exists where the
 output answers at once (b_0 is not zero) and all zeros of B lie within the unit circle.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +17,10 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block, one_per, own_sample_time
-from mckibben.blocks.dynamics.starts import free_responses, start_on
+from mckibben.blocks.dynamics.starts import start_on
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.linear import LinearSystem, Polynomials
-from mckibben.blocks.notation import FEW, Notation, summed
-from mckibben.errors import ModelError, require
-from mckibben.recording import Recording
+from mckibben.blocks.notation import Notation
+from mckibben.errors import ModelError
 
 
 @step
@@ -86,6 +82,7 @@ class TransferFunction(Block):
     kernel = filter_step
     start_kernel = filter_start
     rate_dependent = True
+    is_linear = True
     filters = True
     start_on = start_on
     parameters = (
@@ -155,53 +152,6 @@ class TransferFunction(Block):
         b, f = self._padded()
         return np.array([self.input_offset, self.output_offset, *b, *f, gain])
 
-    def predict(self, recording: Recording, horizon: int = 1) -> Recording:
-        """Predict the output some samples ahead from measured outputs; not free-running.
-
-        Parameters
-        ----------
-        recording : Recording
-            With the input, which is known until the sample predicted, and the measured output.
-        horizon : int
-            Samples ahead, at least 1.
-
-        Returns
-        -------
-        Recording
-            The input, and the output predicted. Where the block's `initial` is "fitted", the state
-            before the first sample is that with the least one-step errors on this recording. The noise
-            before the first sample is taken to be zero.
-
-        Raises
-        ------
-        DataError
-            If the recording lacks a channel.
-        ModelError
-            If the horizon is not a positive whole number.
-        """
-        from scipy.signal import convolve, lfilter
-
-        whole = isinstance(horizon, int) and horizon >= 1
-        require(whole, "horizon", horizon, "a whole number of samples, 1 or more")
-        c, d = [1.0, *self.noise_numerator], [1.0, *self.noise_denominator]
-        name = self.output.name
-        inputs, measured = self._inputs_from(recording), recording[name]
-        fitted = self.initial == "fitted"
-        rest = self.simulate(
-            inputs, initial="first_sample" if fitted else None, sample_time=recording.sample_time
-        )[:, 0]
-        errors = np.asarray(lfilter(d, c, measured - rest))
-        if fitted and self.n_fitted:
-            places = range(self.n_fitted)
-            free = free_responses(self, inputs, recording.sample_time, places)
-            free = lfilter(d, c, free, axis=0)
-            errors = errors - free @ np.linalg.lstsq(free, errors, rcond=1e-12)[0]
-        # what an error does to the samples after it, of which there are no more than in the recording
-        ahead = lfilter(c, d, np.eye(1, min(horizon, len(errors)))[0])
-        predicted = measured - np.asarray(convolve(errors, ahead))[: len(errors)]
-        kept = recording.select([self.input.name])
-        return kept.with_channels({name: self.output.unit}, **{name: predicted})
-
     def inverse(self) -> TransferFunction:
         """Return the inverse filter.
 
@@ -234,37 +184,3 @@ class TransferFunction(Block):
             self.output,
             self.input,
         )
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return the filter, in observable form, without its noise model."""
-        own_sample_time(self.kind, self.sample_time, sample_time or self.sample_time)
-        b, f = self._padded()
-        n = self.n_states
-        a = np.eye(n, k=1)
-        if n:
-            a[:, 0] = -f[1:]
-        return LinearSystem(
-            *(a, (b[1:] - f[1:] * b[0])[:, np.newaxis], np.eye(1, n), b[:1, np.newaxis]),
-            self.sample_time,
-            np.array([self.input_offset]),
-            np.array([self.output_offset]),
-            Polynomials(tuple(np.trim_zeros(b, "f").tolist()) or (0.0,), tuple(f.tolist())),
-        )
-
-    def worked(self) -> tuple[str, ...]:
-        """Return the polynomials with numerical values, if short."""
-        own = (self.numerator, (1.0, *self.denominator))
-        noise = ((1.0, *self.noise_numerator), (1.0, *self.noise_denominator))
-        if max(map(len, (*own, *noise))) > FEW:
-            return ()
-        top, below = map(_powers, own)
-        text = rf"y_t - y_0 = \frac{{{top}}}{{{below}}}\,(u_t - u_0)"
-        if max(map(len, noise)) > 1:
-            text += rf" + \frac{{{_powers(noise[0])}}}{{{_powers(noise[1])}}}\,e_t"
-        return (text,)
-
-
-def _powers(coefficients: Sequence[float]) -> str:
-    return summed(
-        [(c, f"q^{{-{k}}}" if k else "") for k, c in enumerate(coefficients) if c or not k]
-    )

@@ -33,7 +33,7 @@ from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block, needs_sample_time, one_per
 from mckibben.blocks.kernels import accumulate, kernel, step
-from mckibben.blocks.notation import Notation, tex, with_unit
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 Direction = Literal["shared", "both", "lengthening", "shortening"]
@@ -249,13 +249,3 @@ class MultistateFriction(Block):
         """Return [sample time, pressure gain, reference pressure, table]."""
         step = needs_sample_time(self.kind, sample_time)
         return np.array([step, self.pressure_gain, self.reference_pressure, *self.table().ravel()])
-
-    def worked(self) -> tuple[str, ...]:
-        """Return the values of every element in each direction."""
-        written: dict[str, list[str]] = {}
-        for name, value in zip(self.parameter_names, self.values, strict=False):
-            where, _, quantity = name.partition(": ")
-            symbol, _, unit = quantity.rstrip("]").partition(" [")
-            letter = {"sigma": r"\sigma", "F_c": "F_c"}.get(symbol, symbol)
-            written.setdefault(where, []).append(f"{letter} = {with_unit(tex(value), unit)}")
-        return tuple(rf"\text{{{at}: }}" + r",\quad ".join(lines) for at, lines in written.items())

@@ -96,13 +96,13 @@ class EUPI(Invertible):
     thresholds : sequence of float, length N
         Thresholds, in the unit of the input: 0 <= r_0 < r_1 < ...
     weights : sequence of float, length N
-        Weights, output per input. The inverse wants none negative.
+        Weights, output per input. The inverse requires that none is negative.
     falling_slope : float
         alpha, slope of the falling edge where the rising one has 1; positive.
     falling_threshold : float
         beta, threshold of the falling edge per threshold of the rising one; at least 0.
     polynomial : (float, float, float)
-        a_1, a_2, a_3 of the part without memory. The inverse wants it to increase.
+        a_1, a_2, a_3 of the part without memory. The inverse requires that it increases.
     offset : float
         Constant of the output.
     input_range : (float, float)

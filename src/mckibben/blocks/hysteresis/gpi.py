@@ -2,7 +2,7 @@
 
 Operators play between two envelopes, gamma_R on rising and gamma_L on falling input:
 w_t = max(gamma_R(u_t) - r, w_{t-1}) when u rises, min(gamma_L(u_t) + r, w_{t-1}) when it falls, and
-w_{t-1} when it stands still; the output is y = sum_i x_i w_i.
+w_{t-1} when it is constant; the output is y = sum_i x_i w_i.
 
 The inverse finds the common envelope value z at which the weighted sum equals the reference, then
 u = gamma_R^{-1}(z) while the reference rises and gamma_L^{-1}(z) while it falls. At a reversal z is
@@ -166,10 +166,10 @@ class GPI(Invertible):
     thresholds : sequence of float, length N + 1
         Thresholds on the envelopes' values: 0 <= r_0 < r_1 < ...
     weights : sequence of float, length N + 1
-        Weights, output per unit of the envelopes. The inverse wants r_0 = 0 and positive partial
+        Weights, output per unit of the envelopes. The inverse requires r_0 = 0 and positive partial
         sums.
     rising, falling : Envelope
-        gamma_R and gamma_L. The inverse wants gamma_L >= gamma_R over the input range.
+        gamma_R and gamma_L. The inverse requires gamma_L >= gamma_R over the input range.
     input_range : (float, float)
         Lowest and highest input, over which the conditions hold and to which the inverse clips.
     initial, input, output

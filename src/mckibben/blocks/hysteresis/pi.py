@@ -42,7 +42,7 @@ from mckibben.blocks.learning import (
     learnable_operators,
     start_learning,
 )
-from mckibben.blocks.notation import FEW, Notation, summed, tex
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solved_inverse
 
 
@@ -123,7 +123,7 @@ class PI(Invertible):
     thresholds : sequence of float, length N
         Thresholds of the play operators, in the unit of the input: 0 <= r_0 < r_1 < ...
     weights : sequence of float, length N
-        Weights, output per input. The exact inverse wants r_0 = 0 and positive partial sums.
+        Weights, output per input. The exact inverse requires r_0 = 0 and positive partial sums.
     offset : float
         Constant of the output.
     input_range : (float, float), optional
@@ -188,14 +188,6 @@ class PI(Invertible):
             pi_adaptive_start,
             lambda theta: replace(self, weights=fields.vector(theta[:-1]), offset=float(theta[-1])),
         )
-
-    def worked(self) -> tuple[str, ...]:
-        """Return the sum with numerical values, if short."""
-        if len(self.weights) > FEW:
-            return ()
-        pairs = zip(self.weights, self.thresholds, strict=True)
-        terms = [(w, rf"F_{{{tex(r)}}}[u]" if r else "u") for w, r in pairs]
-        return (f"y = {summed([(self.offset, ''), *terms])}",)
 
 
 @summing_step
@@ -262,7 +254,7 @@ class RateDependentPI(Invertible):
     rate_weights : sequence of float, length N
         k_i, output per input per rate.
     weights : sequence of float, length N
-        d_i, output per input at rest. The inverse wants r_0 = 0 and positive partial sums.
+        d_i, output per input at rest. The inverse requires r_0 = 0 and positive partial sums.
     offset : float
         Constant of the output.
     rate_time_constant : float

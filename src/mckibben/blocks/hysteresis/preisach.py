@@ -32,7 +32,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Cost, one_per
+from mckibben.blocks.base import one_per
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
@@ -318,19 +318,6 @@ class Preisach(Triangle, Invertible):
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [number of levels, levels, Everett table, offset]."""
         return np.array([len(self.levels), *self.levels, *self.table().ravel(), self.offset])
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of locating an input in the table."""
-        once = self._look_up()
-        return Cost(once, once + 64)
-
-    def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of searching along the levels, typically half of them."""
-        once, levels = self._look_up(), len(self.levels)
-        return Cost(once * max(1, levels // 2), once * levels + 64)
-
-    def _look_up(self) -> int:
-        return 20 + 4 * len(self.levels).bit_length()
 
     def check_invertible(self) -> None:
         """Require non-negative weights, positive on the diagonal."""

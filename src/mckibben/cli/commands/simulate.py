@@ -27,10 +27,6 @@ def simulate(
             "(the one excursion that explains the first measured output)."
         ),
     ] = "model",
-    horizon: Annotated[
-        int | None,
-        Option("Predict N samples ahead from measured outputs, not free-running.", "N"),
-    ] = None,
     interval: Annotated[
         float | None,
         Option("With a calibrated model: add the band of this coverage, as 0.9.", "LEVEL"),
@@ -51,7 +47,6 @@ def simulate(
         saved(model, fields),
         lambda names: read_files(file, names, reading),
         initial=initial,
-        horizon=horizon,
         interval=interval,
     )
     write(found.recording.with_meta(model=str(model)), out)

@@ -194,7 +194,7 @@ def described(
     ]
     calls = [each for each in steps if isinstance(each, dict)]
     inputs, outputs = _channel_entries(block.inputs), _channel_entries(block.outputs)
-    cost, size, n_numbers = wiring.cost, 4 if single else 8, max(wiring.n_numbers, 1)
+    size, n_numbers = 4 if single else 8, max(wiring.n_numbers, 1)
     constants = sum(call.coefficients.size for call in wiring.calls)
     return {
         "name": name,
@@ -222,8 +222,6 @@ def described(
         "sources": [f"{name}.c"],
         "ram": size * (n_numbers + len(outputs)) + size,
         "flash": size * constants + 32 * len(calls),
-        "usual": cost.usual,
-        "worst": cost.worst,
     }
 
 
@@ -233,13 +231,8 @@ def check_single(block: Block, sample_time: float | None) -> None:
     Raises
     ------
     ModelError
-        If two knots, levels or thresholds that follow one another become one, or the block says that
-        it needs more.
+        If two knots, levels or thresholds that follow one another become one.
     """
-    if block.needs_double:
-        raise ModelError(
-            f"{block.title!r} {block.needs_double}", remedy="export in double precision"
-        )
     for name, places in block.strictly_increasing():
         if np.any(np.diff(np.array(places, dtype=np.float32)) <= 0) and np.all(np.diff(places) > 0):
             raise ModelError(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Cost
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Layout
 from mckibben.errors import DataError, ModelError
 
@@ -71,7 +71,7 @@ class Wiring:
 
         self.steps: list[Call | Sum] = []
         self.outputs, self.n_signals = list(named(layout.given)), layout.n_signals - n
-        self.n_numbers, self.cost = 0, Cost(0, 0)
+        self.n_numbers = 0
         for step in layout.steps:
             part, taken, first = step.block, named(step.taken), step.given[0] - n
             if part is None:
@@ -88,7 +88,6 @@ class Wiring:
                 state = part.initial_state(np.zeros(len(part.inputs)))
             self.steps.append(Call(part, numbers, state, taken, first, self.n_numbers))
             self.n_numbers += part.n_states + part.n_scratch
-            self.cost += part.cost(sample_time)
         self.calls = [step for step in self.steps if isinstance(step, Call)]
 
 

@@ -56,7 +56,7 @@ USES = {
         "mckibben: invert track; mckibben.studying.results: Inverse Tracking; "
         "mckibben.control: track Tracked control_law Controller BlockController tune_pid "
         "DisturbanceObserver EstimatedLoad Twin dead_time_undone previewed before Before slow_rise "
-        "uncompensated; mckibben.stream: run FixedRate Deadlines UDPLink Step",
+        "uncompensated; mckibben.stream: run FixedRate Deadlines Step",
     ),
     "rigs": Use(
         "Virtual rigs and environments",

@@ -21,7 +21,7 @@ class Use(NamedTuple):
 USES = {
     "recordings": Use(
         "Recordings and files",
-        "mckibben: Recording read write; mckibben.files: columns_of has_columns",
+        "mckibben: Recording read write; mckibben.files: columns_of",
     ),
     "signals": Use(
         "Signals: excitations, cycles, filters",

@@ -342,9 +342,6 @@ class CompareOptions:
     allow_shared: Annotated[
         bool, Option("Allow test data that were fitted; every result states it.")
     ] = False
-    allow_early: Annotated[bool, Option("Compare even if the output moves before its input.")] = (
-        False
-    )
 
 
 @dataclass(frozen=True)

@@ -188,8 +188,6 @@ class Contents:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the samples, for JSON."""
-        from mckibben.files.condition import condition
-
         files = {file: [asdict(one) for one in found] for file, found in self.columns.items()}
         recordings = [
             {
@@ -202,7 +200,6 @@ class Contents:
                         "unit": one.units[name],
                         "min": float(samples.min()),
                         "max": float(samples.max()),
-                        **condition(samples),
                     }
                     for name, samples in one.channels.items()
                 },

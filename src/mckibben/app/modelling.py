@@ -160,7 +160,7 @@ def fit(
         *(train, test),
         inputs=inputs, outputs=outputs, load=load or None, models=[model],
         settings={model: settings or {}}, seed=seed,
-        allow_shared=allow_shared, allow_early=True,  # with a note
+        allow_shared=allow_shared,
     )  # fmt: skip
     plan = replace(plan, items={model: plan.items[model]})  # without those of each load alone
     *_, last = ranked(

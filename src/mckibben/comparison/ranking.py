@@ -94,7 +94,6 @@ def compare(
     jobs: int | None = None,
     most_samples: int | None = None,
     allow_shared: bool = False,
-    allow_early: bool = False,
     folder: str | Path | None = None,
     clear: bool = True,
     progress: bool | Callable[[Standing], None] | None = None,
@@ -145,8 +144,6 @@ def compare(
         motion. Scores refer to these samples.
     allow_shared : bool
         Whether to allow test recordings that were fitted, and repeated training recordings.
-    allow_early : bool
-        Whether to allow outputs that move before their input.
     folder : path, optional
         Folder for finished models, from which an interrupted comparison is resumed.
     clear : bool
@@ -184,7 +181,6 @@ def compare(
         seed=seed,
         most_samples=most_samples,
         allow_shared=allow_shared,
-        allow_early=allow_early,
     )
     kept, board = plan.kept(folder), plan.board()
     try:

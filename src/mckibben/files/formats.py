@@ -24,7 +24,7 @@ READERS: dict[str, str] = {
     ".txt": "text",
     ".dat": "text",
     ".log": "text",
-    ".lvm": "lvm",
+    ".lvm": "text",
     ".parquet": "parquet",
     ".mat": "matlab",
     ".h5": "hdf5",
@@ -34,16 +34,14 @@ READERS: dict[str, str] = {
     ".bag": "bags",
     ".mcap": "bags",
     ".db3": "bags",
-    ".json": "columns_json",
-    ".jsonl": "columns_json",
 }
 """Ending of the file's name -> module of this folder with ``read(file, path) -> list[Table]``."""
 
 WRITERS = (".csv", ".tsv", ".parquet")
 """Endings whose module also has ``write(recording, path)``."""
 
-SOUGHT = tuple(ending for ending in READERS if ending not in (".log", ".json", ".jsonl"))
-"""Endings that a folder is searched for; other formats also hold logs and settings."""
+SOUGHT = tuple(ending for ending in READERS if ending != ".log")
+"""Endings that a folder is searched for."""
 
 _SIGNATURES: dict[bytes, tuple[str, ...]] = {
     b"PAR1": (".parquet",),
@@ -86,8 +84,6 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
                 remedy = f"rename it to end in {endings[0]}" if known else "export it as CSV"
                 problem = f"its contents are those of a {endings[0]} file"
                 raise DataError(problem, file=path, remedy=remedy)
-        if READERS[path.suffix.casefold()] == "text" and b"LabVIEW Measurement" in start[:22]:
-            module = import_module("mckibben.files.lvm")
         return [distinct(printable(table)) for table in module.read(file, path)]
 
 

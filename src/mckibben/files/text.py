@@ -125,24 +125,13 @@ def parsed(data: bytes, path: Path, separators: Sequence[str | None] = SEPARATOR
         separators = (named[1].decode(),)
         data = b"\n" + data[named.end() :]  # so that lines have the same numbers
     start = data[:_SNIFFED].decode("utf-8", "replace").split("\n")
-    return block(data, sniff(start[:400], path, separators), path)
+    return _table(data, sniff(start[:400], path, separators), path)
 
 
-def block(data: bytes, layout: Layout, path: Path, stop: int | None = None) -> Table:
-    """Return the table of the samples of a text, from their first line on.
-
-    Parameters
-    ----------
-    data : bytes
-        UTF-8.
-    layout : Layout
-        Where the last column has no header, lines may end before it.
-    path : Path
-    stop : int, optional
-        The line, counted from 0, before which they end.
-    """
+def _table(data: bytes, layout: Layout, path: Path) -> Table:
+    """Return the table of the samples of a text; lines may end before a last column without header."""
     dialect, headers = layout.dialect, layout.headers
-    numbers, body = _samples(data, layout, path, stop)
+    numbers, body = _samples(data, layout, path)
     options: dict[str, Any] = {"names": range(len(headers)), "na_values": list(MISSING)}
     frame = _frame(body, dialect, low_memory=False, **options)
     if len(frame) != len(numbers):  # so that no sample has the number of another line
@@ -180,12 +169,12 @@ def block(data: bytes, layout: Layout, path: Path, stop: int | None = None) -> T
     return Table(tuple(columns), lines=np.array(numbers), unread=unread)
 
 
-def _samples(data: bytes, layout: Layout, path: Path, stop: int | None) -> tuple[list[int], bytes]:
+def _samples(data: bytes, layout: Layout, path: Path) -> tuple[list[int], bytes]:
     """Return the numbers of the lines of samples and their text, with a cell per header.
 
     Blank lines, comments, and words or separators alone at the end are left out.
     """
-    dialect, headers, rows = layout.dialect, layout.headers, data.split(b"\n")[:stop]
+    dialect, headers, rows = layout.dialect, layout.headers, data.split(b"\n")
     separator = (dialect.separator or " ").encode()
     blanks = rb" \v\f" if separator == b"\t" else rb" \t\v\f"
     skipped = re.compile(rb"[%s]*(?:$|%s)" % (blanks, dialect.comment.encode())).match
@@ -223,7 +212,7 @@ def _samples(data: bytes, layout: Layout, path: Path, stop: int | None) -> tuple
         rest = " ".join(b" ".join(lines[at:]).decode("utf-8", "replace").split())
         if at == 0 or re.search(r"\d", rest, re.ASCII):
             problem = f"there are {counts[at]} cells where the header has {len(headers)}"
-            remedy = "complete or delete that line"
+            remedy = "complete or delete that line, or give the line of names with `header`"
             raise DataError(problem, file=path, row=numbers[at], remedy=remedy)
         warn(path, f"from row {numbers[at]} on there are words alone, left out: {rest[:60]!r}")
         numbers, lines = numbers[:at], lines[:at]

@@ -1,4 +1,4 @@
-"""Vectors in a tree of groups, from MATLAB, Simulink, dSPACE, HDF5 and JSON files.
+"""Vectors in a tree of groups, from MATLAB, Simulink, dSPACE and HDF5 files.
 
 Readers make a plain tree of a file: groups and structs are dicts, struct arrays and cells are lists,
 numbers are arrays, text is str or a list of it. Each array of numbers is a vector, or a matrix of a few,

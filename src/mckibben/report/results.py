@@ -55,20 +55,20 @@ UNFOLDED = 30
 
 
 def recording(found: Recording) -> list[Item]:
-    """Return the ranges of channels, samples at their limits and repeated ones, and notes."""
-    from mckibben.files.condition import condition
-
-    rows = []
-    for name, samples in found.channels.items():
-        about = condition(samples)
-        rows.append([
-            *(name, found.units[name] or "–"),
-            *(f"{float(end) + 0.0:.6g}" for end in (samples.min(), samples.max())),
-            *(percent(about["saturated"]), about["stuck"]),
-        ])  # fmt: skip
-    headings = ["Channel", "Unit", "Lowest", "Highest", "At a limit", "Stuck samples"]
+    """Return the ranges of channels, and notes."""
+    rows = [
+        [
+            name,
+            found.units[name] or "–",
+            *(f"{end + 0.0:.6g}" for end in (samples.min(), samples.max())),
+        ]
+        for name, samples in found.channels.items()
+    ]
     notes = reading_notes([found])
-    return [Table(headings, rows), Text(notes, "note", listed=True) if notes else None]
+    return [
+        Table(["Channel", "Unit", "Lowest", "Highest"], rows),
+        Text(notes, "note", listed=True) if notes else None,
+    ]
 
 
 def contents(found: Contents) -> list[Item]:

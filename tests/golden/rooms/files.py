@@ -97,7 +97,7 @@ ALONE = (
     *("v4.mat", "v5.mat", "v73.mat", "single.mat", "struct.mat", "matrix.mat", "wide-matrix.mat"),
     *("two-rates.mat", "lengths.mat", "groups.h5", "matrix.hdf5", "elsewhere.h5"),
     *("dates.parquet", "nulls.parquet", "titles.xlsx", "dates.xlsx", "first-sheet.xlsx"),
-    *("sheets/book.xlsx", "waveform.tdms", "groups.tdms", "starts.tdms", "columns.json"),
+    *("sheets/book.xlsx", "waveform.tdms", "groups.tdms", "starts.tdms"),
     *("ros1.bag", "ros2-mcap", "ros2-db3"),
     *("ros2-mcap/ros2-mcap.mcap", "ros2-db3/ros2-db3.db3"),
     *("described", "described-wrongly", "no-unit-for-gain", "runs", "signals", "clocks"),

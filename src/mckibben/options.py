@@ -334,7 +334,6 @@ class CompareOptions:
     settings: Settings = field(default_factory=dict)
     seed: Seed = 0
     jobs: Jobs = None
-    dask: Annotated[str | None, Option("Dask scheduler to fit on.", "ADDRESS")] = None
     most_samples: Annotated[
         int | None,
         Option("Most samples to fit to: longer recordings are thinned.", "N", "--samples"),

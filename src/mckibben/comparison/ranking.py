@@ -136,8 +136,7 @@ def compare(
         Seed of all random numbers.
     jobs : int, optional
         Processes, which share the models and their folds; default as many as there are cores, or none
-        for little work. An external joblib backend, such as Dask's, is used instead. Results are
-        identical.
+        for little work. Results are identical.
     most_samples : int
         Longer recordings are thinned to so many samples for fit and test, including turning points.
         Default: 100 000; of more than a million, 40 000, in segments where thinning would lose the
@@ -155,7 +154,7 @@ def compare(
         Called with the leaderboard of the finished models after each one.
     watch : callable, optional
         Called, while a model is fitted, with its name, the share done of its fits, and the least cost
-        so far; not on joblib's backends.
+        so far.
 
     Returns
     -------

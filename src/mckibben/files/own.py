@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import warnings
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,14 +12,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from mckibben.arrays import Array
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files.formats import READERS, reason, tables, writer
-from mckibben.files.notices import warn
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
 from mckibben.system import ordinary
 from mckibben.system.atomic import digest
-
-STILL = ("calibration", "pressure_reference")
-"""Entries of a recording's meta that remain valid after its samples were edited."""
 
 
 class Stored(BaseModel):
@@ -44,13 +39,6 @@ class Stored(BaseModel):
         """Return the table of the samples described, by channel."""
         columns = tuple(Column(name, values[name], unit) for name, unit in self.units.items())
         return Table(columns, None, self.sample_time, self.start_time, self.meta, own=True)
-
-    def edited(self, table: Table) -> Table:
-        """Return a table of edited samples, with the described units and calibrations."""
-        units = {"time": "s", **self.units}
-        columns = (replace(c, unit=c.unit or units.get(c.header) or None) for c in table.columns)
-        meta = {key: self.meta[key] for key in STILL if key in self.meta}
-        return replace(table, columns=tuple(columns), meta=meta)
 
 
 def write(recording: Recording, path: str | Path) -> None:
@@ -118,13 +106,13 @@ def parse(text: str | bytes) -> Stored | str:
     return found if all(map(str.isprintable, words)) else "its names cannot be printed"
 
 
-def noted(found: Stored | str, problem: str, path: Path) -> Stored | None:
-    """Warn that a description does not match the samples; return None if it is invalid."""
-    if isinstance(found, str):
-        warn(path, f"{problem}; it is ignored, and units are taken from the header")
-        return None
-    warn(path, f"{problem}; its units and calibrations are used, and nothing else of it")
-    return found
+def changed(path: Path, place: str) -> DataError:
+    """Return the error for samples that are not those described; ``place`` is of the description."""
+    return DataError(
+        "its samples are not those that this package wrote",
+        file=path,
+        remedy=f"to read it by its header alone, remove {place}",
+    )
 
 
 def sidecar(path: Path) -> Path:

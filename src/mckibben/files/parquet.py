@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.files import own
+from mckibben.files.notices import warn
 from mckibben.files.table import Column, Table, column
 from mckibben.files.tree import without_numbers
 from mckibben.recording import Recording
@@ -27,8 +28,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 
     frame = pq.ParquetFile(file).read()
     text = (frame.schema.metadata or {}).get(_KEY)
-    described = None if text is None else _own(frame, text, path)
-    if isinstance(described, Table):
+    if text is not None and (described := _own(frame, text, path)):
         return [described]
     columns: list[Column] = []
     unread: dict[str, str] = {}
@@ -47,8 +47,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             unread[name] = f"a column of type {kind}"
     if not columns:
         raise without_numbers(unread, path)
-    table = Table(tuple(columns), unread=unread)
-    return [table if described is None else described.edited(table)]
+    return [Table(tuple(columns), unread=unread)]
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -64,18 +63,17 @@ def write(recording: Recording, path: Path) -> None:
         pq.write_table(frame, new)
 
 
-def _own(frame: Any, text: bytes, path: Path) -> Table | own.Stored | None:
-    """Return the described table of a file, or a description of other samples."""
+def _own(frame: Any, text: bytes, path: Path) -> Table | None:
+    """Return the described table of a file, or None if the description is not by this package."""
     description = own.parse(text)
     if isinstance(description, str):
-        problem = f"the description in it is not by this package ({description})"
-    else:
-        problem = "the description in it is of other samples"
-        if description.units.keys() <= set(frame.column_names):
-            values = {name: frame[name].to_numpy() for name in description.units}
-            if digest(_samples(values)) == description.sha256:
-                return description.table(values)
-    return own.noted(description, problem, path)
+        warn(path, f"the description in it is ignored, as it is not by mckibben ({description})")
+        return None
+    if description.units.keys() <= set(frame.column_names):
+        values = {name: frame[name].to_numpy() for name in description.units}
+        if digest(_samples(values)) == description.sha256:
+            return description.table(values)
+    raise own.changed(path, "the key 'mckibben' of its schema's metadata")
 
 
 def _samples(channels: Any) -> bytes:

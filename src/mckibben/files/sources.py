@@ -223,6 +223,8 @@ def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Re
         elif len(times) != timed:
             channel = "time"
             problem = f"it has {len(times)} columns of times, where another file has one"
+        elif tables[path].meta.get("calibration"):
+            problem = "it was calibrated before it was written by mckibben"
         if problem:
             remedy = (
                 "save one signal in every file, and one column of times in all or in none, and "
@@ -239,14 +241,12 @@ def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Re
         problem = f"its files have no times and differ in length: {listing}"
         raise DataError(problem, file=next(iter(tables)).parent, remedy=JOIN)
     each = tables.items()
-    done = {name: one for _, table in each for name, one in table.calibration.items()}
     step, start = grids.pop() if len(grids) == 1 else (None, 0.0)
     together = Table(
         (*clocks[:1], *signals),
         next(iter(tables.values())).lines,
         step,
         start,
-        meta={"calibration": done} if done else {},
         rates={f"{path.name}/{n}": rate for path, table in each for n, rate in table.rates.items()},
         unread={f"{path.name}/{n}": why for path, table in each for n, why in table.unread.items()},
     )

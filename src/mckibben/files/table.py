@@ -81,12 +81,6 @@ class Table:
         """Whether columns have separate times, so that none of them is the time."""
         return any(column.times is not None for column in self.columns)
 
-    @property
-    def calibration(self) -> Mapping[str, Any]:
-        """Calibration of channels in a file written by this package, by name."""
-        found = self.meta.get("calibration")
-        return found if isinstance(found, Mapping) else {}
-
     def row(self, sample: int) -> int:
         """Return the row number for a sample counted from 0."""
         return sample + 1 if self.lines is None else int(self.lines[sample])

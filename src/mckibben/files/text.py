@@ -35,11 +35,9 @@ _SNIFFED = 2**18  # bytes by which the layout of a table is recognised
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the table of a text file."""
     data = file.read()
-    found = _own(data, path) if os.path.lexists(own.sidecar(path)) else None
-    if isinstance(found, Table):
+    if os.path.lexists(own.sidecar(path)) and (found := _own(data, path)):
         return [found]
-    table = parsed(decoded(data, path), path)
-    return [table if found is None else found.edited(table)]
+    return [parsed(decoded(data, path), path)]
 
 
 def laid_out(
@@ -78,26 +76,23 @@ def write(recording: Recording, path: Path) -> None:
         new.write_text(description, encoding="utf-8")
 
 
-def _own(data: bytes, path: Path) -> Table | own.Stored | None:
-    """Return the table described by a sidecar, or a description of another version."""
+def _own(data: bytes, path: Path) -> Table | None:
+    """Return the table that a sidecar describes, or None if that is not by this package."""
     try:
         description = own.parse(read_bytes(own.sidecar(path), most=DESCRIPTION))
     except DataError as error:
         description = error.problem
-    header = data.partition(b"\n")[0].decode("utf-8", "replace")
-    tabs = "\t" in header or path.suffix.casefold() == ".tsv"
-    dialect = Dialect("\t" if tabs else ",", ".")
-    names = next(csv.reader([header], delimiter=dialect.separator or ","), [])
     if isinstance(description, str):
-        problem = f"is not a description by this package ({description})"
-    elif description.sha256 != digest(data):
-        problem = "describes another version of the file"
-    elif names != [*([] if description.sample_time is None else ["time"]), *description.units]:
-        problem = "names other columns than the file"
-    else:
-        frame = _frame(data, dialect, names, skiprows=1, dtype=np.float64)
-        return description.table({name: frame[name].to_numpy() for name in names})
-    return own.noted(description, f"it {problem}", own.sidecar(path))
+        warn(path, f"{own.sidecar(path).name} is ignored, as it is not by mckibben ({description})")
+        return None
+    header = data.partition(b"\n")[0].decode("utf-8", "replace")
+    dialect = Dialect("\t" if path.suffix.casefold() == ".tsv" else ",", ".")
+    names = next(csv.reader([header], delimiter=dialect.separator or ","), [])
+    named = [*([] if description.sample_time is None else ["time"]), *description.units]
+    if description.sha256 != digest(data) or names != named:
+        raise own.changed(path, f"{own.sidecar(path).name}")
+    frame = _frame(data, dialect, names, skiprows=1, dtype=np.float64)
+    return description.table({name: frame[name].to_numpy() for name in description.units})
 
 
 def _frame(data: bytes, dialect: Dialect, names: Sequence[Any], **options: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Choosing columns; missing samples, their codes, wraps, outliers; units."""
+"""Choosing columns; missing samples, their codes, wraps; units."""
 
 from __future__ import annotations
 
@@ -159,13 +159,6 @@ def test_lost_rows_do_not_change_the_sample_time(tmp_path: Path, jitter: float) 
     path = tmp_path / "run.csv"
     path.write_text(f"time_s,pressure_bar,displacement_mm\n{cells}\n")
     assert one(path, gaps="interpolate").sample_time == pytest.approx(T[1] - T[0], rel=1e-4)
-
-
-@pytest.mark.parametrize("length", [1, 3, 4])
-def test_outliers_are_noted_unless_they_last(tmp_path: Path, length: int) -> None:
-    y = changed(Y, slice(100, 100 + length), 100.5 + 0.01 * K[:length])
-    notes = one(table(tmp_path, "pressure_bar,displacement_mm", P, y)).notes
-    assert any("row 102" in note for note in notes) == (length < 4)
 
 
 def test_bridged_samples_are_not_fitted(tmp_path: Path) -> None:

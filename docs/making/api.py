@@ -26,10 +26,10 @@ USES = {
     "signals": Use(
         "Signals: excitations, cycles, filters",
         "mckibben.signals: triangle decaying_triangle progressive_triangle irregular_triangle sine "
-        "decaying_sine progressive_sine chirp multisine random_wave random_steps binary_steps "
+        "decaying_sine progressive_sine chirp multisine random_wave binary_steps "
         "staircase ramps constant pulls build settings_of cut resample decimate_minmax coarsened "
         "made_manageable detrend low_pass zeroed noise_level reversals branches branches_of cycles "
-        "split_cycles split_time",
+        "split_cycles",
     ),
     "describe": Use(
         "Describe a muscle",

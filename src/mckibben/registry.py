@@ -171,7 +171,6 @@ PLUGINS: dict[str, dict[str, str]] = {
         "progressive-triangle": "mckibben.signals.excitations:progressive_triangle",
         "pulls": "mckibben.signals.loads:pulls",
         "ramps": "mckibben.signals.loads:ramps",
-        "random-steps": "mckibben.signals.steps:random_steps",
         "random-wave": "mckibben.signals.broadband:random_wave",
         "sine": "mckibben.signals.excitations:sine",
         "staircase": "mckibben.signals.steps:staircase",

@@ -139,8 +139,7 @@ def compare(
         for little work. Results are identical.
     most_samples : int
         Longer recordings are thinned to so many samples for fit and test, including turning points.
-        Default: 100 000; of more than a million, 40 000, in segments where thinning would lose the
-        motion. Scores refer to these samples.
+        Default: 100 000. Scores refer to these samples.
     allow_shared : bool
         Whether to allow test recordings that were fitted, and repeated training recordings.
     folder : path, optional

@@ -1,4 +1,4 @@
-"""Splitting a recording: in time, at its cycles, or into its branches."""
+"""Splitting a recording at its cycles, or into its branches."""
 
 from __future__ import annotations
 
@@ -9,30 +9,6 @@ import numpy as np
 from mckibben.errors import DataError, require
 from mckibben.recording import Recording
 from mckibben.signals.reversals import branches, reversals
-
-
-def split_time(recording: Recording, fraction: float) -> tuple[Recording, Recording]:
-    """Return the first part of a recording, and the rest, which continues it.
-
-    Parameters
-    ----------
-    fraction : float
-        Share of the samples in the first part, between 0 and 1.
-
-    Raises
-    ------
-    DataError
-        If either part would have fewer than two samples.
-    """
-    n = len(recording)
-    at = round(fraction * n) if 0 < fraction < 1 else 0
-    if min(at, n - at) < 2:
-        raise DataError(
-            f"a share of {fraction} of {n} samples leaves a part with fewer than two",
-            file=recording.source,
-            remedy="give a share further inside 0 and 1, or a longer recording",
-        )
-    return recording.slice(0, at), recording.slice(at, n)
 
 
 def split_cycles(recording: Recording, channel: str, n_blocks: int) -> list[tuple[int, int]]:

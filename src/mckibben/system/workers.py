@@ -268,22 +268,10 @@ def context(*more: str) -> Any:
 
 
 def end_with_parent() -> None:
-    """End this process when its parent ends.
-
-    On Linux the system does so: a thread would wait as long as compiled code keeps all others from
-    running.
-    """
+    """End this process when its parent ends."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return
-    if sys.platform == "linux":
-        import fcntl
-
-        # the parent holds the other end of this pipe, and writes nothing more to it
-        fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(parent.sentinel, fcntl.F_SETSIG, signal.SIGKILL)
-        flags = fcntl.fcntl(parent.sentinel, fcntl.F_GETFL)
-        fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, flags | os.O_ASYNC)
     if not parent.is_alive():
         os._exit(1)
 

@@ -64,7 +64,6 @@ def episode(env: Any, act: Callable[[np.ndarray, dict[str, Any]], Any], seed: in
         ({"spread": 2.0}, "spread"),
         ({"load": 5.0}, "load"),
         ({"settings": {"payload": -1}}, "payload"),
-        ({"render_mode": "human"}, "render_mode"),
         ({"plant": 3}, "plant"),
         ({"plant": "absent.json"}, "absent"),
         ({"plant": PI.example().inverse()}, "inverse"),

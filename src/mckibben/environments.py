@@ -95,8 +95,6 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         Relative spread of bladder stiffness and friction from episode to episode, 0 to 0.5.
     settings : mapping, optional
         Parameters of the rig to change, as `mckibben.Rig.changed` takes them.
-    render_mode : {None, "rgb_array"}
-        With the second, `render` draws the episode so far.
     plant : Twin, Block or path, optional
         A fitted model instead of a rig: itself, its file, or a `mckibben.control.Twin`, where what is no
         pressure stays as that holds it. With a band it scatters, otherwise in every episode; ``spread``
@@ -107,8 +105,6 @@ class Tracking(gymnasium.Env[Vector, Vector]):
     DataError
         On options outside these ranges, or a rig without displacement.
     """
-
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012  # as Gymnasium has it
 
     def __init__(
         self,
@@ -122,7 +118,6 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         load: float = 0.0,
         spread: float = 0.0,
         settings: Mapping[str, Any] | None = None,
-        render_mode: str | None = None,
         plant: Twin | Block | str | Path | None = None,
     ) -> None:
         from mckibben.rigs import load_rig
@@ -149,9 +144,6 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             "reference",
             reference,
             "random-wave, irregular-triangle or sine",
-        )
-        _require(
-            render_mode in (None, "rgb_array"), "render_mode", render_mode, "rgb_array or none"
         )
         changes = {**(settings or {}), "sample_time": control_time}
         self._plant: Rig | Twin = chosen.changed(changes)
@@ -184,7 +176,6 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         self._load = load
         self._steps = round(duration / control_time)
         self._shape, self._preview, self._effort, self._spread = reference, preview, effort, spread
-        self.render_mode = render_mode
         n = len(self._commands)
         n_seen = len(self._moves) * (2 + preview) + len(self._bars) + n
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (n,), np.float32)
@@ -228,24 +219,6 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         reward -= self._effort * float(np.mean(change**2))
         truncated = len(self._done) > self._steps
         return self._observation(measured), reward, False, truncated, info
-
-    def render(self) -> Any:
-        """Return a picture of the episode so far, shape (height, width, 3), or None."""
-        if self.render_mode is None:
-            return None
-        demand("matplotlib", "figures", "pictures of episodes")
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(6, 3), dpi=100, layout="constrained")
-        canvas: Any = FigureCanvasAgg(figure)
-        axes = figure.subplots()
-        time = np.arange(self._steps + 1) * self._plant.sample_time
-        axes.plot(time, self._wanted[: self._steps + 1], "k", lw=0.8)
-        axes.plot(time[: len(self._done)], np.array(self._done)[:, self._moves])
-        axes.set(xlabel="time [s]", ylabel="displacement [mm]", title=self._plant.name)
-        canvas.draw()
-        return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
 
     def _observation(self, measured: Array) -> Vector:
         k = len(self._done) - 1

@@ -111,10 +111,10 @@ def marked(text: bytes) -> bytes:
 def claim_recording(
     path: str | Path, *, inputs: Iterable[str | Path] = (), force: bool = False
 ) -> None:
-    """Raise an error for an output recording likewise, or of an unknown format."""
-    from mckibben.files.formats import writer
+    """Raise an error for an output recording likewise, or if it is no CSV."""
+    from mckibben.files.own import require_csv
 
-    writer(Path(path))
+    require_csv(Path(path))
     claim(path, inputs=inputs, force=force)
 
 

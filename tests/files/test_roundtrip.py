@@ -14,7 +14,6 @@ import mckibben
 from mckibben import DataError, Recording
 from tests.files.made import one, place, put, refused
 
-ENDINGS = (".csv", ".tsv", ".parquet")
 finite = st.floats(allow_nan=False, allow_infinity=False)
 known = ["pressure", "displacement", "displacement_model", "u1_V", "x", "t", "#1", "a,b"]
 words = st.text(min_size=1, max_size=8).filter(lambda s: s.isprintable() and s.strip())
@@ -47,11 +46,10 @@ def recordings(draw: st.DrawFn) -> Recording:
     )
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
 @settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 @given(recording=recordings())
-def test_read_gives_back_what_write_took(recording: Recording, ending: str, tmp_path: Path) -> None:
-    path = tmp_path / f"run{ending}"
+def test_read_gives_back_what_write_took(recording: Recording, tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
     mckibben.write(recording, path)
     (back,) = mckibben.read(path)  # without a warning
     assert back == recording
@@ -150,7 +148,7 @@ def test_own_files_follow_columns_units_rate_and_channels(tmp_path: Path) -> Non
     assert place(path, channels=["force"]) == ("force", None)
 
 
-@pytest.mark.parametrize("name", ["a.mat", "a.xlsx", "a", "no/a.csv", "no/a.tsv", "no/a.parquet"])
+@pytest.mark.parametrize("name", ["a.mat", "a.tsv", "a", "no/a.csv"])
 def test_other_endings_and_missing_folders_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(DataError) as caught:
         mckibben.write(RECORDING, tmp_path / name)
@@ -164,12 +162,11 @@ BAD += [Recording({"x": ONES}, meta={"a": value}) for value in ({1, 2}, float("n
 BAD += [Recording({"x": ONES}, units={"x": "\x1b[2J"})]
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("bad", BAD, ids=str)
 def test_what_cannot_be_read_back_is_not_written_and_nothing_is_lost(
-    tmp_path: Path, bad: Recording, ending: str
+    tmp_path: Path, bad: Recording
 ) -> None:
-    path = tmp_path / f"a{ending}"
+    path = tmp_path / "a.csv"
     mckibben.write(RECORDING, path)
     with pytest.raises(DataError):
         mckibben.write(bad, path)

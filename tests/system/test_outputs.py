@@ -163,9 +163,8 @@ def test_single_files_are_ours_by_what_is_in_them(tmp_path: Path) -> None:
     PI((0.0,), (1.0,)).save(tmp_path / "model.json")
     made = Recording({"pressure": np.linspace(0.0, 1.0, 3)}, 0.1)
     write(made, tmp_path / "run.csv")
-    write(made, tmp_path / "run.parquet")
     put(tmp_path, {"figure.svg": f"<svg>{MAKER}</svg>", "empty.json": ""})
-    for name in ("model.json", "run.csv", "run.parquet", "figure.svg", "empty.json", "new.csv"):
+    for name in ("model.json", "run.csv", "figure.svg", "empty.json", "new.csv"):
         claim(tmp_path / name)
     put(tmp_path, {"other.json": "{}", "other.svg": "<svg/>", "other.csv": "a\n1\n"})
     (tmp_path / "run.csv").write_text((tmp_path / "run.csv").read_text() + "9,9\n")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from io import BufferedReader
@@ -37,9 +37,6 @@ READERS: dict[str, str] = {
 }
 """Ending of the file's name -> module of this folder with ``read(file, path) -> list[Table]``."""
 
-WRITERS = (".csv", ".tsv", ".parquet")
-"""Endings whose module also has ``write(recording, path)``."""
-
 SOUGHT = tuple(ending for ending in READERS if ending != ".log")
 """Endings that a folder is searched for."""
 
@@ -72,7 +69,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     DataError
         If it is empty or damaged, or its ending is unknown or not that of its contents.
     """
-    module = _module(path, READERS, "read")
+    module = _module(path)
     with refusing(path):
         start = file.peek(64)
         if not start:
@@ -96,7 +93,7 @@ def laid_out(
     if READERS.get(path.suffix.casefold()) != "text":
         problem, remedy = "only text has lines and an encoding", "leave both as found"
         raise DataError(problem, file=path, remedy=remedy)
-    text = _module(path, READERS, "read")
+    text = _module(path)
     found: BufferedReader = text.laid_out(file, path, header, skip, encoding)
     return found
 
@@ -105,11 +102,6 @@ def bag(folder: Path) -> list[Table]:
     """Return the contents of a ROS 2 bag folder; errors as in `read`."""
     with refusing(folder):
         return [printable(table) for table in import_module("mckibben.files.bags").folder(folder)]
-
-
-def writer(path: Path) -> ModuleType:
-    """Return the module that writes files of this ending; raise a `DataError` if there is none."""
-    return _module(path, WRITERS, "written")
 
 
 def reason(error: Exception) -> str:
@@ -141,11 +133,11 @@ def refusing(path: Path) -> Iterator[None]:
         raise DataError(problem, file=path, remedy=remedy) from None
 
 
-def _module(path: Path, endings: Collection[str], done: str) -> ModuleType:
+def _module(path: Path) -> ModuleType:
     ending = path.suffix.casefold()
-    if ending not in endings:
-        problem = (
-            f"files {f'ending in {ending!r}' if ending else 'without an ending'} cannot be {done}"
+    if ending not in READERS:
+        ended = f"ending in {ending!r}" if ending else "without an ending"
+        raise DataError(
+            f"files {ended} cannot be read", file=path, remedy=f"give one of {', '.join(READERS)}"
         )
-        raise DataError(problem, file=path, remedy=f"give one of {', '.join(endings)}")
     return import_module(f"mckibben.files.{READERS[ending]}")

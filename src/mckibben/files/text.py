@@ -25,8 +25,7 @@ from mckibben.files.instants import may_be_instant
 from mckibben.files.notices import listed, warn
 from mckibben.files.sniffing import SEPARATORS, Layout, decoded, sniff
 from mckibben.files.table import Column, Table
-from mckibben.recording import Recording
-from mckibben.system.atomic import digest, replacing
+from mckibben.system.atomic import digest
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
 
 _SNIFFED = 2**18  # bytes by which the layout of a table is recognised
@@ -60,22 +59,6 @@ def laid_out(
     return BufferedReader(BytesIO(text.encode()))
 
 
-def write(recording: Recording, path: Path) -> None:
-    """Write a recording as text, with its description in a second file."""
-    import pandas as pd
-
-    # 1.38, not 1.3800000000000001: the description has the exact step
-    time = {} if recording.sample_time is None else {"time": recording.time.round(12)}
-    columns = {**time, **recording.channels}
-    separator = "\t" if path.suffix.casefold() == ".tsv" else ","
-    data = pd.DataFrame(columns).to_csv(index=False, sep=separator, lineterminator="\n").encode()
-    description = own.describe(recording, data, path) + "\n"
-    with replacing(path) as new:
-        new.write_bytes(data)
-    with replacing(own.sidecar(path)) as new:
-        new.write_text(description, encoding="utf-8")
-
-
 def _own(data: bytes, path: Path) -> Table | None:
     """Return the table that a sidecar describes, or None if that is not by this package."""
     try:
@@ -86,11 +69,11 @@ def _own(data: bytes, path: Path) -> Table | None:
         warn(path, f"{own.sidecar(path).name} is ignored, as it is not by mckibben ({description})")
         return None
     header = data.partition(b"\n")[0].decode("utf-8", "replace")
-    dialect = Dialect("\t" if path.suffix.casefold() == ".tsv" else ",", ".")
-    names = next(csv.reader([header], delimiter=dialect.separator or ","), [])
+    dialect = Dialect(",", ".")
+    names = next(csv.reader([header], delimiter=","), [])
     named = [*([] if description.sample_time is None else ["time"]), *description.units]
     if description.sha256 != digest(data) or names != named:
-        raise own.changed(path, f"{own.sidecar(path).name}")
+        raise own.changed(path)
     frame = _frame(data, dialect, names, skiprows=1, dtype=np.float64)
     return description.table({name: frame[name].to_numpy() for name in description.units})
 

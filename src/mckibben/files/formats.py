@@ -40,20 +40,6 @@ READERS: dict[str, str] = {
 SOUGHT = tuple(ending for ending in READERS if ending != ".log")
 """Endings that a folder is searched for."""
 
-_SIGNATURES: dict[bytes, tuple[str, ...]] = {
-    b"PAR1": (".parquet",),
-    b"\x89HDF\r\n\x1a\n": (".h5", ".hdf5", ".mat"),
-    b"TDSm": (".tdms",),
-    b"MATLAB 5.0 MAT": (".mat",),
-    b"MATLAB 7.3 MAT": (".mat",),
-    b"PK\x03\x04": (".xlsx",),
-    b"#ROSBAG V": (".bag",),
-    b"\x89MCAP0\r\n": (".mcap",),
-    b"SQLite format 3\x00": (".db3",),
-    b"\xd0\xcf\x11\xe0": (".xls",),
-}
-"""Beginning of a file -> the endings of its format."""
-
 
 def tables(path: Path) -> list[Table]:
     """Return the raw contents of a file; errors as in `read`."""
@@ -67,20 +53,13 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     Raises
     ------
     DataError
-        If it is empty or damaged, or its ending is unknown or not that of its contents.
+        If it is empty or damaged, or its ending is unknown.
     """
     module = _module(path)
     with refusing(path):
-        start = file.peek(64)
-        if not start:
+        if not file.peek(1):
             remedy = "give a file with a header and samples"
             raise DataError("there is nothing in it", file=path, remedy=remedy)
-        for signature, endings in _SIGNATURES.items():
-            if start.startswith(signature) and path.suffix.casefold() not in endings:
-                known = endings[0] in READERS
-                remedy = f"rename it to end in {endings[0]}" if known else "export it as CSV"
-                problem = f"its contents are those of a {endings[0]} file"
-                raise DataError(problem, file=path, remedy=remedy)
         return [distinct(printable(table)) for table in module.read(file, path)]
 
 

@@ -100,8 +100,8 @@ ALONE = (
     *("sheets/book.xlsx", "waveform.tdms", "groups.tdms", "starts.tdms"),
     *("ros1.bag", "ros2-mcap", "ros2-db3"),
     *("ros2-mcap/ros2-mcap.mcap", "ros2-db3/ros2-db3.db3"),
-    *("described", "described-wrongly", "no-unit-for-gain", "runs", "signals", "clocks"),
-    *("untold", "joined", "nothing"),
+    *("described", "described-wrongly", "no-unit-for-gain", "runs", "clocks"),
+    *("joined", "nothing"),
 )
 """Inputs that are read without options."""
 

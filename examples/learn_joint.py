@@ -14,7 +14,7 @@ import time
 
 import numpy as np
 
-from mckibben.vector_environment import JointTracking
+from joint_environment import JointTracking
 
 COPIES, ROUNDS, ELITE = 128, 30, 16
 """Candidates of a round, rounds, and how many of the best set the next round's distribution."""

@@ -62,7 +62,7 @@ USES = {
         "Virtual rigs and environments",
         "mckibben: Rig load_rig check_rig; "
         "mckibben.rigs: rig_names describe rig_from_data_sheet save_rig record; "
-        "mckibben.environments: Tracking; mckibben.vector_environment: JointTracking",
+        "mckibben.environments: Tracking",
     ),
     "muscles": Use(
         "Muscle library",

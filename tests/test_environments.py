@@ -61,13 +61,11 @@ def episode(env: Any, act: Callable[[np.ndarray, dict[str, Any]], Any], seed: in
         ({"reference": "square"}, "'square'"),
         ({"preview": -1}, "preview"),
         ({"effort": -1.0}, "effort"),
-        ({"spread": 2.0}, "spread"),
         ({"load": 5.0}, "load"),
         ({"settings": {"payload": -1}}, "payload"),
         ({"plant": 3}, "plant"),
         ({"plant": "absent.json"}, "absent"),
         ({"plant": PI.example().inverse()}, "inverse"),
-        ({"plant": Twin(PI.example()), "spread": 0.1}, "spread"),
         ({"plant": Twin(PI.example()), "load": 5.0}, "load"),
     ],
 )

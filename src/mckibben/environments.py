@@ -51,9 +51,6 @@ reversals.
 FARTHEST = 5.0
 """Bound to which observations are clipped, well outside their usual range."""
 
-SPREAD_PARAMETERS = ("muscle.c10", "muscle.friction.contracting", "muscle.friction.extending")
-"""Parameters that ``spread`` varies between episodes."""
-
 
 class Tracking(gymnasium.Env[Vector, Vector]):
     """Track a reference with the displacement of a rig or a model.
@@ -91,14 +88,12 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         Weight of changes of action, not negative.
     load : float
         Constant force that pulls where the rig has such an input [N].
-    spread : float
-        Relative spread of bladder stiffness and friction from episode to episode, 0 to 0.5.
     settings : mapping, optional
         Parameters of the rig to change, as `mckibben.Rig.changed` takes them.
     plant : Twin, Block or path, optional
-        A fitted model instead of a rig: itself, its file, or a `mckibben.control.Twin`, where what is no
-        pressure stays as that holds it. With a band it scatters, otherwise in every episode; ``spread``
-        is of rigs alone, and ``settings`` are those of `Twin.changed`.
+        A fitted model instead of a rig: itself, its file, or a `mckibben.control.Twin`, whose held
+        inputs stay constant. A band adds scatter, another in every episode. ``settings`` are those of
+        `Twin.changed`.
 
     Raises
     ------
@@ -116,21 +111,17 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         preview: int = 0,
         effort: float = 0.01,
         load: float = 0.0,
-        spread: float = 0.0,
         settings: Mapping[str, Any] | None = None,
         plant: Twin | Block | str | Path | None = None,
     ) -> None:
         from mckibben.rigs import load_rig
 
         chosen: Rig | Twin
-        self._spreading: Rig | None = None
         if plant is None:
             chosen = load_rig(rig) if isinstance(rig, str | Path) else rig
             if control_time is None:
                 control_time = max(0.02, chosen.sample_time)
-            self._spreading = chosen if spread else None
         else:
-            _require(not spread, "spread", spread, "0 with a plant, which has its own scatter")
             _require(not load, "load", load, "0 with a plant, and held={'force': ...} to the plant")
             chosen = plant = _twin(plant)
             control_time = chosen.sample_time if control_time is None else control_time
@@ -138,7 +129,6 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         _require(2 * control_time <= duration <= 1e4, "duration", duration, "2 steps to 10000 s")
         _require(preview in range(1001), "preview", preview, "a whole number from 0 to 1000")
         _require(0 <= effort < np.inf, "effort", effort, "0 or more")
-        _require(0 <= spread <= 0.5, "spread", spread, "0 to 0.5")
         _require(
             reference in ("random-wave", "irregular-triangle", "sine"),
             "reference",
@@ -147,8 +137,6 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         )
         changes = {**(settings or {}), "sample_time": control_time}
         self._plant: Rig | Twin = chosen.changed(changes)
-        if self._spreading is not None:
-            self._spreading = self._spreading.changed(changes)
         outputs = self._plant.outputs
         self._moves = [i for i, name in enumerate(outputs) if name.startswith("displacement")]
         self._bars = [i for i, name in enumerate(outputs) if name.startswith("pressure")]
@@ -175,7 +163,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             )
         self._load = load
         self._steps = round(duration / control_time)
-        self._shape, self._preview, self._effort, self._spread = reference, preview, effort, spread
+        self._shape, self._preview, self._effort = reference, preview, effort
         n = len(self._commands)
         n_seen = len(self._moves) * (2 + preview) + len(self._bars) + n
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (n,), np.float32)
@@ -193,12 +181,11 @@ class Tracking(gymnasium.Env[Vector, Vector]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Vector, dict[str, Any]]:
-        """Start an episode: a new reference, a rig at rest, and, with ``spread``, a varied muscle."""
+        """Start an episode: a new reference, and a plant at rest."""
         super().reset(seed=seed)
         del options
-        self._now = self._varied()
-        self._wanted = self._hidden_run(self._now)
-        measured = self._now.reset(seed=int(self.np_random.integers(2**31)))
+        self._wanted = self._hidden_run()
+        measured = self._plant.reset(seed=int(self.np_random.integers(2**31)))
         self._action = np.zeros(len(self._commands))
         self._applied = self._low.copy()
         self._done = [measured]
@@ -211,7 +198,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         commands = dict(zip(self._commands, self._applied.tolist(), strict=True))
         if self._load:
             commands["force"] = self._load
-        measured = self._now.step(commands)
+        measured = self._plant.step(commands)
         self._done.append(measured)
         change, self._action = wish - self._action, wish
         info = self._info(measured)
@@ -239,30 +226,12 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             "pressure": measured[self._bars] if self._bars else self._applied.copy(),
         }
 
-    def _varied(self) -> Rig | Twin:
-        rig = self._spreading
-        if rig is None:
-            return self._plant
-        fields = rig.model_dump()
-        settings: dict[str, Any] = {}
-        for path in SPREAD_PARAMETERS:
-            value: Any = fields
-            for part in path.split("."):
-                value = value[part]
-            factor = float(np.exp(self._spread * self.np_random.standard_normal()))
-            settings[path] = (
-                [factor * each for each in value]
-                if isinstance(value, list | tuple)
-                else factor * value
-            )
-        return rig.changed(settings)
-
-    def _hidden_run(self, plant: Rig | Twin) -> Array:
+    def _hidden_run(self) -> Array:
         """Return a rig's response to random commands [mm], shape (samples, displacements)."""
         from mckibben.signals import irregular_triangle, random_wave, sine
 
         n = len(self._wanted)
-        time = np.arange(max(n, 2)) * plant.sample_time
+        time = np.arange(max(n, 2)) * self._plant.sample_time
         waves = {}
         for name, low, high in zip(self._commands, self._low, self._high, strict=True):
             bottom, top = np.sort(self.np_random.uniform(0.0, 1.0, 2))
@@ -276,7 +245,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
                 turns = max(int(time[-1] * FASTEST), 1)
                 share = irregular_triangle(time, turns, top, bottom, seed=seed)
             waves[name] = low + (high - low) * share
-        return self._ideal(plant, waves)[:n]
+        return self._ideal(waves)[:n]
 
     def _measured_stroke(self) -> float:
         """Return the largest range of displacement when all commands rise slowly together [mm]."""
@@ -287,17 +256,19 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             for name, low, high in zip(self._commands, self._low, self._high, strict=True)
             if name != "pressure_extensor"
         }
-        return float(np.ptp(self._ideal(self._plant, waves), axis=0).max())
+        return float(np.ptp(self._ideal(waves), axis=0).max())
 
-    def _ideal(self, plant: Rig | Twin, waves: Mapping[str, Array]) -> Array:
+    def _ideal(self, waves: Mapping[str, Array]) -> Array:
         from mckibben.recording import Recording
 
         channels = dict(waves)
         if self._load:
             n = len(next(iter(waves.values())))
             channels["force"] = np.full(n, self._load)
-        given: Recording = Recording(channels, plant.sample_time)
-        return plant.run(given, ideal=True).matrix([plant.outputs[i] for i in self._moves])
+        given: Recording = Recording(channels, self._plant.sample_time)
+        return self._plant.run(given, ideal=True).matrix(
+            [self._plant.outputs[i] for i in self._moves]
+        )
 
 
 def register() -> None:

@@ -28,7 +28,7 @@ USES = {
         "mckibben.signals: triangle decaying_triangle progressive_triangle irregular_triangle sine "
         "decaying_sine progressive_sine chirp multisine random_wave binary_steps "
         "staircase ramps constant pulls build settings_of cut resample decimate_minmax coarsened "
-        "made_manageable detrend low_pass zeroed noise_level reversals branches branches_of cycles "
+        "made_manageable detrend low_pass zeroed noise_level reversals branches cycles "
         "split_cycles",
     ),
     "describe": Use(

@@ -89,11 +89,10 @@ def shortest_hold(x: Array, span: float) -> int:
         stride *= 2
 
 
-def moves(signals: Sequence[Array]) -> bool:
-    """Return whether a channel varies, within its pieces or between them, by more than white noise."""
-    steps = np.concatenate([np.diff(x) for x in signals])
-    # of white noise it is twice the variance
-    return float(np.mean(steps**2)) < float(np.concatenate(signals).var())
+def moves(x: Array) -> bool:
+    """Return whether a signal varies by more than white noise."""
+    # the mean square of the steps of white noise is twice its variance
+    return float(np.mean(np.diff(x) ** 2)) < float(x.var())
 
 
 def _band(x: Array, span: float) -> float:

@@ -1,4 +1,4 @@
-"""Splitting a recording at its cycles, or into its branches."""
+"""Splitting a recording at its cycles."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from mckibben.errors import DataError, require
 from mckibben.recording import Recording
-from mckibben.signals.reversals import branches, reversals
+from mckibben.signals.reversals import reversals
 
 
 def split_cycles(recording: Recording, channel: str, n_blocks: int) -> list[tuple[int, int]]:
@@ -51,20 +51,3 @@ def split_cycles(recording: Recording, channel: str, n_blocks: int) -> list[tupl
     nearest = allowed[np.abs(allowed[:, np.newaxis] - wanted).argmin(axis=0)]
     cuts = [0, *np.unique(nearest).tolist(), n]
     return list(pairwise(cuts))
-
-
-def branches_of(
-    recording: Recording, channel: str, threshold: float | None = None
-) -> list[Recording]:
-    """Return the monotonic branches of a recording, each as a recording.
-
-    Parameters
-    ----------
-    channel : str
-        The input, whose reversals part the branches.
-    threshold : float, optional
-        Smallest swing back that is a reversal; see `reversals`.
-    """
-    return [
-        recording.slice(start, stop) for start, stop, _ in branches(recording[channel], threshold)
-    ]

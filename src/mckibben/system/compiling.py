@@ -13,7 +13,6 @@ import re
 import sys
 import tempfile
 import threading
-import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -40,9 +39,6 @@ _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 _lock = threading.Lock()
 
-UNUSED = 30 * 86400.0
-"""Time after which what other versions of the package cached is removed [s]."""
-
 
 @cache
 def cache_folder() -> Path | None:
@@ -55,15 +51,9 @@ def cache_folder() -> Path | None:
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
-        os.utime(folder)
     except OSError:
         _note(f"compiled functions are not cached: {folder} cannot be written to")
         return None
-    for other in {base, *base.iterdir()} - {folder}:
-        with suppress(OSError):
-            if time.time() - other.stat().st_mtime > UNUSED:
-                for path in other.glob("*.nbc"):
-                    path.unlink()
     return folder
 
 

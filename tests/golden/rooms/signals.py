@@ -12,7 +12,7 @@ import numpy as np
 
 from mckibben import Recording, signals
 from mckibben.registry import load, names
-from tests.golden.case import EXACT, Case, Tree
+from tests.golden.case import Case, Tree
 from tests.golden.models import path
 from tests.golden.running import same, stored
 
@@ -162,7 +162,6 @@ def treated(folder: Path) -> Tree:
         "coarsened": traces(signals.coarsened(run, 7, "pressure")),
         "first": traces(first),
         "rest": traces(rest),
-        "branches": [[len(b), b.start_time] for b in signals.branches_of(run, "pressure")],
         "blocks of cycles": [list(block) for block in signals.split_cycles(run, "pressure", 4)],
         "made manageable": [traces(part) for part in (*thinned, *tested)],
         "for drawing": [
@@ -185,5 +184,5 @@ def cases() -> Iterator[Case]:
         "signals/treated",
         "cut, resample, low_pass, detrend, coarsened, ...",
         treated,
-        {"branches/*": EXACT, "*": FILTERED},
+        {"*": FILTERED},
     )

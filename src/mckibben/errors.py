@@ -136,7 +136,7 @@ def rendered(
 
 def _short(given: object, most: int = 1000) -> str:
     """Return a long text with its middle left out."""
-    text = str(given)  # whatever was given for a name
+    text = str(given)
     half = most // 2
     return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
 

@@ -92,7 +92,7 @@ def parsed(option: Option, text: str, name: str) -> Any:
         ) from None
 
 
-# What options make of a text; a ValueError says that it is of another form.
+# Parsers of options. A ValueError is raised for a text of another form.
 
 
 def pair(text: str) -> tuple[str, str]:

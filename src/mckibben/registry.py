@@ -1,6 +1,6 @@
 """Registry of plug-ins, one line each: group, name, and location.
 
-A plug-in is imported when it is first asked for, never before. Packages outside this one join by
+A plug-in is imported at its first use. Other packages add plug-ins by
 entry points in the groups ``mckibben.blocks``, ``mckibben.estimators`` and so on.
 """
 

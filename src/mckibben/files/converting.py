@@ -43,7 +43,7 @@ class Signal:
 class Times:
     """Times in their original unit, with the recorded digits.
 
-    The unit is ``certain`` where it was asked for or is not the second.
+    The unit is ``certain`` where it was requested or is not the second.
     """
 
     values: Array

@@ -249,5 +249,5 @@ def _split(table: Table, stamp: str | None) -> tuple[list[Column], list[Column]]
 def _named(column: Column, name: str) -> Column:
     """Return a column named after its file if that is a channel, or else after its header."""
     if is_standard(column.header) and not is_standard(name):
-        return replace(column, header=name, says=column.header)
+        return replace(column, header=name, alias=column.header)
     return replace(column, header=name, unit=column.unit or parse(column.header).unit)

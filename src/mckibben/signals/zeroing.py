@@ -43,7 +43,9 @@ def rest(recording: Recording, channel: str, over: str) -> float | None:
     others = [
         name
         for name in recording.channels
-        if _quantity(name) in quantities and name not in (over, channel) and moves(recording[name])
+        if _quantity(name) in quantities
+        and name not in (over, channel)
+        and moves([recording[name]])
     ]
     columns = recording.matrix([over, *others])
     spans = np.ptp(columns, axis=0)

@@ -32,7 +32,7 @@ from mckibben.version import __version__
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 DIGEST = sha256().digest_size
-"""Bytes before what was compiled, by which a damaged file is known."""
+"""Bytes before the compiled code, by which a damaged file is detected."""
 
 _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """No entry for C: it would hold all the code again, and nothing calls it."""
@@ -135,8 +135,8 @@ def deferred(function: Function, **options: Any) -> Function:
 def _with_digest(given: Any, digest: str) -> Callable[..., Any]:
     """Return a function with a digest of its content in its name.
 
-    Numba calls compiled code by name. Two functions of one name, as those that one function makes, would
-    be taken for each other where they come from files that two processes wrote.
+    Numba calls compiled code by name. Two functions of one name, such as those that one function makes,
+    would be mixed up if they come from files that two processes wrote.
     """
     code, known, closure = given.__code__, given.__globals__, given.__closure__
     own = FunctionType(code, known, given.__name__, given.__defaults__, closure)
@@ -162,8 +162,8 @@ def _compile_alike(compiled: Any) -> None:
 class _Cache:
     """Cache of compiled functions: a file per signature, named after a digest of the content.
 
-    So a file is never of anything else, whatever other processes write at the same time. Numba's own
-    cache shares one file among functions of one name, as of kernels that one function made.
+    So processes that write at the same time do not mix functions up. Numba's own cache shares one file
+    among functions of one name, such as kernels made by one function.
 
     ``digest`` is that of `made_of`.
     """
@@ -193,7 +193,7 @@ class _Cache:
             return result._rebuild(target_context, *pickle.loads(content[DIGEST:]))
         except (FileNotFoundError, ImportError):  # of what it calls, which was elsewhere
             return None
-        except Exception:  # whatever is wrong with it, it can be compiled again
+        except Exception:  # it is compiled again
             _note("compiled functions in the cache were damaged, and are compiled again")
             return None
 

@@ -58,7 +58,6 @@ def episode(env: Any, act: Callable[[np.ndarray, dict[str, Any]], Any], seed: in
         ({"control_time": 0.0}, "control_time"),
         ({"duration": 0.0}, "duration"),
         ({"duration": float("nan")}, "duration"),
-        ({"reference": "square"}, "'square'"),
         ({"preview": -1}, "preview"),
         ({"effort": -1.0}, "effort"),
         ({"load": 5.0}, "load"),

@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,8 +80,6 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         Time that an action is held [s]; default 0.02 s, or the rig's sample time if that is longer.
     duration : float
         Of an episode [s], at least two control steps.
-    reference : {"random-wave", "irregular-triangle", "sine"}
-        Shape of the hidden commands.
     preview : int
         Reference samples ahead that the observation shows, 0 to 1000.
     effort : float
@@ -107,7 +105,6 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         *,
         control_time: float | None = None,
         duration: float = 20.0,
-        reference: Literal["random-wave", "irregular-triangle", "sine"] = "random-wave",
         preview: int = 0,
         effort: float = 0.01,
         load: float = 0.0,
@@ -129,12 +126,6 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         _require(2 * control_time <= duration <= 1e4, "duration", duration, "2 steps to 10000 s")
         _require(preview in range(1001), "preview", preview, "a whole number from 0 to 1000")
         _require(0 <= effort < np.inf, "effort", effort, "0 or more")
-        _require(
-            reference in ("random-wave", "irregular-triangle", "sine"),
-            "reference",
-            reference,
-            "random-wave, irregular-triangle or sine",
-        )
         changes = {**(settings or {}), "sample_time": control_time}
         self._plant: Rig | Twin = chosen.changed(changes)
         outputs = self._plant.outputs
@@ -163,7 +154,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             )
         self._load = load
         self._steps = round(duration / control_time)
-        self._shape, self._preview, self._effort = reference, preview, effort
+        self._preview, self._effort = preview, effort
         n = len(self._commands)
         n_seen = len(self._moves) * (2 + preview) + len(self._bars) + n
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (n,), np.float32)
@@ -228,7 +219,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
 
     def _hidden_run(self) -> Array:
         """Return a rig's response to random commands [mm], shape (samples, displacements)."""
-        from mckibben.signals import irregular_triangle, random_wave, sine
+        from mckibben.signals import random_wave
 
         n = len(self._wanted)
         time = np.arange(max(n, 2)) * self._plant.sample_time
@@ -237,13 +228,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             bottom, top = np.sort(self.np_random.uniform(0.0, 1.0, 2))
             bottom, top = 0.3 * bottom, 0.6 + 0.35 * top
             seed = int(self.np_random.integers(2**31))
-            if self._shape == "random-wave":
-                share = random_wave(time, FASTEST, top, bottom, SLOWEST, seed=seed)
-            elif self._shape == "sine":
-                share = sine(time, 1 / self.np_random.uniform(SLOWEST, FASTEST), top, bottom)
-            else:
-                turns = max(int(time[-1] * FASTEST), 1)
-                share = irregular_triangle(time, turns, top, bottom, seed=seed)
+            share = random_wave(time, FASTEST, top, bottom, SLOWEST, seed=seed)
             waves[name] = low + (high - low) * share
         return self._ideal(waves)[:n]
 

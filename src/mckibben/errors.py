@@ -145,10 +145,6 @@ class DataError(MckibbenError):
     """A recording, or a file with one, that cannot be used as it is."""
 
 
-class TooLargeError(DataError):
-    """A file that exceeds the size limit."""
-
-
 class ModelError(MckibbenError):
     """A model, or a file with one, that cannot do what is requested."""
 

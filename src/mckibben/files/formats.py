@@ -11,7 +11,7 @@ from types import ModuleType
 
 from pydantic import ValidationError
 
-from mckibben.errors import DataError, MckibbenError, TooLargeError
+from mckibben.errors import DataError, MckibbenError
 from mckibben.files.table import Table, distinct, printable
 from mckibben.system.ordinary import opened
 
@@ -102,7 +102,7 @@ def refusing(path: Path) -> Iterator[None]:
         raise
     except MemoryError:
         problem, remedy = "it needs more memory than there is", "split it into shorter recordings"
-        raise TooLargeError(problem, file=path, remedy=remedy) from None
+        raise DataError(problem, file=path, remedy=remedy) from None
     except Exception as error:
         problem = f"it is damaged, or not {path.suffix[1:] or 'a bag'} ({reason(error)})"
         remedy = "export it again from its source"

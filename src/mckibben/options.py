@@ -145,14 +145,6 @@ def span(text: str) -> tuple[float, float]:
     return float(start or "-inf"), float(end or "inf")
 
 
-def size(text: str) -> float:
-    """Return a size such as ``2GB``, ``500 MB`` or ``1e9`` in bytes."""
-    found = re.fullmatch(r"\s*([\d.]+(?:[eE]\d+)?)\s*([kMGT]?)i?B?\s*", text, re.IGNORECASE)
-    if found is None or not float(found[1]) > 0:
-        raise ValueError
-    return float(found[1]) * 1024.0 ** " KMGT".index(found[2].upper() or " ")
-
-
 def limits(text: str) -> tuple[str, tuple[float | None, ...]]:
     """Return channel and limits of ``CHANNEL=LOW:HIGH[:RATE]``, None where left out.
 
@@ -191,10 +183,6 @@ Fields = Annotated[
     Option("Field of the model that is not identified, as frequency=1.5; repeatable.",
            "NAME=VALUE", "--set", setting),
 ]  # fmt: skip
-
-
-MOST = 2.0 * 1024**3
-"""Largest file that is read by default [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -239,7 +227,6 @@ class ReadOptions:
             calibration,
         ),
     ] = field(default_factory=dict)
-    most: Annotated[float, Option("Largest file read, as 2GB.", "SIZE", parse=size)] = MOST
     rate: Annotated[float | None, Option("Samples per second, without a time column.", "HZ")] = None
     gaps: Annotated[
         Literal["error", "split", "interpolate"],
@@ -284,7 +271,6 @@ class ReadOptions:
             "gaps": self.gaps,
             "raw": self.raw,
             "rest_length": self.rest_length,
-            "most": self.most,
             "header": self.header,
             "skip": self.skip,
             "encoding": self.encoding,

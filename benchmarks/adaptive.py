@@ -27,7 +27,6 @@ from mckibben.measured.sets import sets_in
 from mckibben.registry import load
 from mckibben.rigs import load_rig
 from mckibben.rigs.drifting import Drifting
-from mckibben.signals import decaying_triangle
 
 Array = NDArray[np.float64]
 

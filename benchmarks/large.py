@@ -82,7 +82,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         if given.only != "many":
-            long = folder / "long.parquet"
+            long = folder / "long.csv"
             write(recording(given.samples, 0.001, 0), long)
             print(f"one recording of {given.samples} samples, {long.stat().st_size / 1e6:.0f} MB")
             measured("compare --models pi,gpi", "compare", long, "--models", ",".join(FEW))

@@ -29,7 +29,9 @@ from mckibben.reading import read_files
 from mckibben.recording import Recording
 from mckibben.rigs import load_rig
 from mckibben.signals import random_wave
-from mckibben.vector_environment import JointTracking
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+from joint_environment import JointTracking
 
 COPIES, CONTROL_STEPS = 256, 100
 LIMITS = BalanceEstimator.targets["mjcf"]

@@ -15,7 +15,7 @@ import time
 
 import numpy as np
 
-from mckibben.vector_environment import JointTracking
+from joint_environment import JointTracking
 
 COPIES, ROUNDS, ELITE = 128, 30, 16
 """Candidates per round, rounds, and best candidates that define the next distribution."""

@@ -118,10 +118,3 @@ def test_cross_validation_takes_recordings_and_frames() -> None:
     frames = cross_val_score(PIEstimator(n_operators=3), [one.to_frame() for one in runs], cv=3)
     assert scores.shape == (3,)
     assert np.allclose(scores, frames)
-
-
-def test_xarray_has_times_and_units() -> None:
-    pytest.importorskip("xarray")
-    found = run(start_time=1.0).to_xarray()
-    assert found["pressure"].attrs["units"] == "bar"
-    assert np.array_equal(found["time"], run(start_time=1.0).time)

@@ -1,13 +1,11 @@
 """The naive twin of every kernel: plain Python loops, straight from the formulas.
 
 A twin takes a block, rows of inputs and the sample time, and returns rows of outputs from the
-block's own start. Twins of inverses know nothing of how kernels invert: they search by bisection,
-one sample after another, for the input that makes the forward formula give the reference.
+block's own start. Inverses have none: a law of every block is that its inverse is exact.
 """
 
 from __future__ import annotations
 
-import copy
 import itertools
 import math
 from collections.abc import Callable, Iterator
@@ -74,37 +72,12 @@ def _power_sum(block: Any, u: float) -> float:
     return math.fsum(c * x**power for power, c in enumerate(block.polynomial))
 
 
-def polynomial_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    forward = block.forward
-    low, high = forward.input_range
-    return _rows([bisect(lambda u: _power_sum(forward, u), y, low, high) for y in _column(inputs)])
-
-
 def stepping(model: Callable[[Any, float, float], Any]) -> Twin:
     """Return the twin of a model that goes from input to input, made from its first and the step."""
 
     def twin(block: Any, inputs: Rows, sample_time: float) -> Rows:
         own = model(block, inputs[0][0], sample_time)
         return _rows([float(own.go(u)) for u in _column(inputs)])
-
-    return twin
-
-
-def solved(model: Callable[[Any, float, float], Any]) -> Twin:
-    """Return the twin of an inverse: bisection on what the next output of a model would be."""
-
-    def twin(block: Any, inputs: Rows, sample_time: float) -> Rows:
-        forward = block.forward
-        low, high = getattr(forward, "input_range", None) or (-1e3, 1e3)
-        first = bisect(
-            lambda u: float(model(forward, u, sample_time).go(u)), inputs[0][0], low, high
-        )
-        own = model(forward, first, sample_time)
-        outputs = []
-        for y in _column(inputs):
-            outputs.append(bisect(lambda u: float(copy.copy(own).go(u)), y, low, high))
-            own.go(outputs[-1])
-        return _rows(outputs)
 
     return twin
 
@@ -189,36 +162,6 @@ def gpi(block: Any, inputs: Rows, sample_time: float) -> Rows:
                 states[i] = min(_envelope(block.falling, u) + r, states[i])
         previous = u
         outputs.append(_sum(block.weights, states))
-    return _rows(outputs)
-
-
-def gpi_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    forward = block.forward
-    thresholds, weights = forward.thresholds, forward.weights
-    low, high = forward.input_range
-
-    def risen(u: float) -> list[float]:
-        edge = _envelope(forward.rising, u)
-        return [max(edge - r, s) for s, r in zip(states, thresholds, strict=True)]
-
-    def fallen(u: float) -> list[float]:
-        edge = _envelope(forward.falling, u)
-        return [min(edge + r, s) for s, r in zip(states, thresholds, strict=True)]
-
-    previous = inputs[0][0]
-    states = [-math.inf] * len(thresholds)
-    u = bisect(lambda v: _sum(weights, risen(v)), previous, low, high)
-    states = risen(u)
-    outputs = []
-    for y in _column(inputs):
-        if y > previous:
-            u = bisect(lambda v: _sum(weights, risen(v)), y, low, high)
-            states = risen(u)
-        elif y < previous:
-            u = bisect(lambda v: _sum(weights, fallen(v)), y, low, high)
-            states = fallen(u)
-        previous = y
-        outputs.append(u)
     return _rows(outputs)
 
 
@@ -346,13 +289,10 @@ STEPS = 200
 
 STEPPED = {
     "bouc-wen": 1000,
-    "bouc-wen-inverse": 10,
-    "duhem-inverse": 10,
     "generalized-bouc-wen": 1000,
-    "generalized-bouc-wen-inverse": 30,
     "multistate-friction": 1000,
 }
-"""Kinds whose twin steps through corners or bisects over steps, and how many samples to compare."""
+"""Kinds whose twin steps through corners, and how many samples to compare."""
 
 STEP_ERROR = 1e-5
 """Of those twins, relative to the output's range."""
@@ -616,38 +556,11 @@ def air(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return _rows(pressures[: len(inputs)])
 
 
-def air_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    forward = block.forward
-    low, high = forward.input_range
-    x = _air_at_rest(forward, bisect(partial(_air_at_rest, forward), inputs[0][0], low, high))
-    outputs = []
-    for y in _column(inputs):
-        if abs(y - x) < 1e-12:  # held in the middle of the commands that do
-            u = x / forward.gain + forward.offset
-        else:
-            u = bisect(partial(_air_moved, forward, sample_time, x), y, low, high)
-            x = _air_moved(forward, sample_time, x, u)
-        outputs.append(u)
-    return _rows(outputs)
-
-
 # -- maps, and forces ------------------------------------------------------------------------
 
 
 def _acting(u: float, c: float) -> float:
     return math.copysign(abs(u) - 0.95 * c * (1 - math.e ** (-abs(u) / c)), u)
-
-
-def contact_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    from scipy.optimize import brentq
-
-    c = block.forward.pressure
-    return _rows(
-        [
-            brentq(lambda u, y=y: _acting(u, c) - y, min(y, 0.0) - c, max(y, 0.0) + c, xtol=1e-15)
-            for y in _column(inputs)
-        ]
-    )
 
 
 def _braid_pressure(block: Any, displacement: float) -> float:
@@ -799,32 +712,6 @@ def fuzzy_network(block: Any, inputs: Rows, sample_time: float) -> Rows:
                 own = block.consequents[at : at + width]
                 answers[j] += firing * sum(a * b for a, b in zip(own, values, strict=True))
         out.append([answer / total for answer in answers])
-    return out
-
-
-def _rooted(
-    formula: Callable[[list[float], list[float]], list[float]], start: list[float], row: list[float]
-) -> list[float]:
-    """Return where a formula of driven and scheduling values gives the first values of a row."""
-    from scipy.optimize import root
-
-    n = len(start)
-
-    def missed(x: Any) -> list[float]:
-        return [a - b for a, b in zip(formula(list(x), row[n:]), row[:n], strict=True)]
-
-    found = root(missed, start, tol=1e-14)
-    return [float(value) for value in found.x]
-
-
-def fuzzy_network_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    def formula(x: list[float], rest: list[float]) -> list[float]:
-        return fuzzy_network(block.forward, [[*x, *rest]], sample_time)[0]
-
-    last, out = [0.0] * len(block.outputs), []
-    for row in inputs:
-        last = _rooted(formula, last, row)
-        out.append(last)
     return out
 
 
@@ -1186,57 +1073,41 @@ TWINS: dict[str, Twin] = {
     "activation-pressure": activation_pressure,
     "affine": memoryless(lambda block, u: block.gain * u + block.offset),
     "air": air,
-    "air-inverse": air_inverse,
     "balance": balance,
     "balance-inverse": balance_inverse,
     "bouc-wen": stepping(_BoucWen),
-    "bouc-wen-inverse": solved(_BoucWen),
     "bouc-wen-oscillator": _oscillator(_bouc_wen_slope),
     "braid-equilibrium": braid_equilibrium,
-    "braid-equilibrium-inverse": memoryless(lambda block, x: _braid_pressure(block.forward, x)),
     "chou-hannaford": memoryless(_chou_hannaford),
     "coupled-memory": coupled_memory,
     "coupling": coupling,
     "fuzzy-network": fuzzy_network,
-    "fuzzy-network-inverse": fuzzy_network_inverse,
     "creep": stepping(_Creep),
-    "creep-inverse": solved(_Creep),
     "duhem": stepping(_Duhem),
-    "duhem-inverse": solved(_Duhem),
     "duhem-oscillator": _oscillator(_duhem_slope),
     "eupi": stepping(_EUPI),
-    "eupi-inverse": solved(_EUPI),
     "exponential": memoryless(lambda block, u: math.exp(u) - block.offset),
     "generalized-bouc-wen": stepping(_GeneralizedBoucWen),
-    "generalized-bouc-wen-inverse": solved(_GeneralizedBoucWen),
     "gpi": gpi,
-    "gpi-inverse": gpi_inverse,
     "krasnoselskii-pokrovskii": stepping(_Ramps),
-    "krasnoselskii-pokrovskii-inverse": solved(_Ramps),
     "load-estimate": load_estimate,
     "contact": memoryless(lambda block, u: _acting(u, block.pressure)),
-    "contact-inverse": contact_inverse,
     "logarithm": memoryless(lambda block, u: math.log(u + block.offset)),
     "maxwell-slip": stepping(_Springs),
-    "maxwell-slip-inverse": solved(_Springs),
     "multistate-friction": multistate_friction,
     "narx-network": narx_network,
     "narx-polynomial": narx_polynomial,
     "negative": memoryless(lambda block, u: -u),
     "pi": stepping(_PI),
     "pid": pid,
-    "pi-inverse": solved(_PI),
     "piecewise-linear": memoryless(_piecewise_linear),
     "play": stepping(_Play),
     "polynomial": memoryless(_power_sum),
     "polynomial-force": memoryless(_polynomial_force),
-    "polynomial-inverse": polynomial_inverse,
     "preisach": stepping(_Relays),
-    "preisach-inverse": solved(_Relays),
     "process-model": process_model,
     "prompt": prompt,
     "rate-dependent-pi": stepping(_RateDependentPI),
-    "rate-dependent-pi-inverse": solved(_RateDependentPI),
     "state-network": state_network,
     "tondu-lopez": memoryless(_tondu_lopez),
     "recurrent-fuzzy-network": recurrent_fuzzy_network,

@@ -21,15 +21,15 @@ class Use(NamedTuple):
 USES = {
     "recordings": Use(
         "Recordings and files",
-        "mckibben: Recording read write; mckibben.files: columns_of has_columns",
+        "mckibben: Recording read write; mckibben.files: columns_of",
     ),
     "signals": Use(
         "Signals: excitations, cycles, filters",
         "mckibben.signals: triangle decaying_triangle progressive_triangle irregular_triangle sine "
-        "decaying_sine progressive_sine chirp multisine random_wave random_steps binary_steps "
+        "decaying_sine progressive_sine chirp multisine random_wave binary_steps "
         "staircase ramps constant pulls build settings_of cut resample decimate_minmax coarsened "
-        "made_manageable detrend low_pass zeroed noise_level reversals branches branches_of cycles "
-        "split_cycles split_time",
+        "made_manageable detrend low_pass zeroed noise_level reversals branches cycles "
+        "split_cycles",
     ),
     "describe": Use(
         "Describe a muscle",
@@ -56,13 +56,13 @@ USES = {
         "mckibben: invert track; mckibben.studying.results: Inverse Tracking; "
         "mckibben.control: track Tracked control_law Controller BlockController tune_pid "
         "DisturbanceObserver EstimatedLoad Twin dead_time_undone previewed before Before slow_rise "
-        "uncompensated; mckibben.stream: run FixedRate Deadlines UDPLink Step",
+        "uncompensated; mckibben.stream: run FixedRate Deadlines Step",
     ),
     "rigs": Use(
         "Virtual rigs and environments",
         "mckibben: Rig load_rig; "
         "mckibben.rigs: rig_names describe save_rig record; "
-        "mckibben.environments: Tracking; mckibben.vector_environment: JointTracking",
+        "mckibben.environments: Tracking",
     ),
     "muscles": Use(
         "Muscle library",

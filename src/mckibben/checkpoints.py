@@ -1,7 +1,7 @@
 """Checkpoints: finished parts of long work, stored with its results, for resuming it.
 
 Each is a JSON file under a digest of all that it depends on: the data, settings, seed, and the program
-itself. What is under another digest is not used.
+itself. A part under another digest is not used.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Checkpoints:
             return None
         try:
             return _from_json(kind, json.loads(ordinary.read_text(path, most=LARGEST_FILE)))
-        except Exception as error:  # whatever is wrong with it, it can be computed again
+        except Exception as error:  # a damaged part is computed again
             _warn(path, error)
             return None
 

@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,9 +51,6 @@ reversals.
 FARTHEST = 5.0
 """Bound to which observations are clipped, well outside their usual range."""
 
-SPREAD_PARAMETERS = ("muscle.c10", "muscle.friction.contracting", "muscle.friction.extending")
-"""Parameters that ``spread`` varies between episodes."""
-
 
 class Tracking(gymnasium.Env[Vector, Vector]):
     """Track a reference with the displacement of a rig or a model.
@@ -83,23 +80,17 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         Time that an action is held [s]; default 0.02 s, or the rig's sample time if that is longer.
     duration : float
         Of an episode [s], at least two control steps.
-    reference : {"random-wave", "irregular-triangle", "sine"}
-        Shape of the hidden commands.
     preview : int
         Reference samples ahead that the observation shows, 0 to 1000.
     effort : float
         Weight of changes of action, not negative.
     load : float
         Constant force that pulls where the rig has such an input [N].
-    spread : float
-        Relative spread of bladder stiffness and friction from episode to episode, 0 to 0.5.
     settings : mapping, optional
         Parameters of the rig to change, as `mckibben.Rig.changed` takes them.
-    render_mode : {None, "rgb_array"}
-        With the second, `render` draws the episode so far.
     plant : Twin, Block or path, optional
         A fitted model instead of a rig: itself, its file, or a `mckibben.control.Twin`, which holds
-        inputs other than pressures. ``spread`` applies to rigs alone, and ``settings`` are those of
+        inputs other than pressures. ``settings`` are those of
         `Twin.changed`.
 
     Raises
@@ -108,34 +99,26 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         On options outside these ranges, or a rig without displacement.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012  # as Gymnasium has it
-
     def __init__(
         self,
         rig: str | Path | Rig = "mas20-hanging",
         *,
         control_time: float | None = None,
         duration: float = 20.0,
-        reference: Literal["random-wave", "irregular-triangle", "sine"] = "random-wave",
         preview: int = 0,
         effort: float = 0.01,
         load: float = 0.0,
-        spread: float = 0.0,
         settings: Mapping[str, Any] | None = None,
-        render_mode: str | None = None,
         plant: Twin | Block | str | Path | None = None,
     ) -> None:
         from mckibben.rigs import load_rig
 
         chosen: Rig | Twin
-        self._spreading: Rig | None = None
         if plant is None:
             chosen = load_rig(rig) if isinstance(rig, str | Path) else rig
             if control_time is None:
                 control_time = max(0.02, chosen.sample_time)
-            self._spreading = chosen if spread else None
         else:
-            _require(not spread, "spread", spread, "0 with a plant")
             _require(not load, "load", load, "0 with a plant, and held={'force': ...} to the plant")
             chosen = plant = _twin(plant)
             control_time = chosen.sample_time if control_time is None else control_time
@@ -143,20 +126,8 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         _require(2 * control_time <= duration <= 1e4, "duration", duration, "2 steps to 10000 s")
         _require(preview in range(1001), "preview", preview, "a whole number from 0 to 1000")
         _require(0 <= effort < np.inf, "effort", effort, "0 or more")
-        _require(0 <= spread <= 0.5, "spread", spread, "0 to 0.5")
-        _require(
-            reference in ("random-wave", "irregular-triangle", "sine"),
-            "reference",
-            reference,
-            "random-wave, irregular-triangle or sine",
-        )
-        _require(
-            render_mode in (None, "rgb_array"), "render_mode", render_mode, "rgb_array or none"
-        )
         changes = {**(settings or {}), "sample_time": control_time}
         self._plant: Rig | Twin = chosen.changed(changes)
-        if self._spreading is not None:
-            self._spreading = self._spreading.changed(changes)
         outputs = self._plant.outputs
         self._moves = [i for i, name in enumerate(outputs) if name.startswith("displacement")]
         self._bars = [i for i, name in enumerate(outputs) if name.startswith("pressure")]
@@ -183,8 +154,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             )
         self._load = load
         self._steps = round(duration / control_time)
-        self._shape, self._preview, self._effort, self._spread = reference, preview, effort, spread
-        self.render_mode = render_mode
+        self._preview, self._effort = preview, effort
         n = len(self._commands)
         n_seen = len(self._moves) * (2 + preview) + len(self._bars) + n
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (n,), np.float32)
@@ -202,12 +172,11 @@ class Tracking(gymnasium.Env[Vector, Vector]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Vector, dict[str, Any]]:
-        """Start an episode: a new reference, a rig at rest, and, with ``spread``, a varied muscle."""
+        """Start an episode: a new reference, and a plant at rest."""
         super().reset(seed=seed)
         del options
-        self._now = self._varied()
-        self._wanted = self._hidden_run(self._now)
-        measured = self._now.reset(seed=int(self.np_random.integers(2**31)))
+        self._wanted = self._hidden_run()
+        measured = self._plant.reset(seed=int(self.np_random.integers(2**31)))
         self._action = np.zeros(len(self._commands))
         self._applied = self._low.copy()
         self._done = [measured]
@@ -220,7 +189,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         commands = dict(zip(self._commands, self._applied.tolist(), strict=True))
         if self._load:
             commands["force"] = self._load
-        measured = self._now.step(commands)
+        measured = self._plant.step(commands)
         self._done.append(measured)
         change, self._action = wish - self._action, wish
         info = self._info(measured)
@@ -228,24 +197,6 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         reward -= self._effort * float(np.mean(change**2))
         truncated = len(self._done) > self._steps
         return self._observation(measured), reward, False, truncated, info
-
-    def render(self) -> Any:
-        """Return a picture of the episode so far, shape (height, width, 3), or None."""
-        if self.render_mode is None:
-            return None
-        demand("matplotlib", "figures", "pictures of episodes")
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(6, 3), dpi=100, layout="constrained")
-        canvas: Any = FigureCanvasAgg(figure)
-        axes = figure.subplots()
-        time = np.arange(self._steps + 1) * self._plant.sample_time
-        axes.plot(time, self._wanted[: self._steps + 1], "k", lw=0.8)
-        axes.plot(time[: len(self._done)], np.array(self._done)[:, self._moves])
-        axes.set(xlabel="time [s]", ylabel="displacement [mm]", title=self._plant.name)
-        canvas.draw()
-        return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
 
     def _observation(self, measured: Array) -> Vector:
         k = len(self._done) - 1
@@ -266,44 +217,20 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             "pressure": measured[self._bars] if self._bars else self._applied.copy(),
         }
 
-    def _varied(self) -> Rig | Twin:
-        rig = self._spreading
-        if rig is None:
-            return self._plant
-        fields = rig.model_dump()
-        settings: dict[str, Any] = {}
-        for path in SPREAD_PARAMETERS:
-            value: Any = fields
-            for part in path.split("."):
-                value = value[part]
-            factor = float(np.exp(self._spread * self.np_random.standard_normal()))
-            settings[path] = (
-                [factor * each for each in value]
-                if isinstance(value, list | tuple)
-                else factor * value
-            )
-        return rig.changed(settings)
-
-    def _hidden_run(self, plant: Rig | Twin) -> Array:
+    def _hidden_run(self) -> Array:
         """Return a rig's response to random commands [mm], shape (samples, displacements)."""
-        from mckibben.signals import irregular_triangle, random_wave, sine
+        from mckibben.signals import random_wave
 
         n = len(self._wanted)
-        time = np.arange(max(n, 2)) * plant.sample_time
+        time = np.arange(max(n, 2)) * self._plant.sample_time
         waves = {}
         for name, low, high in zip(self._commands, self._low, self._high, strict=True):
             bottom, top = np.sort(self.np_random.uniform(0.0, 1.0, 2))
             bottom, top = 0.3 * bottom, 0.6 + 0.35 * top
             seed = int(self.np_random.integers(2**31))
-            if self._shape == "random-wave":
-                share = random_wave(time, FASTEST, top, bottom, SLOWEST, seed=seed)
-            elif self._shape == "sine":
-                share = sine(time, 1 / self.np_random.uniform(SLOWEST, FASTEST), top, bottom)
-            else:
-                turns = max(int(time[-1] * FASTEST), 1)
-                share = irregular_triangle(time, turns, top, bottom, seed=seed)
+            share = random_wave(time, FASTEST, top, bottom, SLOWEST, seed=seed)
             waves[name] = low + (high - low) * share
-        return self._ideal(plant, waves)[:n]
+        return self._ideal(waves)[:n]
 
     def _measured_stroke(self) -> float:
         """Return the largest range of displacement when all commands rise slowly together [mm]."""
@@ -314,9 +241,9 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             for name, low, high in zip(self._commands, self._low, self._high, strict=True)
             if name != "pressure_extensor"
         }
-        return float(np.ptp(self._ideal(self._plant, waves), axis=0).max())
+        return float(np.ptp(self._ideal(waves), axis=0).max())
 
-    def _ideal(self, plant: Rig | Twin, waves: Mapping[str, Array]) -> Array:
+    def _ideal(self, waves: Mapping[str, Array]) -> Array:
         from mckibben.recording import Recording
         from mckibben.rigs import Rig
 
@@ -324,9 +251,13 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         if self._load:
             n = len(next(iter(waves.values())))
             channels["force"] = np.full(n, self._load)
-        given: Recording = Recording(channels, plant.sample_time)
-        ran = plant.run(given, ideal=True) if isinstance(plant, Rig) else plant.run(given)
-        return ran.matrix([plant.outputs[i] for i in self._moves])
+        given: Recording = Recording(channels, self._plant.sample_time)
+        ran = (
+            self._plant.run(given, ideal=True)
+            if isinstance(self._plant, Rig)
+            else self._plant.run(given)
+        )
+        return ran.matrix([self._plant.outputs[i] for i in self._moves])
 
 
 def register() -> None:

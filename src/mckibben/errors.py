@@ -136,17 +136,13 @@ def rendered(
 
 def _short(given: object, most: int = 1000) -> str:
     """Return a long text with its middle left out."""
-    text = str(given)  # whatever was given for a name
+    text = str(given)
     half = most // 2
     return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
 
 
 class DataError(MckibbenError):
     """A recording, or a file with one, that cannot be used as it is."""
-
-
-class TooLargeError(DataError):
-    """A file that exceeds the size limit."""
 
 
 class ModelError(MckibbenError):

@@ -93,7 +93,7 @@ def parsed(option: Option, text: str, name: str) -> Any:
         ) from None
 
 
-# What options make of a text; a ValueError says that it is of another form.
+# Parsers of options. A ValueError is raised for a text of another form.
 
 
 def pair(text: str) -> tuple[str, str]:
@@ -148,14 +148,6 @@ def span(text: str) -> tuple[float, float]:
     return float(start or "-inf"), float(end or "inf")
 
 
-def size(text: str) -> float:
-    """Return a size such as ``2GB``, ``500 MB`` or ``1e9`` in bytes."""
-    found = re.fullmatch(r"\s*([\d.]+(?:[eE]\d+)?)\s*([kMGT]?)i?B?\s*", text, re.IGNORECASE)
-    if found is None or not float(found[1]) > 0:
-        raise ValueError
-    return float(found[1]) * 1024.0 ** " KMGT".index(found[2].upper() or " ")
-
-
 def limits(text: str) -> tuple[str, tuple[float | None, ...]]:
     """Return channel and limits of ``CHANNEL=LOW:HIGH[:RATE]``, None where left out.
 
@@ -194,10 +186,6 @@ Fields = Annotated[
     Option("Field of the model that is not identified, as frequency=1.5; repeatable.",
            "NAME=VALUE", "--set", setting),
 ]  # fmt: skip
-
-
-MOST = 2.0 * 1024**3
-"""Largest file that is read by default [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -242,7 +230,6 @@ class ReadOptions:
             calibration,
         ),
     ] = field(default_factory=dict)
-    most: Annotated[float, Option("Largest file read, as 2GB.", "SIZE", parse=size)] = MOST
     rate: Annotated[float | None, Option("Samples per second, without a time column.", "HZ")] = None
     gaps: Annotated[
         Literal["error", "split", "interpolate"],
@@ -287,7 +274,6 @@ class ReadOptions:
             "gaps": self.gaps,
             "raw": self.raw,
             "rest_length": self.rest_length,
-            "most": self.most,
             "header": self.header,
             "skip": self.skip,
             "encoding": self.encoding,
@@ -334,7 +320,6 @@ class CompareOptions:
     settings: Settings = field(default_factory=dict)
     seed: Seed = 0
     jobs: Jobs = None
-    dask: Annotated[str | None, Option("Dask scheduler to fit on.", "ADDRESS")] = None
     most_samples: Annotated[
         int | None,
         Option("Most samples to fit to: longer recordings are thinned.", "N", "--samples"),
@@ -342,9 +327,6 @@ class CompareOptions:
     allow_shared: Annotated[
         bool, Option("Allow test data that were fitted; every result states it.")
     ] = False
-    allow_early: Annotated[bool, Option("Compare even if the output moves before its input.")] = (
-        False
-    )
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,7 @@
 """Output files of a run: replaced together when complete, and never overwriting the user's.
 
 In a folder of results, ``run.json`` lists the files of the last complete run with their digests. A run
-writes into ``unfinished/new``. When it is complete, it writes a journal of what goes where, and renames
-the files, ``run.json`` last. Whoever finds a journal finishes what is in it, so that a folder holds one
-run wholly, whenever a process is killed.
+writes into ``unfinished/new``, and moves the files to their places when it is complete.
 """
 
 from __future__ import annotations
@@ -27,9 +25,6 @@ RUN = "run.json"
 
 UNFINISHED = "unfinished"
 """Folder, in a folder of results, with the files and checkpoints of an incomplete run."""
-
-JOURNAL = "journal.json"
-"""File in that folder that lists the moves of a complete run until all are done."""
 
 FORMAT = "mckibben-run"
 
@@ -116,10 +111,10 @@ def marked(text: bytes) -> bytes:
 def claim_recording(
     path: str | Path, *, inputs: Iterable[str | Path] = (), force: bool = False
 ) -> None:
-    """Raise an error for an output recording likewise, or of an unknown format."""
-    from mckibben.files.formats import writer
+    """Raise an error for an output recording likewise, or if it is no CSV."""
+    from mckibben.files.own import require_csv
 
-    writer(Path(path))
+    require_csv(Path(path))
     claim(path, inputs=inputs, force=force)
 
 
@@ -174,7 +169,6 @@ class Results:
         self._inputs, self._force, self._kind = list(inputs), force, kind
         self._digests: dict[str, str] = {}
         _inside(folder, f"{UNFINISHED}/new/{RUN}")
-        _finish(folder)
         with written(self.new):
             if self.new.exists():  # of a run that was stopped
                 shutil.rmtree(self.new)
@@ -218,22 +212,29 @@ class Results:
             If a file in their places was changed while the run went.
         """
         self.claim(self._digests)
-        earlier = _listed(self.folder).items()
-        removed = {n: old for n, old in earlier if n not in self._digests and self._removable(n)}
+        for name, old in _listed(self.folder).items():
+            if name not in self._digests and self._removable(name, old):
+                path = self.folder / name
+                with written(path):
+                    path.unlink()
+                with suppress(OSError):  # not empty
+                    path.parent.rmdir()
         run = {"format": FORMAT, "version": 1, "kind": self._kind, "files": self._digests}
         write_json(self.new / RUN, run)
-        journal = {"files": [*self._digests, RUN], "removed": removed}
-        write_json(self.new / JOURNAL, journal)
-        with written(self.folder):
-            (self.new / JOURNAL).replace(self.folder / UNFINISHED / JOURNAL)
-        _finish(self.folder)
+        for name in (*self._digests, RUN):
+            path = self.folder / name
+            with written(path):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                (self.new / name).replace(path)
+        _prune(self.new)
         self._digests = {}
 
-    def _removable(self, name: str) -> bool:
-        """Return whether a listed file is in the folder, and is not an input."""
+    def _removable(self, name: str, old: str) -> bool:
+        """Return whether a listed file is in the folder and unchanged, and is not an input."""
         with suppress(DataError):
-            refuse_inputs(_inside(self.folder, name), self._inputs)
-            return True
+            path = _inside(self.folder, name)
+            refuse_inputs(path, self._inputs)
+            return _holds(path, old)
         return False
 
 
@@ -273,7 +274,7 @@ def results_in(
     place, new = folder / UNFINISHED, unfinished(folder)
     lock, existed = place / "lock", folder.exists()
     with written(folder):
-        if new.exists() and not lock.exists():  # which stays as long as there is a run to finish
+        if new.exists() and not lock.exists():
             problem = "it blocks unfinished results, and was not written by mckibben"
             raise DataError(problem, file=new, remedy="move it away, or give another folder")
         place.mkdir(parents=True, exist_ok=True)
@@ -296,35 +297,6 @@ def results_in(
         for empty in (place, folder) if not existed else (place,):
             with suppress(OSError):  # not empty
                 empty.rmdir()
-
-
-def _finish(folder: Path) -> None:
-    """Complete the moves of a journal, if its process was killed."""
-    place, new = folder / UNFINISHED / JOURNAL, unfinished(folder)
-    if not os.path.lexists(place):
-        return
-    try:
-        journal = json.loads(ordinary.read_text(place, most=ordinary.DESCRIPTION))
-        files, removed = list(journal["files"]), dict(journal["removed"])
-    except (ValueError, TypeError, KeyError):
-        remedy = "move it away, and look at the files in the folder 'new' next to it"
-        raise DataError("the journal is damaged", file=place, remedy=remedy) from None
-    for name, old in removed.items():
-        path = _inside(folder, name)
-        if _holds(path, old):
-            with written(path):
-                path.unlink()
-            with suppress(OSError):  # not empty
-                path.parent.rmdir()
-    for name in files:
-        path, source = _inside(folder, name), _inside(new, name)
-        with written(path):
-            if source.exists():
-                path.parent.mkdir(parents=True, exist_ok=True)
-                source.replace(path)
-    with written(place):
-        place.unlink()
-    _prune(new)
 
 
 def _prune(folder: Path) -> None:

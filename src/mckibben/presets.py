@@ -1,7 +1,7 @@
 """Presets: a class with some of its settings fixed, under a separate name.
 
-A published variant, or a structure, is a choice of settings and no class: ``preset(...)`` stands for it
-beside the class, and a line of the registry, or an entry point of another package, leads there.
+A published variant, or a structure, is a choice of settings and no class: ``preset(...)`` defines it
+next to the class, and a line of the registry, or an entry point of another package, names it.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def preset(of: type, about: str, **chosen: Any) -> Preset:
 class Chosen:
     """A preset with its class: calling it creates an object of the class.
 
-    What else it is asked for is the class's own; class methods see the preset for their class.
+    Other attributes are those of the class; class methods have the preset for their class.
 
     Parameters
     ----------

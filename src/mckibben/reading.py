@@ -122,7 +122,7 @@ def read_sides(
     sides = channels_of([one for some in found for one in some], inputs, outputs, load)
     needed = [*sides.inputs, *sides.outputs]
     if any(name not in one for runs in found for one in runs for name in needed):
-        return [read_files(some, needed, reading) for some in data]  # says what is wrong with it
+        return [read_files(some, needed, reading) for some in data]  # raises the error
     _warn_again(caught)
     return found
 
@@ -163,7 +163,7 @@ def read_pair(
             )
         usual = found.inputs[0], found.outputs[0]
     if not all(name in one for one in recordings for name in usual):
-        recordings = read_files(data, [*usual, *others], reading)  # says what is wrong with it
+        recordings = read_files(data, [*usual, *others], reading)  # raises the error
     else:
         _warn_again(caught)
     return recordings, *usual
@@ -188,8 +188,6 @@ class Contents:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the samples, for JSON."""
-        from mckibben.files.condition import condition
-
         files = {file: [asdict(one) for one in found] for file, found in self.columns.items()}
         recordings = [
             {
@@ -202,7 +200,6 @@ class Contents:
                         "unit": one.units[name],
                         "min": float(samples.min()),
                         "max": float(samples.max()),
-                        **condition(samples),
                     }
                     for name, samples in one.channels.items()
                 },

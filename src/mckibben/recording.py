@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array, check_finite
 from mckibben.errors import DataError
-from mckibben.system.extras import demand
 from mckibben.system.showing import DrawsItself
 
 STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
@@ -325,24 +324,6 @@ class Recording(DrawsItself):
         about = {"grid": grid, "units": dict(self.units), "meta": dict(self.meta)}
         frame.attrs["mckibben"] = about
         return frame
-
-    def to_xarray(self) -> Any:
-        """Return the channels as a dataset of xarray over time [s], with their units.
-
-        Raises
-        ------
-        DataError
-            If xarray is not installed.
-        """
-        demand("xarray", "xarray", "datasets of xarray")
-        from importlib import import_module
-
-        over = "sample" if self.sample_time is None else "time"
-        arrays = {name: (over, samples) for name, samples in self.channels.items()}
-        found = import_module("xarray").Dataset(arrays, {over: self.time}, dict(self.meta))
-        for name, unit in self.units.items():
-            found[name].attrs["units"] = unit
-        return found
 
     def with_derived(self, channels: Iterable[str]) -> Recording:
         """Return a recording with channels added that can be derived by the rest length."""

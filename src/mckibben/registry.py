@@ -1,6 +1,6 @@
 """Registry of plug-ins, one line each: group, name, and location.
 
-A plug-in is imported when it is first asked for, never before. Packages outside this one join by
+A plug-in is imported at its first use. Other packages add plug-ins by
 entry points in the groups ``mckibben.blocks``, ``mckibben.estimators`` and so on.
 """
 
@@ -169,7 +169,6 @@ PLUGINS: dict[str, dict[str, str]] = {
         "progressive-triangle": "mckibben.signals.excitations:progressive_triangle",
         "pulls": "mckibben.signals.loads:pulls",
         "ramps": "mckibben.signals.loads:ramps",
-        "random-steps": "mckibben.signals.steps:random_steps",
         "random-wave": "mckibben.signals.broadband:random_wave",
         "sine": "mckibben.signals.excitations:sine",
         "staircase": "mckibben.signals.steps:staircase",

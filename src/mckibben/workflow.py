@@ -278,13 +278,12 @@ def _compared(
     written: Callable[[Sequence[str]], Sequence[str]],
 ) -> Iterator[tuple[dict[str, Any], Results | None]]:
     """Claim the output files of a comparison, read its recordings, and return its arguments."""
-    from mckibben.comparison.backends import on_cluster
     from mckibben.estimators.catalogue import settings_of_all
     from mckibben.files.sources import expanded
     from mckibben.outputs import results_in
     from mckibben.system import workers
 
-    if chosen.jobs != 1 and chosen.dask is None:
+    if chosen.jobs != 1:
         workers.prepare()
     arguments = {one.name: getattr(chosen, one.name) for one in fields(CompareOptions)}
     whole = chosen.models in ("all", "quick")
@@ -296,10 +295,7 @@ def _compared(
     logs = [getattr(chosen, name, None) for name in ("model", "compensator")]
     read = _paths(train, *sides, logs)
     kind = "study" if isinstance(chosen, StudyOptions) else "compare"
-    with (
-        results_in(out, written(names), inputs=read, force=force, kind=kind) as results,
-        on_cluster(arguments.pop("dask")),
-    ):
+    with results_in(out, written(names), inputs=read, force=force, kind=kind) as results:
         fitted, checks, tests = read_sides(
             sides, chosen.inputs, chosen.outputs, chosen.load, reading
         )

@@ -109,7 +109,6 @@ BAD = [
     (f"{RIG} --signal pressure=sine:period=1", "'pressure'"),
     (f"{RIG} --signal sine:period=1 --set payload=-3", "payload is -3"),
     ("rig record dance --out set", "'dance'"),
-    ("rig record field-models --out set --format xls", "'xls'"),
     ("rig record field-models --out set --only zz", "'zz'"),
 ]
 

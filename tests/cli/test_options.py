@@ -144,8 +144,6 @@ def test_raw_volts_are_calibrated(cli: Cli, tmp_path: Path) -> None:
     for option in (
         "--calibrate=pressure=A0:2.5",
         "--calibrate=A0:1:2:bar",
-        "--most=1kB",
-        "--most=x",
     ):
         path.write_text("t_s,A0,x_mm\n" + 9 * rows)
         assert cli("info", path, option).code == 2

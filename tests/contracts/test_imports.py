@@ -22,7 +22,7 @@ LAYERS = (
     {"muscles"},
     {"estimators", "export", "stream", "link", "outputs", "checkpoints", "example"},
     {"control"},
-    {"environments", "vector_environment"},
+    {"environments"},
     {"comparison", "diagnosis"},
     {"planning"},
     {"options"},

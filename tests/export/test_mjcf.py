@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +25,7 @@ from mckibben.signals import random_wave
 from tests.export.muscle import MUSCLE
 
 mujoco = pytest.importorskip("mujoco", minversion="4.0")
-gymnasium = pytest.importorskip("gymnasium")
-
-from mckibben.vector_environment import JointTracking  # noqa: E402
+pytest.importorskip("gymnasium")
 
 Array = NDArray[np.floating[Any]]
 
@@ -270,7 +269,8 @@ def joint(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_environments_step_as_single_simulations_do(joint: Path) -> None:
-    env = JointTracking(joint, 3, duration=1.0, preview=2, threads=2)
+    environment = import_module("examples.joint_environment")
+    env = environment.JointTracking(joint, 3, duration=1.0, preview=2, threads=2)
     seen, _ = env.reset(seed=5)
     assert seen.shape == env.observation_space.shape == (3, 7)
     data = mujoco.MjData(env.model)
@@ -290,19 +290,3 @@ def test_environments_step_as_single_simulations_do(joint: Path) -> None:
         over, steps = bool(truncated.all()), steps + 1
     assert steps == 50
     assert abs(reference) <= 1.0
-
-
-def test_environments_repeat_by_seed_and_refuse_what_is_wrong(joint: Path) -> None:
-    def episode(seed: int) -> Array:
-        env = JointTracking(joint, 2, duration=0.2)
-        first, _ = env.reset(seed=seed)
-        rest = [env.step(np.full((2, 2), 0.3, dtype=np.float32))[0] for _ in range(5)]
-        return np.array([first, *rest])
-
-    np.testing.assert_array_equal(episode(1), episode(1))
-    assert not np.array_equal(episode(1), episode(2))
-    for given in ({"joint": "elbow"}, {"duration": 0.0}, {"preview": -1}, {"control_time": 0.0}):
-        with pytest.raises(DataError):
-            JointTracking(joint, 2, **given)
-    with pytest.raises(DataError):
-        JointTracking(joint.with_name("none.xml"), 2)

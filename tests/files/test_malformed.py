@@ -150,8 +150,8 @@ CASES: list[Case] = [
     Case("book.xls", b"\xd0\xcf\x11\xe0", names="'.xls'"),
     Case("no_ending", csv),
     # Content of another kind
-    Case("parquet.csv", parquet, names=".parquet"),
-    Case("mcap.bag", MCAP, names=".mcap"),
+    Case("parquet.csv", parquet),
+    Case("mcap.bag", MCAP),
     Case("garbage.csv", GARBAGE),
     # Text
     Case("header_only.csv", b"time_s,pressure_bar,displacement_mm\n"),

@@ -1,4 +1,4 @@
-"""Choosing columns; missing samples, their codes, wraps, outliers; units; the condition of signals."""
+"""Choosing columns; missing samples, their codes, wraps; units."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import mckibben
-from mckibben import DataError, Recording
-from mckibben.files.condition import condition, early, lag
+from mckibben import DataError
 from mckibben.registry import load
 from tests.files.made import Cells, one, place, put, refused, several
 
@@ -162,13 +161,6 @@ def test_lost_rows_do_not_change_the_sample_time(tmp_path: Path, jitter: float) 
     assert one(path, gaps="interpolate").sample_time == pytest.approx(T[1] - T[0], rel=1e-4)
 
 
-@pytest.mark.parametrize("length", [1, 3, 4])
-def test_outliers_are_noted_unless_they_last(tmp_path: Path, length: int) -> None:
-    y = changed(Y, slice(100, 100 + length), 100.5 + 0.01 * K[:length])
-    notes = one(table(tmp_path, "pressure_bar,displacement_mm", P, y)).notes
-    assert any("row 102" in note for note in notes) == (length < 4)
-
-
 def test_bridged_samples_are_not_fitted(tmp_path: Path) -> None:
     y = changed(Y, slice(150, 190), np.nan)
     path = table(tmp_path, "pressure_bar,displacement_mm", P, y)
@@ -236,30 +228,3 @@ def test_flaws_of_columns_not_asked_for_do_not_matter(tmp_path: Path) -> None:
     assert refused(path).channel in ("force", "force_2")
     asked = one(path, columns={"pressure": "pressure", "displacement": "displacement"})
     assert asked["displacement"].tolist() == Y.tolist()
-
-
-# The condition of signals ------------------------------------------------------------------------
-
-
-def test_lag_is_that_of_what_was_shifted() -> None:
-    rng = np.random.default_rng(1)
-    p = np.convolve(rng.standard_normal(900), np.hanning(60), "same")
-    for shift in (-20, -3, 0, 5, 40):
-        recording = Recording({"pressure": p, "displacement": np.roll(np.tanh(p), shift)}, 0.01)
-        assert lag(recording, "pressure", "displacement") == pytest.approx(shift, abs=1)
-        assert (early([recording], "pressure", "displacement") is None) == (shift >= 0)
-    noise = Recording({"pressure": p, "displacement": rng.standard_normal(900)}, 0.01)
-    assert lag(noise, "pressure", "displacement") is None
-
-
-def test_an_early_output_is_compared_only_where_that_is_allowed() -> None:
-    recording = Recording({"pressure": P, "displacement": np.roll(Y, -8)}, 0.02)
-    with pytest.raises(DataError) as caught:
-        mckibben.compare(recording, models=["pi"], jobs=1)
-    assert caught.value.channel == "displacement"
-    assert mckibben.compare(recording, models=["pi"], jobs=1, allow_early=True).rows
-
-
-def test_condition_counts_what_is_saturated_and_stuck() -> None:
-    assert condition(np.minimum(Y, 20.0))["saturated"] == pytest.approx(np.mean(Y >= 20), abs=0.01)
-    assert condition(changed(Y, slice(110, 170), Y[110]))["stuck"] == 60

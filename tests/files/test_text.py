@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.files.made import columns, one, place, refused, rows, several
+from tests.files.made import columns, one, place, refused, rows
 
 N = 40
 T = [k / 100 for k in range(N)]
@@ -240,61 +239,7 @@ def test_one_number_anywhere_shows_that_a_mark_is_for_decimals(
         assert (error.row, "'1.125'" in error.problem) == (2, True)
 
 
-# LabVIEW's files ------------------------------------------------------------------------------
-
-
-def labview(clocks: str, mark: str, separator: str) -> str:
-    """Return a file of LabVIEW with one segment; its first sample has a comment."""
-    named = {"\t": "Tab", ",": "Comma", ";": "Semicolon"}[separator]
-    names = ["X_Value", "pressure", *(["X_Value"] if clocks == "Multi" else []), "disp", "Comment"]
-    cells: dict[str, Any] = {"One": (T, P, X), "Multi": (T, P, T, X), "No": ([""] * N, P, X)}
-    head = [
-        *("LabVIEW Measurement|", f"Separator|{named}", f"Decimal_Separator|{mark}"),
-        *(f"X_Columns|{clocks}", "Time_Pref|Relative", "***End_of_Header***|", "|"),
-        *("Channels|2|", f"Samples|{N}|{N}", "Y_Unit_Label|bar|mm", "X_Dimension|Time|Time"),
-        *(f"X0|0{mark}0|0", f"Delta_X|0{mark}01|0{mark}01", "***End_of_Header***||"),
-        "|".join(names),
-    ]
-    lines = rows(*cells[clocks], separator=separator, mark=mark).splitlines()
-    lines[0] += f"{separator}first"
-    return "\n".join([*(line.replace("|", separator) for line in head), *lines]) + "\n"
-
-
-@pytest.mark.parametrize("name", ["run.lvm", "run.txt"])
-@pytest.mark.parametrize("clocks", ["One", "Multi", "No"])
-@pytest.mark.parametrize(("mark", "separator"), [(",", "\t"), (".", ","), (",", ";")])
-def test_files_of_labview(
-    tmp_path: Path, clocks: str, mark: str, separator: str, name: str
-) -> None:
-    recording = one(file(tmp_path, labview(clocks, mark, separator), name))
-    samples = {channel: values.tolist() for channel, values in recording.channels.items()}
-    assert samples == {"pressure": P, "displacement": X}
-    assert (recording.sample_time, recording.start_time) == (0.01, 0.0)
-
-
-def test_segments_of_labview_are_recordings(tmp_path: Path) -> None:
-    content = labview("One", ".", "\t")
-    at = content.index("Channels")
-    first, second = several(file(tmp_path, f"{content}\n{content[at:]}", "run.lvm"))
-    assert first["pressure"].tolist() == second["pressure"].tolist() == P
-    assert (first.name, second.name) == ("run[1]", "run[2]")
-    assert refused(file(tmp_path, content[:at], "cut.lvm"))
-
-
-def test_units_of_a_labview_file_are_those_of_their_columns(tmp_path: Path) -> None:
-    head = ["LabVIEW Measurement", "Separator|Tab", "X_Columns|Multi", "***End_of_Header***", ""]
-    head += ["Channels|2", "Samples|40||40", "Y_Unit_Label|bar||cm", "X_Dimension|Time||Time"]
-    head += [
-        "X0|0||0",
-        "Delta_X|0.01||0.01",
-        "***End_of_Header***",
-        "X_Value|pressure|X_Value|x|Comment",
-    ]
-    lines = [f"{t}|{p}|{t}|{x}" for t, p, x in zip(T, P, X, strict=True)]
-    content = "\n".join([*head, *lines]).replace("|", "\t")
-    recording = one(file(tmp_path, content, "run.lvm"), columns={"displacement": "x"})
-    assert recording["pressure"] == pytest.approx(P)
-    assert recording["displacement"] == pytest.approx(10 * np.array(X))
+# Lines that are no samples ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("below", ["Maximum;5,1;30", "Mean;2;3\nStd;1;1", "Prüfer: A. Muster"])

@@ -14,10 +14,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mckibben.errors import DataError, DataWarning
+from mckibben.errors import DataError
 from mckibben.link import Link, LinkError, Note, State
 from mckibben.link.client import Frame, Kind, unpacked
-from mckibben.link.driving import Driven
 from tests.link.serving import SAMPLE_TIME, SERVING, Line, block
 from tests.tools import needs
 
@@ -156,29 +155,7 @@ def test_the_devices_own_timer_goes_on_after_a_reset() -> None:
         assert link.statistics.resumed == 1
         with pytest.raises(LinkError, match=r"set\(\)"):
             link.step([1.0])
-        driven = Driven(link.device, link.state(), link.state(), tuple(found), 2)
-        rows, n_breaks = driven.places()
-        assert n_breaks == 1
-        assert rows[-1] == pytest.approx((found[-1].time - found[0].time) / 0.02, abs=3)
-        with pytest.warns(DataWarning, match="missing|reset"):
-            recording = driven.recording()
-        assert len(recording) == rows[-1] + 1
-        assert recording["pressure"][-1] == pytest.approx(1.99)
-
-
-def test_a_count_that_time_does_not_allow_makes_no_rows() -> None:
-    with linked(line := Line(), lock_step=False) as link:
-        link.stream(1)
-        found: list[State] = []
-        for k in range(40):
-            link.set([2.0])
-            found += link.samples(timeout=0.02)
-            if k == 10:
-                line.server.server_count(2**32 - 5)  # goes round soon after
-        driven = Driven(link.device, link.state(), link.state(), tuple(found))
-        rows, n_breaks = driven.places()
-        assert n_breaks == 1
-        assert rows[-1] == pytest.approx((found[-1].time - found[0].time) / SAMPLE_TIME, abs=3)
+        assert found[-1].inputs == pytest.approx([1.99])
 
 
 class Impostor:

@@ -16,7 +16,6 @@ from mckibben.signals import (
     decimate_minmax,
     resample,
     split_cycles,
-    split_time,
     triangle,
 )
 
@@ -99,9 +98,6 @@ def test_blocks_cover_all_and_start_at_minima(n_cycles: int, n_blocks: int) -> N
         lambda: resample(wave(1.0), 0.0),
         lambda: resample(wave(1.0), 11.0),
         lambda: resample(UNTIMED, 1.0),
-        lambda: split_time(wave(1.0), 0.0),
-        lambda: split_time(wave(1.0), 1.0),
-        lambda: split_time(wave(1.0), 1e-9),
         lambda: split_cycles(wave(1.0), "pressure", 0),
         lambda: split_cycles(wave(1.0), "voltage", 2),
         lambda: split_cycles(wave(1.0), "force", 2),

@@ -1,13 +1,9 @@
-"""A folder holds one run wholly, whenever a process is killed; what is the user's stays."""
+"""A folder holds one run; files of the user's stay."""
 
 from __future__ import annotations
 
-import os
-import random
-import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben import PI, Recording, example, write
+from mckibben import PI, Recording, write
 from mckibben.errors import DataError
 from mckibben.outputs import MAKER, RUN, UNFINISHED, claim, results_in
 
@@ -43,69 +39,6 @@ def put(folder: Path, files: dict[str, str]) -> None:
     for name, text in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text)
-
-
-def killed(folder: Path, moment: int) -> bool:
-    """Run in a process that is killed before its n-th operation on files; return whether it was."""
-    process = os.fork()
-    if process == 0:
-        count = 0
-
-        def hook(event: str, _: object) -> None:
-            nonlocal count
-            if event in ("open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "shutil.rmtree"):
-                count += 1
-                if count > moment:
-                    os.kill(os.getpid(), signal.SIGKILL)
-
-        sys.addaudithook(hook)
-        try:
-            run(folder, LATER)
-        finally:
-            os._exit(0)
-    return os.WIFSIGNALED(os.waitpid(process, 0)[1])
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="cannot fork")
-def test_a_run_that_is_killed_leaves_the_earlier_or_the_later_results_whole(tmp_path: Path) -> None:
-    moment, earlier, later = 0, 0, 0
-    while True:  # at every moment in turn
-        folder = tmp_path / str(moment)
-        run(folder, EARLIER)
-        put(folder, MINE)
-        ended = not killed(folder, moment)
-        with results_in(folder, []):  # finishes what the journal says
-            pass
-        found = held(folder)
-        assert found in (EARLIER | MINE, LATER | MINE)
-        earlier, later = earlier + (found["a.json"] == "1"), later + (found["a.json"] == "2")
-        run(folder, LATER)
-        assert held(folder) == LATER | MINE
-        assert not (folder / UNFINISHED).exists()
-        if ended:
-            break
-        moment += 1
-    assert min(earlier, later) > 10
-
-
-@pytest.mark.long
-@pytest.mark.skipif(sys.platform == "win32", reason="has no such signal")
-def test_a_comparison_that_is_killed_leaves_the_earlier_results_whole(tmp_path: Path) -> None:
-    words = [sys.executable, "-m", "mckibben", "compare", str(example.TRAIN)]
-    words += ["--test", str(example.TEST), "--jobs", "1", "-o", str(tmp_path), "--models"]
-    started = time.monotonic()
-    subprocess.run([*words, "pi"], check=True, capture_output=True)
-    duration, before = time.monotonic() - started, held(tmp_path)
-    draw = random.Random(0)
-    for _ in range(3):
-        process = subprocess.Popen([*words, "arx"], stderr=subprocess.DEVNULL)
-        time.sleep(duration * draw.uniform(0.3, 0.9))
-        process.kill()
-        process.wait()
-        with results_in(tmp_path, []):
-            pass
-        found = held(tmp_path)
-        assert found == before or (found.keys() == before.keys() and "arx" in str(found))
 
 
 @contextmanager
@@ -230,9 +163,8 @@ def test_single_files_are_ours_by_what_is_in_them(tmp_path: Path) -> None:
     PI((0.0,), (1.0,)).save(tmp_path / "model.json")
     made = Recording({"pressure": np.linspace(0.0, 1.0, 3)}, 0.1)
     write(made, tmp_path / "run.csv")
-    write(made, tmp_path / "run.parquet")
     put(tmp_path, {"figure.svg": f"<svg>{MAKER}</svg>", "empty.json": ""})
-    for name in ("model.json", "run.csv", "run.parquet", "figure.svg", "empty.json", "new.csv"):
+    for name in ("model.json", "run.csv", "figure.svg", "empty.json", "new.csv"):
         claim(tmp_path / name)
     put(tmp_path, {"other.json": "{}", "other.svg": "<svg/>", "other.csv": "a\n1\n"})
     (tmp_path / "run.csv").write_text((tmp_path / "run.csv").read_text() + "9,9\n")

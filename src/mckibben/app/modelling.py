@@ -157,7 +157,7 @@ def fit(
     plan = plan_of(
         *(train, test),
         inputs=inputs, outputs=outputs, load=load or None, models=[model],
-        seed=seed, allow_shared=allow_shared, allow_early=True,  # with a note
+        seed=seed, allow_shared=allow_shared,
     )  # fmt: skip
     plan = replace(plan, items={model: plan.items[model]})  # without those of each load alone
     *_, last = ranked(

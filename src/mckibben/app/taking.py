@@ -41,7 +41,7 @@ def report(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Js
     if not models:
         raise DataError("no model is fitted to these recordings", remedy="fit one under Models")
     given = {"inputs": of["inputs"], "outputs": of["outputs"], "load": of["load"] or None}
-    given |= {"models": models, "jobs": 1, "allow_early": True} | options
+    given |= {"models": models, "jobs": 1} | options
     train, test = workspace.with_role("train"), workspace.with_role("test")
     found = study(train, test, **given, progress=tell)
     write_report(found, workspace.path("takeaway", file), title=options.get("title", ""))

@@ -13,7 +13,6 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.free_run import Mask, run_free
-from mckibben.comparison import backends
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.choosing import CONSTANT, skill_of
 from mckibben.comparison.leaderboard import Row
@@ -145,9 +144,7 @@ def effort_of(model: str, data: Data) -> float:
 
 
 def processes_for(seconds: float) -> int:
-    """Return the number of processes for an amount of work, local or on an external backend."""
-    if backends.chosen():
-        return backends.processes()
+    """Return the number of processes for an amount of work."""
     return cores() if seconds > WORTH_A_PROCESS else 1
 
 
@@ -155,8 +152,6 @@ def results(
     data: Data, tasks: Sequence[Task], n: int, report: Callable[..., None] | None = None
 ) -> Iterator[Outcome]:
     """Yield the results of tasks as they finish; see `Workers.results`."""
-    if backends.chosen():
-        return backends.outcomes(fit, data, tasks)
     return workers.outcomes(fit, data, tasks, n, report)
 
 

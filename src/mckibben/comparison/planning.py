@@ -79,7 +79,6 @@ def plan_of(
     seed: int = 0,
     most_samples: int | None = None,
     allow_shared: bool = False,
-    allow_early: bool = False,
 ) -> Plan:
     """Return the set-up of a comparison; see `compare`."""
     recordings, tests, checks = listed(train), listed(test), listed(validation)
@@ -90,7 +89,7 @@ def plan_of(
     every = [*recordings, *tests, *checks]
     channels = channels_of(every, inputs, outputs, load)
     unit = _checked([recordings, every], channels)
-    notes = _early(every, channels, allow_early)
+    notes: tuple[str, ...] = ()
     shared = check_shared(
         {"fit": recordings, "validate": checks, "test": tests},
         [*channels.inputs, *channels.scheduled(recordings)],
@@ -151,25 +150,6 @@ def plan_of(
         outside=_outside(split, channels.known(every)),
     )
     return Plan(Data(split, parts, channels), items, empty, refused)
-
-
-def _early(every: Sequence[Recording], channels: Channels, allow: bool) -> tuple[str, ...]:
-    """Raise an error, or note, if the output moves before its input."""
-    from mckibben.files.condition import early
-
-    found = early(every, channels.inputs[0], channels.outputs[0]) if channels.single else None
-    if found is None:
-        return ()
-    moves = f"moves {-found} samples before {channels.inputs[0]}"
-    if not allow:
-        raise DataError(
-            f"it {moves}",
-            file=every[0].source,
-            channel=channels.outputs[0],
-            remedy="check that columns are not swapped and clocks agree; or compare all the same with "
-            "`allow_early`",
-        )
-    return (f"{channels.outputs[0]} {moves}",)
 
 
 def _checked(some: Sequence[Sequence[Recording]], channels: Channels) -> str:

@@ -94,7 +94,6 @@ def compare(
     jobs: int | None = None,
     most_samples: int | None = None,
     allow_shared: bool = False,
-    allow_early: bool = False,
     folder: str | Path | None = None,
     clear: bool = True,
     progress: bool | Callable[[Standing], None] | None = None,
@@ -137,16 +136,12 @@ def compare(
         Seed of all random numbers.
     jobs : int, optional
         Processes, which share the models and their folds; default as many as there are cores, or none
-        for little work. An external joblib backend, such as Dask's, is used instead. Results are
-        identical.
+        for little work. Results are identical.
     most_samples : int
         Longer recordings are thinned to so many samples for fit and test, including turning points.
-        Default: 100 000; of more than a million, 40 000, in segments where thinning would lose the
-        motion. Scores refer to these samples.
+        Default: 100 000. Scores refer to these samples.
     allow_shared : bool
         Whether to allow test recordings that were fitted, and repeated training recordings.
-    allow_early : bool
-        Whether to allow outputs that move before their input.
     folder : path, optional
         Folder for finished models, from which an interrupted comparison is resumed.
     clear : bool
@@ -158,7 +153,7 @@ def compare(
         Called with the leaderboard of the finished models after each one.
     watch : callable, optional
         Called, while a model is fitted, with its name, the share done of its fits, and the least cost
-        so far; not on joblib's backends.
+        so far.
 
     Returns
     -------
@@ -184,7 +179,6 @@ def compare(
         seed=seed,
         most_samples=most_samples,
         allow_shared=allow_shared,
-        allow_early=allow_early,
     )
     kept, board = plan.kept(folder), plan.board()
     try:

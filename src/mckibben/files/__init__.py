@@ -2,5 +2,4 @@
 
 from mckibben.files.own import write as write
 from mckibben.files.reading import columns_of as columns_of
-from mckibben.files.reading import has_columns as has_columns
 from mckibben.files.reading import read as read

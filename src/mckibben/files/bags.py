@@ -78,11 +78,11 @@ class _Topic:
             unit, word = _UNITS.get(self.kind, {}).get(place), place.rpartition("/")[2]
             if word in ("data", "value") or unit == "Pa abs":
                 word = self.name.rpartition("/")[2]
-            says = "pressure" if unit == "Pa abs" else _indexed(header)
+            alias = "pressure" if unit == "Pa abs" else _indexed(header)
             if is_standard(word) and not is_time(word):
-                says = word
+                alias = word
             samples, held = np.array(values, dtype=np.float64), not isinstance(values[0], float)
-            yield Column(header, samples, unit, says=says, times=times[at], held=held)
+            yield Column(header, samples, unit, alias=alias, times=times[at], held=held)
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -116,7 +116,7 @@ def folder(path: Path) -> list[Table]:
     channels = [channel_of(parse(column.label)) for column in columns]
     for i, column in enumerate(columns):  # the caller has to choose among several of one channel
         if channels.count(channels[i]) > 1:
-            columns[i] = replace(column, says=_indexed(column.header))
+            columns[i] = replace(column, alias=_indexed(column.header))
     source = "header stamps" if by_stamp else "recording times"
     return [Table(tuple(columns), meta={"time_source": source}, unread=unread)]
 

@@ -70,7 +70,7 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
 
     Columns that the request names go before those that the folder describes, and these before those
     whose headers name the channel; numbers go before text. Unless columns have clocks of their own,
-    all are of one length: that of the columns asked for, or else the longest that several have.
+    all have one length: that of the requested columns, or else the longest that several have.
 
     Raises
     ------
@@ -201,7 +201,7 @@ def _of_one_length(source: Source, fixed: Mapping[str, Column]) -> tuple[Source,
 def _described(source: Source) -> dict[str, Column]:
     """Return the columns and constants of the folder's settings; optional ones may be missing.
 
-    Of a force, a mass is the weight that hangs there: nobody measured it.
+    A mass that is described as a force is its weight.
     """
     table, request = source.table, source.request
     time, channels = request.described.time, request.described.channels

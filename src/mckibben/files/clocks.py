@@ -17,15 +17,14 @@ from mckibben.files.timebase import GAP
 def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Column], list[str]]:
     """Return columns of one length, with a time column, and the headers of those left out.
 
-    The clock suits the channels asked for and those that have a meaning (a temperature that nobody asks
-    for does not slow the rest down), or all. Between its samples a column is linear, or holds the
-    last where it is one of counts; where it has a gap, or another one needed has not begun or is over,
-    samples are missing. Columns that were sampled together do not change.
+    The grid is that of the slowest requested or standard channel; temperatures count only where they
+    are requested. Other columns are interpolated linearly, and counts by the last sample. Samples are
+    missing in gaps, and before a column begins and after it ends. Columns with this grid do not change.
 
     Raises
     ------
     DataError
-        If times go back, or those of columns that are needed have nothing in common.
+        If times go back, or the needed columns have no time in common.
     """
     clocks = {name: column.times for name, column in named.items() if column.times is not None}
     if not clocks:

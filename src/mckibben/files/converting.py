@@ -43,7 +43,7 @@ class Signal:
 class Times:
     """Times in their original unit, with the recorded digits.
 
-    The unit is ``certain`` where it was asked for or is not the second.
+    The unit is ``certain`` where it was requested or is not the second.
     """
 
     values: Array
@@ -187,8 +187,6 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
         samples = quality.without_codes(channel, samples, raw, source)
     if not own or channel in source.request.units or calibrated:
         quality.refuse_impossible(channel, samples, read_in.name, source)
-    if not own and standard is not None:
-        quality.note_outliers(channel, samples, source)
     return Signal(samples, unit, read_in, assumed, calibration)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from io import BufferedReader
@@ -11,7 +11,7 @@ from types import ModuleType
 
 from pydantic import ValidationError
 
-from mckibben.errors import DataError, MckibbenError, TooLargeError
+from mckibben.errors import DataError, MckibbenError
 from mckibben.files.table import Table, distinct, printable
 from mckibben.system.ordinary import opened
 
@@ -24,7 +24,7 @@ READERS: dict[str, str] = {
     ".txt": "text",
     ".dat": "text",
     ".log": "text",
-    ".lvm": "lvm",
+    ".lvm": "text",
     ".parquet": "parquet",
     ".mat": "matlab",
     ".h5": "hdf5",
@@ -34,30 +34,11 @@ READERS: dict[str, str] = {
     ".bag": "bags",
     ".mcap": "bags",
     ".db3": "bags",
-    ".json": "columns_json",
-    ".jsonl": "columns_json",
 }
 """Ending of the file's name -> module of this folder with ``read(file, path) -> list[Table]``."""
 
-WRITERS = (".csv", ".tsv", ".parquet")
-"""Endings whose module also has ``write(recording, path)``."""
-
-SOUGHT = tuple(ending for ending in READERS if ending not in (".log", ".json", ".jsonl"))
-"""Endings that a folder is searched for; other formats also hold logs and settings."""
-
-_SIGNATURES: dict[bytes, tuple[str, ...]] = {
-    b"PAR1": (".parquet",),
-    b"\x89HDF\r\n\x1a\n": (".h5", ".hdf5", ".mat"),
-    b"TDSm": (".tdms",),
-    b"MATLAB 5.0 MAT": (".mat",),
-    b"MATLAB 7.3 MAT": (".mat",),
-    b"PK\x03\x04": (".xlsx",),
-    b"#ROSBAG V": (".bag",),
-    b"\x89MCAP0\r\n": (".mcap",),
-    b"SQLite format 3\x00": (".db3",),
-    b"\xd0\xcf\x11\xe0": (".xls",),
-}
-"""Beginning of a file -> the endings of its format."""
+SOUGHT = tuple(ending for ending in READERS if ending != ".log")
+"""Endings that a folder is searched for."""
 
 
 def tables(path: Path) -> list[Table]:
@@ -72,22 +53,13 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     Raises
     ------
     DataError
-        If it is empty or damaged, or its ending is unknown or not that of its contents.
+        If it is empty or damaged, or its ending is unknown.
     """
-    module = _module(path, READERS, "read")
+    module = _module(path)
     with refusing(path):
-        start = file.peek(64)
-        if not start:
+        if not file.peek(1):
             remedy = "give a file with a header and samples"
             raise DataError("there is nothing in it", file=path, remedy=remedy)
-        for signature, endings in _SIGNATURES.items():
-            if start.startswith(signature) and path.suffix.casefold() not in endings:
-                known = endings[0] in READERS
-                remedy = f"rename it to end in {endings[0]}" if known else "export it as CSV"
-                problem = f"its contents are those of a {endings[0]} file"
-                raise DataError(problem, file=path, remedy=remedy)
-        if READERS[path.suffix.casefold()] == "text" and b"LabVIEW Measurement" in start[:22]:
-            module = import_module("mckibben.files.lvm")
         return [distinct(printable(table)) for table in module.read(file, path)]
 
 
@@ -100,7 +72,7 @@ def laid_out(
     if READERS.get(path.suffix.casefold()) != "text":
         problem, remedy = "only text has lines and an encoding", "leave both as found"
         raise DataError(problem, file=path, remedy=remedy)
-    text = _module(path, READERS, "read")
+    text = _module(path)
     found: BufferedReader = text.laid_out(file, path, header, skip, encoding)
     return found
 
@@ -109,11 +81,6 @@ def bag(folder: Path) -> list[Table]:
     """Return the contents of a ROS 2 bag folder; errors as in `read`."""
     with refusing(folder):
         return [printable(table) for table in import_module("mckibben.files.bags").folder(folder)]
-
-
-def writer(path: Path) -> ModuleType:
-    """Return the module that writes files of this ending; raise a `DataError` if there is none."""
-    return _module(path, WRITERS, "written")
 
 
 def reason(error: Exception) -> str:
@@ -135,7 +102,7 @@ def refusing(path: Path) -> Iterator[None]:
         raise
     except MemoryError:
         problem, remedy = "it needs more memory than there is", "split it into shorter recordings"
-        raise TooLargeError(problem, file=path, remedy=remedy) from None
+        raise DataError(problem, file=path, remedy=remedy) from None
     except Exception as error:
         problem = f"it is damaged, or not {path.suffix[1:] or 'a bag'} ({reason(error)})"
         remedy = "export it again from its source"
@@ -145,11 +112,11 @@ def refusing(path: Path) -> Iterator[None]:
         raise DataError(problem, file=path, remedy=remedy) from None
 
 
-def _module(path: Path, endings: Collection[str], done: str) -> ModuleType:
+def _module(path: Path) -> ModuleType:
     ending = path.suffix.casefold()
-    if ending not in endings:
-        problem = (
-            f"files {f'ending in {ending!r}' if ending else 'without an ending'} cannot be {done}"
+    if ending not in READERS:
+        ended = f"ending in {ending!r}" if ending else "without an ending"
+        raise DataError(
+            f"files {ended} cannot be read", file=path, remedy=f"give one of {', '.join(READERS)}"
         )
-        raise DataError(problem, file=path, remedy=f"give one of {', '.join(endings)}")
     return import_module(f"mckibben.files.{READERS[ending]}")

@@ -20,7 +20,7 @@ from mckibben.files.table import Table, plain_meta
 from mckibben.files.tree import INFO, Node, Unread
 from mckibben.system.extras import demand
 
-_PACKING = {"scale_factor": 1.0, "add_offset": 0.0}
+_PACKING = ("scale_factor", "add_offset")
 """Attributes of packed numbers, by "NetCDF Climate and Forecast Metadata Conventions", 8.1."""
 
 
@@ -118,20 +118,13 @@ class _Tree:
             lines = [row.astype("<u2").tobytes() for row in np.atleast_2d(data[()].T)]
             texts = [line.decode("utf-16-le", "replace") for line in lines]
             return texts[0] if len(texts) == 1 else texts
+        if any(name in data.attrs for name in _PACKING):
+            return Unread("packed by a scale_factor or add_offset")
         samples = _fields(np.asarray(data[()]))
         missing = about.get("_FillValue", about.get("missing_value"))
         if isinstance(samples, np.ndarray) and isinstance(missing, int | float):
-            samples = np.where(samples == missing, np.nan, samples)
-        packed = {name: about.get(name, "") for name in _PACKING if name in data.attrs}
-        if not packed or not isinstance(samples, np.ndarray):
-            return samples
-        if (
-            any(isinstance(number, str) for number in packed.values())
-            or samples.dtype.kind not in "iuf"
-        ):
-            return Unread("packed by a scale_factor or add_offset that is no number")
-        gain, offset = (float(packed.get(name, one)) for name, one in _PACKING.items())
-        return np.asarray(samples * gain + offset)
+            return np.where(samples == missing, np.nan, samples)
+        return samples
 
 
 def _fields(samples: NDArray[Any]) -> Node:

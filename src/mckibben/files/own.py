@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import warnings
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,19 +11,15 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError, MckibbenError
-from mckibben.files.formats import READERS, reason, tables, writer
-from mckibben.files.notices import warn
+from mckibben.files.formats import reason, tables
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
 from mckibben.system import ordinary
-from mckibben.system.atomic import digest
-
-STILL = ("calibration", "pressure_reference")
-"""Entries of a recording's meta that remain valid after its samples were edited."""
+from mckibben.system.atomic import digest, replacing
 
 
 class Stored(BaseModel):
-    """Description of a recording in a CSV's sidecar or in the schema of a Parquet file.
+    """Description of a recording in a CSV's sidecar.
 
     ``sha256`` is of the samples as they are on disk, to see whether they were changed since; ``units``
     are in the order of the columns. With a sample time, the first column is the time.
@@ -45,13 +40,6 @@ class Stored(BaseModel):
         columns = tuple(Column(name, values[name], unit) for name, unit in self.units.items())
         return Table(columns, None, self.sample_time, self.start_time, self.meta, own=True)
 
-    def edited(self, table: Table) -> Table:
-        """Return a table of edited samples, with the described units and calibrations."""
-        units = {"time": "s", **self.units}
-        columns = (replace(c, unit=c.unit or units.get(c.header) or None) for c in table.columns)
-        meta = {key: self.meta[key] for key in STILL if key in self.meta}
-        return replace(table, columns=tuple(columns), meta=meta)
-
 
 def write(recording: Recording, path: str | Path) -> None:
     """Write a recording to a file, from which `read` returns an equal one; an old file is replaced.
@@ -60,9 +48,8 @@ def write(recording: Recording, path: str | Path) -> None:
     ----------
     recording : Recording
     path : path
-        Ends in ``.csv``, ``.tsv`` or ``.parquet``. Text files have a plain header of channel names,
-        ``time`` [s] first where the recording has time, and beside them a sidecar
-        ``NAME.csv-metadata.json`` with units, time grid and meta.
+        Ends in ``.csv``. The file has a plain header of channel names, ``time`` [s] first where the
+        recording has time, and beside it is ``NAME.csv-metadata.json`` with units, time grid and meta.
 
     Raises
     ------
@@ -70,8 +57,25 @@ def write(recording: Recording, path: str | Path) -> None:
         If the ending is another, the folder cannot be written to, a channel is named ``time``, or
         ``meta`` holds what JSON cannot. What was in the file before is then still there.
     """
+    import pandas as pd
+
     path = Path(path)
-    writer(path).write(recording, path)
+    require_csv(path)
+    # 1.38, not 1.3800000000000001: the description has the exact step
+    time = {} if recording.sample_time is None else {"time": recording.time.round(12)}
+    columns = {**time, **recording.channels}
+    data = pd.DataFrame(columns).to_csv(index=False, lineterminator="\n").encode()
+    description = describe(recording, data, path) + "\n"
+    with replacing(path) as new:
+        new.write_bytes(data)
+    with replacing(sidecar(path)) as new:
+        new.write_text(description, encoding="utf-8")
+
+
+def require_csv(path: Path) -> None:
+    """Raise an error for a recording to be written to another file than ``.csv``."""
+    if path.suffix.casefold() != ".csv":
+        raise DataError("recordings are written as CSV", file=path, remedy="end it in .csv")
 
 
 def describe(recording: Recording, samples: bytes, path: Path) -> str:
@@ -118,13 +122,13 @@ def parse(text: str | bytes) -> Stored | str:
     return found if all(map(str.isprintable, words)) else "its names cannot be printed"
 
 
-def noted(found: Stored | str, problem: str, path: Path) -> Stored | None:
-    """Warn that a description does not match the samples; return None if it is invalid."""
-    if isinstance(found, str):
-        warn(path, f"{problem}; it is ignored, and units are taken from the header")
-        return None
-    warn(path, f"{problem}; its units and calibrations are used, and nothing else of it")
-    return found
+def changed(path: Path) -> DataError:
+    """Return the error for samples that are not those described."""
+    return DataError(
+        "its samples are not those that this package wrote",
+        file=path,
+        remedy=f"to read it by its header alone, remove {sidecar(path).name}",
+    )
 
 
 def sidecar(path: Path) -> Path:
@@ -137,8 +141,8 @@ def sidecar(path: Path) -> Path:
 
 
 def description(path: Path) -> Path | None:
-    """Return the path of a text file's description; None for other formats."""
-    return sidecar(path) if READERS.get(path.suffix.casefold()) == "text" else None
+    """Return the path of a CSV's description; None for other formats."""
+    return sidecar(path) if path.suffix.casefold() == ".csv" else None
 
 
 def describes(path: Path) -> bool:

@@ -1,35 +1,22 @@
-"""Parquet files: own ones with metadata in the schema, others by header rules."""
+"""Parquet files: columns of numbers, times and text."""
 
 from __future__ import annotations
 
 from io import BufferedReader
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from mckibben.files import own
 from mckibben.files.table import Column, Table, column
 from mckibben.files.tree import without_numbers
-from mckibben.recording import Recording
-from mckibben.system.atomic import digest, replacing
 from mckibben.system.extras import demand
-
-demand("pyarrow", "parquet", "Parquet")
-
-_KEY = b"mckibben"
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Read the one table of a Parquet file: its numbers, times and text."""
+    """Read the one table of a Parquet file."""
+    demand("pyarrow", "parquet", "Parquet", file=path)
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     frame = pq.ParquetFile(file).read()
-    text = (frame.schema.metadata or {}).get(_KEY)
-    described = None if text is None else _own(frame, text, path)
-    if isinstance(described, Table):
-        return [described]
     columns: list[Column] = []
     unread: dict[str, str] = {}
     is_a = pa.types
@@ -47,37 +34,4 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             unread[name] = f"a column of type {kind}"
     if not columns:
         raise without_numbers(unread, path)
-    table = Table(tuple(columns), unread=unread)
-    return [table if described is None else described.edited(table)]
-
-
-def write(recording: Recording, path: Path) -> None:
-    """Write a recording as Parquet, with its description in the schema."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    description = own.describe(recording, _samples(recording.channels), path)
-    time = {} if recording.sample_time is None else {"time": recording.time}
-    frame = pa.table({**time, **recording.channels})
-    frame = frame.replace_schema_metadata({_KEY: description})
-    with replacing(path) as new:
-        pq.write_table(frame, new)
-
-
-def _own(frame: Any, text: bytes, path: Path) -> Table | own.Stored | None:
-    """Return the described table of a file, or a description of other samples."""
-    description = own.parse(text)
-    if isinstance(description, str):
-        problem = f"the description in it is not by this package ({description})"
-    else:
-        problem = "the description in it is of other samples"
-        if description.units.keys() <= set(frame.column_names):
-            values = {name: frame[name].to_numpy() for name in description.units}
-            if digest(_samples(values)) == description.sha256:
-                return description.table(values)
-    return own.noted(description, problem, path)
-
-
-def _samples(channels: Any) -> bytes:
-    arrays = (np.asarray(values) for values in channels.values())
-    return b"".join(values.astype("<f8").tobytes() for values in arrays)
+    return [Table(tuple(columns), unread=unread)]

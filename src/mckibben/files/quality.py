@@ -1,4 +1,4 @@
-"""Data quality: codes for missing samples, wraps, outliers, impossible values."""
+"""Data quality: codes for missing samples, wraps, impossible values."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.arrays import Array, true_runs
+from mckibben.arrays import Array
 from mckibben.files.headers import unit_of
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
@@ -130,23 +130,6 @@ def _is_code(code: float, known: Array) -> bool:
     at_once = not low < code < high and steps[at[1:] != at[:-1]].min() > 5 * inside
     # one of few values is a level of the signal
     return bool(far or at_once) and np.unique(others).size >= 10
-
-
-def note_outliers(channel: str, values: Array, source: Source) -> None:
-    """Note short runs of outliers, which may be measured."""
-    finite = np.flatnonzero(np.isfinite(values))
-    if finite.size < 100:
-        return
-    known = values[finite]
-    low, high = np.quantile(known, (0.01, 0.99))
-    first, after = true_runs(np.maximum(known - high, low - known) > high - low).T
-    lone = (after - first <= 3) & (first > 0) & (after < known.size)
-    if high > low and lone.any():
-        n, at = np.sum((after - first)[lone]), int(finite[first[lone][0]])
-        source.warn(
-            f"channel {channel!r}: {n} outlier(s), the first of {values[at]:.6g} in row "
-            f"{source.table.row(at)}; correct or blank cells that were not measured"
-        )
 
 
 def refuse_impossible(channel: str, values: Array, read_in: str, source: Source) -> None:

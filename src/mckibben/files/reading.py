@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.errors import DataError
 from mckibben.files import gaps as gaps_in
 from mckibben.files import sources, timebase
 from mckibben.files.channels import about
@@ -178,14 +177,6 @@ def columns_of(path: str | Path, **options: Any) -> list[Seen]:
     request = replace(Request(**options), described=about(path))
     (table, *_), _ = sources.tables(path, request)
     return seen(request.of(table, path))
-
-
-def has_columns(path: Path) -> bool:
-    """Return whether a file holds columns of samples, not a model."""
-    try:
-        return bool(columns_of(path))
-    except DataError:
-        return False
 
 
 def _read(path: Path, request: Request) -> tuple[list[Recording], Source]:

@@ -7,12 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from mckibben.errors import DataError, require
-from mckibben.files.channels import NAME, Channel, Described, Time
+from mckibben.files.channels import Channel, Described, Time
 from mckibben.files.formats import MOST_BYTES
-from mckibben.files.headers import parse, snake_case
 from mckibben.files.notices import warn
 from mckibben.files.table import Table
 from mckibben.recording import conversion
@@ -68,28 +67,12 @@ class Request:
         """Return a table with this request; constants are added to the description.
 
         What this package wrote was described when it was first read, and is not calibrated twice.
-
-        Raises
-        ------
-        DataError
-            If its samples were changed since, so that it is not certain whether they are calibrated.
         """
         channels, time = dict(self.described.channels), self.described.time
-        done = table.calibration
         if table.own:
+            done: Any = table.meta.get("calibration") or {}
             time, every = Time(), channels.items()
             channels = {c: one for c, one in every if one.is_calibrated and c not in done}
-        headers = {snake_case(parse(column.header).name) for column in table.columns}
-        for name, one in channels.items():
-            here = one.column is None or snake_case(parse(one.column).name) in headers
-            if one.is_calibrated and here and name in done and name not in self.calibration:
-                raise DataError(
-                    f"it was calibrated before, and is again by {NAME}",
-                    file=path,
-                    channel=name,
-                    remedy=f"remove it from {NAME}; or, if the values are raw ones, use "
-                    f"`calibration[{name}]=COLUMN:GAIN:OFFSET:UNIT`",
-                )
         for name, (value, unit) in self.constants.items():
             channels[name] = Channel(value=value, unit=unit.strip() or None)
         described = self.described.model_copy(update={"channels": channels, "time": time})

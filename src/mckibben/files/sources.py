@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -17,9 +16,9 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files import formats, timebase
-from mckibben.files.channels import NAME, about, described
+from mckibben.files.channels import NAME, described
 from mckibben.files.converting import times_of
-from mckibben.files.headers import channel_of, is_standard, is_time, parse, unit_of
+from mckibben.files.headers import is_standard, is_time, parse
 from mckibben.files.own import description
 from mckibben.files.request import Request, Source
 from mckibben.files.table import Column, Table
@@ -33,12 +32,6 @@ PROTOCOL = "protocol.json"
 """File with the role of each recording in its folder."""
 
 ROLES = ("train", "validation", "test")
-
-JOIN = (
-    "name the files as channels, such as pressure.csv and displacement.csv; or write in "
-    f'{NAME} which belong together, as in join = ["*_pressure.csv", "*_displacement.csv"]; or give '
-    "files instead of the folder, where each is a recording"
-)
 
 
 def is_bag(path: Path) -> bool:
@@ -54,12 +47,11 @@ def inside(path: Path) -> list[Path]:
     Raises
     ------
     DataError
-        If a folder has no recordings, or files with one signal each that may be one or several.
+        If a folder has no recordings.
     """
     if not path.is_dir() or is_bag(path):
         return [path]
-    bags = [each for each in _listed(path) if is_bag(each)]
-    found = _files(path) + bags
+    found = _files(path) + [each for each in _listed(path) if is_bag(each)]
     if not found:
         raise DataError(
             "there is no recording in the folder", file=path, remedy="put recordings in it"
@@ -67,10 +59,7 @@ def inside(path: Path) -> list[Path]:
     if os.path.lexists(path / PROTOCOL):
         return found
     settings = described(path)
-    firsts = {path / next(iter(settings.parts(each.name))): None for each in found}
-    if len(firsts) == len(found) and not bags and _are_one(found):
-        return [path]
-    return list(firsts)
+    return list(dict.fromkeys(path / next(iter(settings.parts(each.name))) for each in found))
 
 
 def roles(path: Path) -> dict[str, list[Path]]:
@@ -165,7 +154,7 @@ def read_with(path: Path) -> list[Path]:
 def _parts(path: Path) -> dict[Path, str]:
     """Return the files of a recording -> the names of their signals, if there are several."""
     if path.is_dir():
-        return {each: each.stem for each in _files(path)}
+        return dict.fromkeys(_files(path), "")
     parts = described(path.parent).parts(path.name)
     return {path.with_name(file): name for file, name in parts.items()}
 
@@ -186,29 +175,6 @@ def _listed(folder: Path) -> list[Path]:
         return sorted(folder.iterdir())
 
 
-def _are_one(paths: Sequence[Path]) -> bool:
-    """Return whether files form one recording: one column each, of different channels."""
-    channels: list[str] = []
-    for path in paths if len(paths) > 1 else ():
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            tables = formats.tables(path)
-        signals, _ = _split(tables[0], about(path).time.column)
-        if len(tables) > 1 or len(signals) != 1:
-            return False
-        channels.append(channel_of(parse(_named(signals[0], path.stem).label)))
-    if len(set(channels)) < 2:
-        return False
-    if len(set(channels)) < len(channels) or not any(map(unit_of, channels)):
-        raise DataError(
-            "its files hold one signal each, and neither their names nor their headers show which "
-            f"belong together: {', '.join(path.name for path in paths[:10])}",
-            file=paths[0].parent,
-            remedy=JOIN,
-        )
-    return True
-
-
 def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Request) -> Table:
     """Return one table from files with one signal each, given the names of the signals."""
     stamp = request.columns.get("time", request.described.time.column)
@@ -223,6 +189,8 @@ def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Re
         elif len(times) != timed:
             channel = "time"
             problem = f"it has {len(times)} columns of times, where another file has one"
+        elif tables[path].meta.get("calibration"):
+            problem = "it was calibrated before it was written by mckibben"
         if problem:
             remedy = (
                 "save one signal in every file, and one column of times in all or in none, and "
@@ -237,16 +205,15 @@ def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Re
     if not apart and len(set(lengths.values())) > 1:
         listing = ", ".join(f"{name} {n}" for name, n in lengths.items())
         problem = f"its files have no times and differ in length: {listing}"
-        raise DataError(problem, file=next(iter(tables)).parent, remedy=JOIN)
+        remedy = f"save times in each file, or leave one out of join in {NAME}"
+        raise DataError(problem, file=next(iter(tables)).parent, remedy=remedy)
     each = tables.items()
-    done = {name: one for _, table in each for name, one in table.calibration.items()}
     step, start = grids.pop() if len(grids) == 1 else (None, 0.0)
     together = Table(
         (*clocks[:1], *signals),
         next(iter(tables.values())).lines,
         step,
         start,
-        meta={"calibration": done} if done else {},
         rates={f"{path.name}/{n}": rate for path, table in each for n, rate in table.rates.items()},
         unread={f"{path.name}/{n}": why for path, table in each for n, why in table.unread.items()},
     )
@@ -282,5 +249,5 @@ def _split(table: Table, stamp: str | None) -> tuple[list[Column], list[Column]]
 def _named(column: Column, name: str) -> Column:
     """Return a column named after its file if that is a channel, or else after its header."""
     if is_standard(column.header) and not is_standard(name):
-        return replace(column, header=name, says=column.header)
+        return replace(column, header=name, alias=column.header)
     return replace(column, header=name, unit=column.unit or parse(column.header).unit)

@@ -32,10 +32,10 @@ class Column:
 
     header: str  # as written in the file
     values: Array | None  # the samples, NaN where a cell is blank; None for a column of text
-    unit: str | None = None  # where the file states it apart from the header
+    unit: str | None = None  # where the file states it outside the header
     texts: Sequence[str] = ()  # cells of text; of a text file the first ones, unless they are times
     flaw: Flaw | None = None
-    says: str | None = None  # names channel and unit in place of the header, as a file's name does
+    alias: str | None = None  # names channel and unit in place of the header, as a file's name does
     times: Array | None = None  # of the samples [s], where not all columns were sampled together
     held: bool = False  # whether each sample holds until the next, as with counts and switches
     place: str | None = None  # the names that lead to it in the file, where the header is less
@@ -44,7 +44,7 @@ class Column:
     @property
     def label(self) -> str:
         """Text with the channel and the unit."""
-        return self.says or self.header
+        return self.alias or self.header
 
     @property
     def size(self) -> int:
@@ -80,12 +80,6 @@ class Table:
     def has_clocks(self) -> bool:
         """Whether columns have separate times, so that none of them is the time."""
         return any(column.times is not None for column in self.columns)
-
-    @property
-    def calibration(self) -> Mapping[str, Any]:
-        """Calibration of channels in a file written by this package, by name."""
-        found = self.meta.get("calibration")
-        return found if isinstance(found, Mapping) else {}
 
     def row(self, sample: int) -> int:
         """Return the row number for a sample counted from 0."""

@@ -25,8 +25,7 @@ from mckibben.files.instants import may_be_instant
 from mckibben.files.notices import listed, warn
 from mckibben.files.sniffing import SEPARATORS, Layout, decoded, sniff
 from mckibben.files.table import Column, Table
-from mckibben.recording import Recording
-from mckibben.system.atomic import digest, replacing
+from mckibben.system.atomic import digest
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
 
 _SNIFFED = 2**18  # bytes by which the layout of a table is recognised
@@ -35,11 +34,9 @@ _SNIFFED = 2**18  # bytes by which the layout of a table is recognised
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the table of a text file."""
     data = file.read()
-    found = _own(data, path) if os.path.lexists(own.sidecar(path)) else None
-    if isinstance(found, Table):
+    if os.path.lexists(own.sidecar(path)) and (found := _own(data, path)):
         return [found]
-    table = parsed(decoded(data, path), path)
-    return [table if found is None else found.edited(table)]
+    return [parsed(decoded(data, path), path)]
 
 
 def laid_out(
@@ -62,42 +59,23 @@ def laid_out(
     return BufferedReader(BytesIO(text.encode()))
 
 
-def write(recording: Recording, path: Path) -> None:
-    """Write a recording as text, with its description in a second file."""
-    import pandas as pd
-
-    # 1.38, not 1.3800000000000001: the description has the exact step
-    time = {} if recording.sample_time is None else {"time": recording.time.round(12)}
-    columns = {**time, **recording.channels}
-    separator = "\t" if path.suffix.casefold() == ".tsv" else ","
-    data = pd.DataFrame(columns).to_csv(index=False, sep=separator, lineterminator="\n").encode()
-    description = own.describe(recording, data, path) + "\n"
-    with replacing(path) as new:
-        new.write_bytes(data)
-    with replacing(own.sidecar(path)) as new:
-        new.write_text(description, encoding="utf-8")
-
-
-def _own(data: bytes, path: Path) -> Table | own.Stored | None:
-    """Return the table described by a sidecar, or a description of another version."""
+def _own(data: bytes, path: Path) -> Table | None:
+    """Return the table that a sidecar describes, or None if that is not by this package."""
     try:
         description = own.parse(read_bytes(own.sidecar(path), most=DESCRIPTION))
     except DataError as error:
         description = error.problem
-    header = data.partition(b"\n")[0].decode("utf-8", "replace")
-    tabs = "\t" in header or path.suffix.casefold() == ".tsv"
-    dialect = Dialect("\t" if tabs else ",", ".")
-    names = next(csv.reader([header], delimiter=dialect.separator or ","), [])
     if isinstance(description, str):
-        problem = f"is not a description by this package ({description})"
-    elif description.sha256 != digest(data):
-        problem = "describes another version of the file"
-    elif names != [*([] if description.sample_time is None else ["time"]), *description.units]:
-        problem = "names other columns than the file"
-    else:
-        frame = _frame(data, dialect, names, skiprows=1, dtype=np.float64)
-        return description.table({name: frame[name].to_numpy() for name in names})
-    return own.noted(description, f"it {problem}", own.sidecar(path))
+        warn(path, f"{own.sidecar(path).name} is ignored, as it is not by mckibben ({description})")
+        return None
+    header = data.partition(b"\n")[0].decode("utf-8", "replace")
+    dialect = Dialect(",", ".")
+    names = next(csv.reader([header], delimiter=","), [])
+    named = [*([] if description.sample_time is None else ["time"]), *description.units]
+    if description.sha256 != digest(data) or names != named:
+        raise own.changed(path)
+    frame = _frame(data, dialect, names, skiprows=1, dtype=np.float64)
+    return description.table({name: frame[name].to_numpy() for name in description.units})
 
 
 def _frame(data: bytes, dialect: Dialect, names: Sequence[Any], **options: Any) -> Any:
@@ -125,24 +103,13 @@ def parsed(data: bytes, path: Path, separators: Sequence[str | None] = SEPARATOR
         separators = (named[1].decode(),)
         data = b"\n" + data[named.end() :]  # so that lines have the same numbers
     start = data[:_SNIFFED].decode("utf-8", "replace").split("\n")
-    return block(data, sniff(start[:400], path, separators), path)
+    return _table(data, sniff(start[:400], path, separators), path)
 
 
-def block(data: bytes, layout: Layout, path: Path, stop: int | None = None) -> Table:
-    """Return the table of the samples of a text, from their first line on.
-
-    Parameters
-    ----------
-    data : bytes
-        UTF-8.
-    layout : Layout
-        Where the last column has no header, lines may end before it.
-    path : Path
-    stop : int, optional
-        The line, counted from 0, before which they end.
-    """
+def _table(data: bytes, layout: Layout, path: Path) -> Table:
+    """Return the table of the samples of a text; lines may end before a last column without header."""
     dialect, headers = layout.dialect, layout.headers
-    numbers, body = _samples(data, layout, path, stop)
+    numbers, body = _samples(data, layout, path)
     options: dict[str, Any] = {"names": range(len(headers)), "na_values": list(MISSING)}
     frame = _frame(body, dialect, low_memory=False, **options)
     if len(frame) != len(numbers):  # so that no sample has the number of another line
@@ -180,12 +147,12 @@ def block(data: bytes, layout: Layout, path: Path, stop: int | None = None) -> T
     return Table(tuple(columns), lines=np.array(numbers), unread=unread)
 
 
-def _samples(data: bytes, layout: Layout, path: Path, stop: int | None) -> tuple[list[int], bytes]:
+def _samples(data: bytes, layout: Layout, path: Path) -> tuple[list[int], bytes]:
     """Return the numbers of the lines of samples and their text, with a cell per header.
 
     Blank lines, comments, and words or separators alone at the end are left out.
     """
-    dialect, headers, rows = layout.dialect, layout.headers, data.split(b"\n")[:stop]
+    dialect, headers, rows = layout.dialect, layout.headers, data.split(b"\n")
     separator = (dialect.separator or " ").encode()
     blanks = rb" \v\f" if separator == b"\t" else rb" \t\v\f"
     skipped = re.compile(rb"[%s]*(?:$|%s)" % (blanks, dialect.comment.encode())).match
@@ -223,7 +190,7 @@ def _samples(data: bytes, layout: Layout, path: Path, stop: int | None) -> tuple
         rest = " ".join(b" ".join(lines[at:]).decode("utf-8", "replace").split())
         if at == 0 or re.search(r"\d", rest, re.ASCII):
             problem = f"there are {counts[at]} cells where the header has {len(headers)}"
-            remedy = "complete or delete that line"
+            remedy = "complete or delete that line, or give the line of names with `header`"
             raise DataError(problem, file=path, row=numbers[at], remedy=remedy)
         warn(path, f"from row {numbers[at]} on there are words alone, left out: {rest[:60]!r}")
         numbers, lines = numbers[:at], lines[:at]

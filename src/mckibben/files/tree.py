@@ -1,10 +1,10 @@
-"""Vectors in a tree of groups, from MATLAB, Simulink, dSPACE, HDF5 and JSON files.
+"""Vectors in a tree of groups, from MATLAB, Simulink, dSPACE and HDF5 files.
 
 Readers make a plain tree of a file: groups and structs are dicts, struct arrays and cells are lists,
 numbers are arrays, text is str or a list of it. Each array of numbers is a vector, or a matrix of a few,
 at its place: the names that lead to it. A text called ``name`` or ``unit`` describes the group that it
-is in, a text in a group beside (``units.p``) what has its name, and the time of a vector is the nearest
-above it that has as many samples.
+is in, and a text in a neighbouring group (``units.p``) the vector of its name. The time of a vector is
+the nearest above it that has as many samples.
 """
 
 from __future__ import annotations
@@ -110,8 +110,8 @@ def table(
         full = dot.join(place)
         columns[place] = replace(each, place=full)
         if labels[each.label] > 1:
-            says = each.label if is_standard(each.label) else re.sub(r"\W+", "_", full).strip("_")
-            columns[place] = replace(each, header=full, says=says, place=full)
+            alias = each.label if is_standard(each.label) else re.sub(r"\W+", "_", full).strip("_")
+            columns[place] = replace(each, header=full, alias=alias, place=full)
     found = (*columns.values(), *texts)
     return Table(found, meta=meta or {}, rates=rates, unread=unread)
 
@@ -164,7 +164,7 @@ def _vectors(
 ) -> tuple[dict[Place, Column], dict[Place, tuple[Place, ...]]]:
     """Return the vectors and matrix columns by path, and the paths where units of them may be.
 
-    The first of these is the group that a vector stands for, or itself.
+    The first of these is the group that a vector represents, or itself.
     """
     names, units = (
         {at[:-1]: leaf for at, leaf in leaves.items() if at[-1].casefold() in fields}
@@ -210,7 +210,7 @@ def _vectors(
 
 def _column(header: str, name: str, values: NDArray[Any]) -> Column:
     found = column(header, np.ascontiguousarray(values))
-    return replace(found, says=None if name == header else name)
+    return replace(found, alias=None if name == header else name)
 
 
 def _units(

@@ -110,7 +110,7 @@ class State:
 
     @property
     def is_safe(self) -> bool:
-        """Whether the outputs are the safe ones, as no host gives inputs."""
+        """Whether the outputs are the safe ones, as no host sends inputs."""
         return Note.RUNNING not in self.notes
 
 
@@ -126,8 +126,8 @@ class Statistics:
 class Link(AbstractContextManager["Link"]):
     """Drives a model on a device over a serial line.
 
-    A frame without an answer is sent again under the same number: whatever the line loses or damages,
-    the device executes each command once, in order, or not at all. Inputs carry all settings, so that
+    A frame without an answer is sent again under the same number: the device executes each command
+    once, in order, or not at all, even if the line loses or damages frames. Inputs carry all settings:
     the next ones resume a device that was reset, or whose watchdog has acted; `statistics` counts it.
 
     Parameters

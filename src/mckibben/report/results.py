@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from mckibben.diagnosis.data_gaps import Gap
     from mckibben.diagnosis.description import ModelDescription
     from mckibben.diagnosis.review import Review
-    from mckibben.link.client import State
-    from mckibben.link.driving import Driven
+    from mckibben.link import Device, State
     from mckibben.papers.paper import Paper
     from mckibben.planning.planner import Plan
     from mckibben.reading import Contents
@@ -52,20 +51,20 @@ UNFOLDED = 30
 
 
 def recording(found: Recording) -> list[Item]:
-    """Return the ranges of channels, samples at their limits and repeated ones, and notes."""
-    from mckibben.files.condition import condition
-
-    rows = []
-    for name, samples in found.channels.items():
-        about = condition(samples)
-        rows.append([
-            *(name, found.units[name] or "–"),
-            *(f"{float(end) + 0.0:.6g}" for end in (samples.min(), samples.max())),
-            *(percent(about["saturated"]), about["stuck"]),
-        ])  # fmt: skip
-    headings = ["Channel", "Unit", "Lowest", "Highest", "At a limit", "Stuck samples"]
+    """Return the ranges of channels, and notes."""
+    rows = [
+        [
+            name,
+            found.units[name] or "–",
+            *(f"{end + 0.0:.6g}" for end in (samples.min(), samples.max())),
+        ]
+        for name, samples in found.channels.items()
+    ]
     notes = reading_notes([found])
-    return [Table(headings, rows), Text(notes, "note", listed=True) if notes else None]
+    return [
+        Table(["Channel", "Unit", "Lowest", "Highest"], rows),
+        Text(notes, "note", listed=True) if notes else None,
+    ]
 
 
 def contents(found: Contents) -> list[Item]:
@@ -517,37 +516,21 @@ def rigs(found: Mapping[str, Any]) -> list[Item]:
     ]
 
 
-def device(found: Driven) -> list[Item]:
-    """Return the description of a device, its ports, and its recording."""
-    one = found.device
-
-    def state(when: str, now: State) -> str:
-        return f"{when}: {'safe' if now.is_safe else 'driven'} after {now.steps} steps."
-
-    states = [found.before] if found.after is None else [found.before, found.after]
-    ports = [("input", p) for p in one.inputs] + [("output", p) for p in one.outputs]
-    values = [[*now.inputs.tolist(), *now.outputs.tolist()] for now in states]
+def device(found: Device, state: State) -> list[Item]:
+    """Return the description of a device, its ports, and their values."""
+    ports = [("input", p) for p in found.inputs] + [("output", p) for p in found.outputs]
+    values = [*state.inputs.tolist(), *state.outputs.tolist()]
     rows = [
-        [
-            kind,
-            p.name,
-            p.unit,
-            p.low,
-            p.high,
-            p.safe if kind == "output" else "",
-            *(v[k] for v in values),
-        ]
-        for k, (kind, p) in enumerate(ports)
+        [kind, p.name, p.unit, p.low, p.high, p.safe if kind == "output" else "", value]
+        for (kind, p), value in zip(ports, values, strict=True)
     ]
-    whens = ["before", "after"][: len(states)]
     about = (
-        f"Model {one.fingerprint}: a step every {one.period:g} s, safe after "
-        f"{one.period * one.silence:g} s of silence."
+        f"Model {found.fingerprint}: a step every {found.period:g} s, safe after "
+        f"{found.period * found.silence:g} s of silence."
     )
-    return [
-        Text([about, *map(state, ("Before", "After"), states)]),
-        Table(["", "Channel", "Unit", "Lowest", "Highest", "Safe", *whens], rows),
-    ]
+    now = f"Now: {'safe' if state.is_safe else 'driven'} after {state.steps} steps."
+    headings = ["Kind", "Channel", "Unit", "Lowest", "Highest", "Safe", "Value"]
+    return [Text([about, now]), Table(headings, rows)]
 
 
 FACES: Mapping[str, Callable[[Any], list[Item]]] = MappingProxyType(

@@ -25,11 +25,8 @@ from mckibben.signals.reversals import branches as branches
 from mckibben.signals.reversals import cycles as cycles
 from mckibben.signals.reversals import noise_level as noise_level
 from mckibben.signals.reversals import reversals as reversals
-from mckibben.signals.splitting import branches_of as branches_of
 from mckibben.signals.splitting import split_cycles as split_cycles
-from mckibben.signals.splitting import split_time as split_time
 from mckibben.signals.steps import binary_steps as binary_steps
-from mckibben.signals.steps import random_steps as random_steps
 from mckibben.signals.steps import staircase as staircase
 from mckibben.signals.thinning import decimate_minmax as decimate_minmax
 from mckibben.signals.zeroing import zeroed as zeroed

@@ -18,17 +18,6 @@ FEWEST = 10
 MOST = 100_000
 """Largest number of samples to fit to, and to test on."""
 
-HUGE = 1_000_000
-"""Samples above which fewer are taken, of stretches: tens of models are then done in minutes."""
-
-MOST_OF_HUGE = 40_000
-
-PER_SWING = 20
-"""Smallest number of samples per swing of the input, before segments are cut out instead."""
-
-STRETCHES = 4
-"""Taken of each recording, spread evenly."""
-
 
 def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
     """Return a recording with one sample per ``factor``, including turning points.
@@ -91,9 +80,6 @@ def made_manageable(
 ) -> tuple[list[Recording], list[Recording], tuple[str, ...]]:
     """Return recordings thinned alike to at most so many samples for fit and test.
 
-    Without a number given, huge recordings are thinned no further than leaves their swings in shape; of
-    what is then still too much, stretches of samples in a row are taken, each with a start of its own.
-
     Parameters
     ----------
     train, test : sequence of Recording
@@ -101,8 +87,7 @@ def made_manageable(
     channel : str
         What drives.
     most : int, optional
-        Samples of all training recordings together, and of all test recordings; default `MOST`, or
-        `MOST_OF_HUGE` where there are more than `HUGE`.
+        Samples of all training recordings together, and of all test recordings; default `MOST`.
 
     Returns
     -------
@@ -115,23 +100,18 @@ def made_manageable(
     DataError
         If the limit is not positive, or leaves nothing.
     """
+    most = MOST if most is None else most
+    require(most >= FEWEST, "most_samples", most, f"{FEWEST} or more", DataError)
     total = max(sum(map(len, train)), sum(map(len, test)))
-    stretched = most is None and total > HUGE
-    limit = most if most is not None else MOST_OF_HUGE if stretched else MOST
-    require(limit >= FEWEST, "most_samples", limit, f"{FEWEST} or more", DataError)
-    factor = -(-total // limit)
+    factor = -(-total // most)
     if factor == 1:
         return list(train), list(test), ()
-    if stretched:
-        factor = max(1, min(factor, _swing(train, channel) // PER_SWING))
     step = train[0].sample_time
     grid = "" if step is None else f", {step * factor:g} s apart: models hold for that sample time"
-    notes = []
-    if factor > 1:
-        notes.append(
-            f"{total} samples are many: one in {factor} is used{grid}, turning points first. Models are "
-            "fitted, chosen and tested on those."
-        )
+    notes = [
+        f"{total} samples are many: one in {factor} is used{grid}, turning points first. Models are "
+        "fitted, chosen and tested on those."
+    ]
     aligned = [_continuing(recording, train, factor) for recording in test]
     parts, lost = [], 0
     for recordings in (list(train), aligned):
@@ -152,41 +132,7 @@ def made_manageable(
         notes.append(
             f"{lost} turning points lie too close to others and are lost: allow more samples."
         )
-    if stretched:
-        left = [sum(map(len, recordings)) for recordings in parts]
-        parts = [_stretches(some, limit) for some in parts]
-        for some, before, role in zip(parts, left, ("fitted to", "tested on"), strict=True):
-            now = sum(map(len, some))
-            if now < before:
-                notes.append(
-                    f"{total} samples are many: of {before} that could be {role}, {now} are used, in "
-                    f"{len(some)} stretches spread evenly, all samples in a row; see `most_samples`"
-                )
     return parts[0], parts[1], tuple(notes)
-
-
-def _swing(recordings: Sequence[Recording], channel: str) -> int:
-    """Return the samples of the median swing of the input."""
-    swings = [np.diff(reversals(recording[channel])) for recording in recordings]
-    return int(np.median(np.concatenate(swings)))
-
-
-def _stretches(recordings: Sequence[Recording], most: int) -> list[Recording]:
-    """Return segments of recordings, evenly spaced, with a total length up to a limit."""
-    share = most / max(sum(map(len, recordings)), 1)
-    if share >= 1:
-        return list(recordings)
-    found = []
-    for recording in recordings:
-        n = int(share * len(recording)) // STRETCHES
-        gap = (len(recording) - n) // (STRETCHES - 1)
-        if n >= FEWEST:
-            pieces = [recording.slice(k * gap, k * gap + n) for k in range(STRETCHES)]
-            found += [
-                piece.with_meta(name=f"{recording.name}, stretch {k}")
-                for k, piece in enumerate(pieces, start=1)
-            ]
-    return found
 
 
 def _continuing(recording: Recording, others: Sequence[Recording], factor: int) -> Recording:

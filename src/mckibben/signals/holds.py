@@ -22,10 +22,10 @@ ALTERNATING = 0.1
 def holds(columns: Array, spans: Sequence[float] | None = None, shortest: int = 10) -> list[slice]:
     """Return the segments in which every column is constant, in order of time.
 
-    A column stands still while it stays within 1 % of its range, what its noise reaches or one step
-    of its resolution to either side, whichever is widest. Stretches are as long as they can be and do
-    not overlap. A slow ramp is none: a stretch of windows that stand still must not be longer than
-    twice the longest of them.
+    A column is constant while it stays within 1 % of its range, its noise or one step of its
+    resolution to either side, whichever is widest. Holds are as long as possible and do not overlap. A
+    slow ramp is no hold: a sequence of constant windows must not be longer than twice the longest of
+    them.
 
     Parameters
     ----------

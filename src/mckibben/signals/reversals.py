@@ -15,7 +15,7 @@ NOISE_SHARE = 0.05
 """Sample-to-sample scatter, as a share of the range, above which it counts as motion, not noise."""
 
 SLIGHT = 1e-3
-"""Scatter below this share of the range is small whatever makes it."""
+"""Scatter below this share of the range counts as small."""
 
 GROWS = 1.5
 """Scatter that grows so much over every second of so many samples is of movement."""
@@ -99,7 +99,7 @@ def reversals(x: ArrayLike, threshold: float | None = None) -> Indices:
 
     Between two turning points the signal never swings back by more than the threshold, and each is
     the extreme sample of the branches that meet there; of a plateau it is the last sample, so that
-    a hold belongs to the branch that led to it. A hold within a branch is no reversal. Only the
+    a hold is part of the branch before it. A hold within a branch is no reversal. Only the
     first and last sample may be less extreme than a neighbour, by at most the threshold.
 
     Parameters
@@ -190,7 +190,7 @@ def cycles(x: ArrayLike, threshold: float | None = None) -> list[slice]:
 def whole_cycles(x: Array, turns: Indices, whole: float = WHOLE) -> list[slice]:
     """Return the whole cycles between known turning points.
 
-    At either end of the signal, so much of the other branch as ``whole`` says is enough.
+    At either end of the signal, a branch counts as whole from this share of the other one.
     """
     heights = x[turns]
     # A minimum, a maximum and a minimum in a row, wherever the first two rise.

@@ -1,4 +1,4 @@
-"""Splitting a recording: in time, at its cycles, or into its branches."""
+"""Splitting a recording at its cycles."""
 
 from __future__ import annotations
 
@@ -8,31 +8,7 @@ import numpy as np
 
 from mckibben.errors import DataError, require
 from mckibben.recording import Recording
-from mckibben.signals.reversals import branches, reversals
-
-
-def split_time(recording: Recording, fraction: float) -> tuple[Recording, Recording]:
-    """Return the first part of a recording, and the rest, which continues it.
-
-    Parameters
-    ----------
-    fraction : float
-        Share of the samples in the first part, between 0 and 1.
-
-    Raises
-    ------
-    DataError
-        If either part would have fewer than two samples.
-    """
-    n = len(recording)
-    at = round(fraction * n) if 0 < fraction < 1 else 0
-    if min(at, n - at) < 2:
-        raise DataError(
-            f"a share of {fraction} of {n} samples leaves a part with fewer than two",
-            file=recording.source,
-            remedy="give a share further inside 0 and 1, or a longer recording",
-        )
-    return recording.slice(0, at), recording.slice(at, n)
+from mckibben.signals.reversals import reversals
 
 
 def split_cycles(recording: Recording, channel: str, n_blocks: int) -> list[tuple[int, int]]:
@@ -75,20 +51,3 @@ def split_cycles(recording: Recording, channel: str, n_blocks: int) -> list[tupl
     nearest = allowed[np.abs(allowed[:, np.newaxis] - wanted).argmin(axis=0)]
     cuts = [0, *np.unique(nearest).tolist(), n]
     return list(pairwise(cuts))
-
-
-def branches_of(
-    recording: Recording, channel: str, threshold: float | None = None
-) -> list[Recording]:
-    """Return the monotonic branches of a recording, each as a recording.
-
-    Parameters
-    ----------
-    channel : str
-        The input, whose reversals part the branches.
-    threshold : float, optional
-        Smallest swing back that is a reversal; see `reversals`.
-    """
-    return [
-        recording.slice(start, stop) for start, stop, _ in branches(recording[channel], threshold)
-    ]

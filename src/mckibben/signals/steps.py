@@ -102,52 +102,6 @@ def binary_steps(
     return staircase(t, (low + (high - low) * bits).tolist(), hold - ramp, ramp)
 
 
-def random_steps(
-    time: ArrayLike,
-    high: float,
-    low: float = 0.0,
-    shortest: float = 1.0,
-    longest: float = 5.0,
-    ramp: float = 0.0,
-    *,
-    seed: int,
-) -> Array:
-    """Return random levels of random durations.
-
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        Time from the start of the first hold [s].
-    high, low : float
-        Between which levels are drawn evenly, high above low; the first is ``low``.
-    shortest, longest : float
-        Between which the times of a hold are drawn evenly [s], with the ramp that ends it.
-    ramp : float
-        Time that the way to the next level takes [s], below ``shortest``; 0 for a jump.
-    seed : int
-        Of levels and times.
-
-    Raises
-    ------
-    DataError
-        On high not above low, times that are not positive or not in order, or too long a ramp.
-    """
-    t = as_time(time)
-    require_order(low, high)
-    n = _holds(t, shortest, ramp)
-    require(shortest <= longest < np.inf, "longest", longest, f"{shortest:g} s or more", DataError)
-    rng = generator(seed)
-    levels = rng.uniform(low, high, n + 1)
-    levels[0] = low
-    ends = np.cumsum(rng.uniform(shortest, longest, n))
-    place = np.searchsorted(ends, t, side="right")
-    here, after = levels[place], levels[np.minimum(place + 1, n)]
-    if ramp == 0:
-        return np.asarray(here)
-    share = np.clip(1.0 - (np.append(ends, np.inf)[place] - t) / ramp, 0.0, 1.0)
-    return np.asarray(here + share * (after - here))
-
-
 def _holds(t: Array, hold: float, ramp: float) -> int:
     """Return the number of holds that fill the time."""
     require_positive("hold", hold)

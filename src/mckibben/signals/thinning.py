@@ -12,7 +12,7 @@ from mckibben.errors import DataError
 def decimate_minmax(t: ArrayLike, *series: ArrayLike, max_points: int) -> tuple[Array, ...]:
     """Return the lowest and highest sample of every bin, for display.
 
-    Bins hold equally many samples. Every series keeps its own extrema, and all are thinned to the
+    Bins hold equally many samples. The extrema of every series remain, and all are thinned to the
     same samples, so that one may be drawn over another. The first and last sample stay where there
     is room.
 

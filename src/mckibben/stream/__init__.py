@@ -1,9 +1,8 @@
-"""Real-time loops in Python: a fixed rate with deadline statistics, and a link to the robot."""
+"""Real-time loops in Python: a fixed rate with deadline statistics."""
 
 from __future__ import annotations
 
 from mckibben.stream.fixed_rate import Deadlines as Deadlines
 from mckibben.stream.fixed_rate import FixedRate as FixedRate
-from mckibben.stream.link import UDPLink as UDPLink
 from mckibben.stream.stepping import Step as Step
 from mckibben.stream.stepping import run as run

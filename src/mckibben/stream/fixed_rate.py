@@ -2,8 +2,7 @@
 
 Deadlines are counted from the start, so that lateness does not add up: after a late step the next
 ones catch up, and deadlines that passed while a step took too long are skipped and counted as missed.
-A clock that is set back counts as one that stood still. Python on a desktop system gives no guarantee;
-the statistics tell what it gave.
+Python on a desktop system gives no guarantee; the statistics have what was achieved.
 """
 
 from __future__ import annotations
@@ -90,8 +89,6 @@ class FixedRate:
     _lateness: deque[float] = field(default_factory=deque, init=False, repr=False)
     _work: deque[float] = field(default_factory=deque, init=False, repr=False)
     _missed: int = field(default=0, init=False, repr=False)
-    _read: float = field(default=-math.inf, init=False, repr=False)
-    _back: float = field(default=0.0, init=False, repr=False)
 
     def __post_init__(self) -> None:
         require(0 < self.period < math.inf, "period", self.period, "a positive time [s]")
@@ -107,31 +104,24 @@ class FixedRate:
         self._lateness, self._work = deque(maxlen=MOST_STORED), deque(maxlen=MOST_STORED)
         self._missed = 0
         n = math.inf if math.isinf(self.duration) else round(self.duration / self.period)
-        start, number = self._now(), 0
+        start, number = self.clock(), 0
         while number < n:
             deadline = start + number * self.period
             self._wait(deadline)
-            began = self._now()
+            began = self.clock()
             try:
                 yield number
             finally:
-                ended = self._now()
+                ended = self.clock()
                 self._lateness.append(began - deadline)
                 self._work.append(ended - began)
             following = max(number + 1, math.floor((ended - start) / self.period))
             self._missed += int(min(following, n)) - number - 1
             number = following
 
-    def _now(self) -> float:
-        """Return the time from a monotonic clock."""
-        read = self.clock()
-        self._back += max(self._read - read, 0.0)
-        self._read = read
-        return read + self._back
-
     def _wait(self, deadline: float) -> None:
         while True:
-            left = deadline - self._now()
+            left = deadline - self.clock()
             if left <= 0.0:
                 return
             if left > SPIN:

@@ -112,7 +112,6 @@ def record_protocol(
     *,
     rig: str | None = None,
     changes: Mapping[str, Any] | None = None,
-    file_format: str = "csv",
     only: str | None = None,
     seed: int = 0,
     jobs: int | None = None,
@@ -142,14 +141,14 @@ def record_protocol(
         listed = ", ".join(run.name for run in plan.runs[:5])
         problem = f"no run of {name!r} has {only!r} in its name"
         raise DataError(problem, parameter="only", remedy=f"there are {listed}, ...")
-    text, place = to_json(_roles(plan, plant, seed, file_format)) + "\n", folder / "protocol.json"
+    text, place = to_json(_roles(plan, plant, seed)) + "\n", folder / "protocol.json"
     if os.path.lexists(place) and ordinary.read_text(place, most=ordinary.DESCRIPTION) != text:
         raise DataError(
             "the folder holds another protocol, rig or seed",
             file=place,
             remedy="give another folder, or remove this one",
         )
-    files = {run: folder / f"{run}.{file_format}" for run in runs}
+    files = {run: folder / f"{run}.csv" for run in runs}
     there = [run for run, file in files.items() if is_own(file)]
     with written(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -165,7 +164,7 @@ def record_protocol(
     return wanted, there
 
 
-def _roles(plan: Protocol, rig: Rig, seed: int, file_format: str) -> dict[str, Any]:
+def _roles(plan: Protocol, rig: Rig, seed: int) -> dict[str, Any]:
     return {
         "protocol": plan.name,
         "source": plan.source,
@@ -175,7 +174,7 @@ def _roles(plan: Protocol, rig: Rig, seed: int, file_format: str) -> dict[str, A
         "runs": [
             {
                 "name": run.name,
-                "file": f"{run.name}.{file_format}",
+                "file": f"{run.name}.csv",
                 "role": run.role,
                 "labels": dict(run.labels),
                 "settings": dict(run.settings),

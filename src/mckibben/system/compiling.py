@@ -13,7 +13,6 @@ import re
 import sys
 import tempfile
 import threading
-import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -33,15 +32,12 @@ from mckibben.version import __version__
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 DIGEST = sha256().digest_size
-"""Bytes before what was compiled, by which a damaged file is known."""
+"""Bytes before the compiled code, by which a damaged file is detected."""
 
 _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """No entry for C: it would hold all the code again, and nothing calls it."""
 
 _lock = threading.Lock()
-
-UNUSED = 30 * 86400.0
-"""Time after which what other versions of the package cached is removed [s]."""
 
 
 @cache
@@ -55,15 +51,9 @@ def cache_folder() -> Path | None:
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
-        os.utime(folder)
     except OSError:
         _note(f"compiled functions are not cached: {folder} cannot be written to")
         return None
-    for other in {base, *base.iterdir()} - {folder}:
-        with suppress(OSError):
-            if time.time() - other.stat().st_mtime > UNUSED:
-                for path in other.glob("*.nbc"):
-                    path.unlink()
     return folder
 
 
@@ -145,8 +135,8 @@ def deferred(function: Function, **options: Any) -> Function:
 def _with_digest(given: Any, digest: str) -> Callable[..., Any]:
     """Return a function with a digest of its content in its name.
 
-    Numba calls compiled code by name. Two functions of one name, as those that one function makes, would
-    be taken for each other where they come from files that two processes wrote.
+    Numba calls compiled code by name. Two functions of one name, such as those that one function makes,
+    would be mixed up if they come from files that two processes wrote.
     """
     code, known, closure = given.__code__, given.__globals__, given.__closure__
     own = FunctionType(code, known, given.__name__, given.__defaults__, closure)
@@ -172,8 +162,8 @@ def _compile_alike(compiled: Any) -> None:
 class _Cache:
     """Cache of compiled functions: a file per signature, named after a digest of the content.
 
-    So a file is never of anything else, whatever other processes write at the same time. Numba's own
-    cache shares one file among functions of one name, as of kernels that one function made.
+    So processes that write at the same time do not mix functions up. Numba's own cache shares one file
+    among functions of one name, such as kernels made by one function.
 
     ``digest`` is that of `made_of`.
     """
@@ -203,7 +193,7 @@ class _Cache:
             return result._rebuild(target_context, *pickle.loads(content[DIGEST:]))
         except (FileNotFoundError, ImportError):  # of what it calls, which was elsewhere
             return None
-        except Exception:  # whatever is wrong with it, it can be compiled again
+        except Exception:  # it is compiled again
             _note("compiled functions in the cache were damaged, and are compiled again")
             return None
 

@@ -6,7 +6,6 @@ looked at, so that nothing can be put in its place in between.
 
 from __future__ import annotations
 
-import io
 import os
 import stat
 from collections.abc import Iterator
@@ -18,18 +17,6 @@ from mckibben.errors import DataError
 
 DESCRIPTION = 4 * 2**20
 """Bytes that a description (a sidecar, a protocol, a job, a rig) may have."""
-
-_SMALL = 2**16
-"""Bytes that are read without a look at how many there are."""
-
-
-class _Ordinary(io.BufferedReader):
-    """A file whose reads are limited to its remaining size, whatever a format states."""
-
-    def read(self, size: int | None = -1, /) -> bytes:
-        if size is not None and size > _SMALL:
-            size = min(size, max(0, os.fstat(self.fileno()).st_size - self.tell()))
-        return super().read(size)
 
 
 @contextmanager
@@ -60,7 +47,7 @@ def opened(path: str | Path, *, most: int) -> Iterator[BufferedReader]:
         if found.st_size > most:
             problem = f"{found.st_size} bytes are more than the {most} that are read"
             raise DataError(problem, file=path, remedy="cut it into smaller files")
-        with _Ordinary(io.FileIO(number, "rb", closefd=False)) as file:
+        with open(number, "rb", closefd=False) as file:
             yield file
     finally:
         os.close(number)

@@ -1,7 +1,6 @@
 """Base classes of results with display on terminals, in notebooks, and in plots.
 
-How each kind is shown is in the report, which lies above all that is shown; it is looked up by name
-when it is asked for.
+The report defines how each kind is shown. As the report imports these classes, it is looked up by name.
 """
 
 from __future__ import annotations

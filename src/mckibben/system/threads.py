@@ -1,7 +1,7 @@
 """Number of cores used by a call.
 
-Matrices here are small: linear algebra on all cores takes longer than on one, and many times as long
-beside other work. So it gets one thread, and cores are for models, folds and starts.
+Matrices here are small: linear algebra on all cores takes longer than on one, and much longer while
+other processes run. It has one thread; cores are for models, folds and starts.
 """
 
 from __future__ import annotations

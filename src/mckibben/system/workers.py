@@ -1,9 +1,8 @@
 """Worker processes that start fast and can be ended at once.
 
-joblib's cannot be stopped within a second and load the library each for themselves; it serves clusters
-(`mckibben.comparison.backends`). These are forked, where the system can, from a server that has loaded
-the library. They never run the user's script again, ignore Ctrl-C, and end with the process that they
-work for, however that one ends.
+joblib's cannot be stopped within a second and load the library each for themselves. These are forked,
+where the system can, from a server that has loaded the library. They never run the user's script again,
+ignore Ctrl-C, and end with the process that they work for, however that one ends.
 """
 
 from __future__ import annotations
@@ -150,7 +149,7 @@ class Workers:
             for link in [link for link in busy if link in ready]:
                 index = busy[link]
                 try:
-                    kind, what = understood(link.recv_bytes())
+                    kind, what = pickle.loads(link.recv_bytes())
                 except (EOFError, OSError):
                     kind, what = (
                         "error",
@@ -269,22 +268,10 @@ def context(*more: str) -> Any:
 
 
 def end_with_parent() -> None:
-    """End this process when its parent ends.
-
-    On Linux the system does so: a thread would wait as long as compiled code keeps all others from
-    running.
-    """
+    """End this process when its parent ends."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return
-    if sys.platform == "linux":
-        import fcntl
-
-        # the parent holds the other end of this pipe, and writes nothing more to it
-        fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(parent.sentinel, fcntl.F_SETSIG, signal.SIGKILL)
-        flags = fcntl.fcntl(parent.sentinel, fcntl.F_GETFL)
-        fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, flags | os.O_ASYNC)
     if not parent.is_alive():
         os._exit(1)
 
@@ -304,18 +291,15 @@ def _serve(link: connection.Connection, common: Any, cores: int) -> None:
     def tell(*progress: Any) -> None:
         link.send_bytes(pickle.dumps(("progress", progress)))
 
-    def call(_: Any, given: bytes, tell: Tell) -> Any:
-        work, item = pickle.loads(given)
-        return work(common, item, tell)
-
     with threads.one_blas_thread(), suppress(EOFError):
         while True:
-            link.send_bytes(answered(call, None, link.recv_bytes(), tell))
+            link.send_bytes(_answer(link.recv_bytes(), common, tell))
 
 
-def answered(work: Work, common: Any, item: Any, tell: Tell) -> bytes:
+def _answer(given: bytes, common: Any, tell: Tell) -> bytes:
     """Do the work, and return its value or error for sending; unsendable values become errors."""
     try:
+        work, item = pickle.loads(given)
         return pickle.dumps(("value", work(common, item, tell)))
     except Exception as error:
         with suppress(Exception):
@@ -323,25 +307,7 @@ def answered(work: Work, common: Any, item: Any, tell: Tell) -> bytes:
             again = pickle.loads(answer)[1]
             if type(again) is type(error) and str(again) == str(error):
                 return answer
-        return pickle.dumps(("error", WorkerError(said(error))))
-
-
-def understood(answer: bytes) -> tuple[str, Any]:
-    """Return whether a message is progress, a value or an error, and its content."""
-    try:
-        kind, what = pickle.loads(answer)
-        return kind, what
-    except Exception as error:
-        words = f"the answer of its process cannot be read: {said(error)}"
-        return "error", WorkerError(words, remedy="use the same versions everywhere")
-
-
-def said(error: Exception) -> str:
-    """Return the text of an error, guarding against errors in its formatting."""
-    try:
-        return f"{type(error).__name__}: {error}"
-    except Exception:
-        return type(error).__name__
+        return pickle.dumps(("error", WorkerError(f"{type(error).__name__}: {error}")))
 
 
 @contextmanager

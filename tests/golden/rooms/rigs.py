@@ -115,9 +115,7 @@ def environment(folder: Path) -> Tree:
 
     made = {
         "mas20-hanging": gymnasium.make("mckibben/mas20-hanging-v2"),
-        "spread": mckibben.environments.Tracking(
-            "mas20-hanging", duration=2.0, preview=2, spread=0.1
-        ),
+        "preview": mckibben.environments.Tracking("mas20-hanging", duration=2.0, preview=2),
     }
     found: dict[str, Tree] = {}
     for name, env in made.items():

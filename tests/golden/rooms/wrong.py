@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -18,11 +18,10 @@ from scipy.io import loadmat
 import mckibben
 from mckibben import MckibbenError, Recording, registry
 from mckibben.control import track
-from mckibben.link import Device, Port, State
 from tests import recordings
 from tests.golden.case import Case, Tree
 from tests.golden.commands import answered, call
-from tests.golden.plants import STEP, Array, cycles, noise, play, runs
+from tests.golden.plants import STEP, cycles, noise, play, runs
 from tests.golden.rooms.commands import MODEL
 
 SCALED = ("balance", "bouc-wen", "cpi", "duhem", "gpi", "kp", "mpi")
@@ -267,57 +266,6 @@ def perfect(folder: Path) -> Tree:
     return {"codes": codes}
 
 
-class Device32:
-    """A device whose counter of steps goes round while it is recorded."""
-
-    def __init__(self, *given: Any, **named: Any) -> None:
-        port = partial(Port, low=0.0, high=6.0, safe=0.0)
-        self.device = Device(
-            fingerprint="0123456789abcdef",
-            period=0.01,
-            silence=50,
-            numbers="float64",
-            n_memory=0,
-            inputs=(port(name="displacement", unit="mm"),),
-            outputs=(port(name="pressure", unit="bar"),),
-            n_missable=0,
-        )
-        self._told = False
-
-    def __enter__(self) -> Device32:
-        return self
-
-    def __exit__(self, *given: object) -> None:
-        pass
-
-    def state(self, steps: int = 0) -> State:
-        notes = get_type_hints(State)["notes"](1)
-        return State(notes, steps, np.array([3.0]), np.array([12.0]))
-
-    def set(self, inputs: Array) -> State:
-        return self.state()
-
-    def stream(self, every: int) -> None:
-        pass
-
-    def samples(self, timeout: float = 0.0) -> list[State]:
-        if self._told:
-            return []
-        self._told = True
-        return [self.state((2**32 - 5 + k) % 2**32) for k in range(10)]
-
-
-def counter(folder: Path) -> Tree:
-    """A recording goes on where a device's counter of steps goes round."""
-    words = ("link", "/dev/nothing", "--set", "displacement=12", "--seconds", "0.05")
-    with patch("mckibben.link.Link", Device32):
-        result = call(*words, "-o", folder / "device.csv")
-    if result.code or not (folder / "device.csv").exists():
-        return {"code": result.code, "n_samples": 0}
-    (found,) = mckibben.read(folder / "device.csv")
-    return {"code": result.code, "n_samples": len(found)}
-
-
 CASES: Mapping[str, tuple[str, Callable[[Path], Tree], Mapping[str, Any]]] = {
     "zeroing": ("mckibben.compare(two runs that never rest)", zeroing, {}),
     **{
@@ -343,7 +291,6 @@ CASES: Mapping[str, tuple[str, Callable[[Path], Tree], Mapping[str, Any]]] = {
     "studied-again": ("mckibben study, stopped the second time", studied_again, {}),
     "arrays": ("mckibben.compare(array)", arrays, {}),
     "perfect-log": ("mckibben study log.csv --compensator inverse.json", perfect, {}),
-    "step-counter": ("mckibben link -o device.csv", counter, {}),
 }
 
 

@@ -28,9 +28,6 @@ WRONG: Mapping[str, tuple[str, Options]] = {
     "titles-of-two-cells": ("wrong/titles.xlsx", {}),
     "shift-jis": ("wrong/shift-jis.csv", {}),
     "japanese-utf-8": ("wrong/japanese.csv", {}),
-    "lvm": ("wrong/labview.lvm", {}),
-    "lvm-called-txt": ("wrong/labview.txt", {}),
-    "lvm-in-a-folder": ("wrong/labview", {}),
     "bara": ("wrong/bara.csv", {}),
     "psia": ("wrong/psia.csv", {}),
     "unit-row-denies-header": ("wrong/unit-row.csv", {}),
@@ -88,13 +85,6 @@ def _told(recording: mckibben.Recording, only: tuple[str, ...], issued: Mapping[
     return told
 
 
-def compared(place: str, folder: Path) -> Tree:
-    """Compare one model on a recording."""
-    recordings = mckibben.read(FILES / place)
-    board, refused, _ = caught(lambda: mckibben.compare(recordings, models=["pi"], jobs=1))
-    return {"best": board.best.model} if refused is None else refusal(refused)
-
-
 def cases() -> Iterator[Case]:
     """Yield the cases; right answers are worked out in another way, hence not equal to the bit."""
     for name, (place, options) in WRONG.items():
@@ -102,6 +92,3 @@ def cases() -> Iterator[Case]:
         call = f"mckibben.read({place!r}{said})"
         run = partial(seen, place, options, ONLY.get(name, ()))
         yield Case(f"files/right-{name}", call, run, {"*": 1e-12})
-    place = "wrong/output-first.csv"
-    call = f"mckibben.compare(mckibben.read({place!r}), models=['pi'])"
-    yield Case("files/right-output-before-cause", call, partial(compared, place))

@@ -22,7 +22,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, Cost, needs_sample_time, one_per
+from mckibben.blocks.base import Block, needs_sample_time, one_per
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
@@ -209,11 +209,6 @@ class StateNetwork(Block):
         head = [step, self.substeps, self.hold == "zero", len(self.linear), len(self.hidden)]
         scales = [self.input_offset, self.input_scale, self.output_offset, self.output_scale]
         return np.array([*head, *scales, *self.pack()])
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of a step: every weight four times per substep, and activations."""
-        operations = self.substeps * 4 * (2 * self.n_parameters + 20 * len(self.hidden))
-        return Cost(operations, operations)
 
     def start_numbers(self) -> Array:
         """Return the coefficients at an admissible sample time."""

@@ -35,7 +35,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, Cost, Run, Start, needs_sample_time
+from mckibben.blocks.base import Block, Run, Start, needs_sample_time
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
@@ -190,11 +190,6 @@ class Oscillator(Block):
                 remedy=f"at least {np.ceil(10 * angle):.0f} substeps, or a shorter sample time",
             )
         return super().bind(sample_time, state, inputs, outputs)
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return the cost of a step: four slopes per substep."""
-        operations = self.substeps * 4 * (18 + self.element.size)
-        return Cost(operations, operations)
 
 
 @kernel

@@ -26,7 +26,6 @@ def info(
     from mckibben.blocks.setting import summary
     from mckibben.errors import DataError
     from mckibben.estimators.catalogue import described
-    from mckibben.files import has_columns
     from mckibben.reading import look
     from mckibben.report import results, text
     from mckibben.version import versions
@@ -45,7 +44,7 @@ def info(
             f"{named[0]!r} is a model, and there is no file of that name",
             remedy="list the models with `models`, or give a file",
         )
-    if len(files) == 1 and files[0].suffix.lower() == ".json" and not has_columns(files[0]):
+    if len(files) == 1 and files[0].suffix.lower() == ".json":
         about = summary(load(files[0]))
         show(about, lambda: text.lines(results.model(about)), as_json)
         return

@@ -17,7 +17,7 @@ from mckibben.options import Option, PlanOptions, ReadOptions
 def plan(
     options: PlanOptions,
     reading: ReadOptions,
-    out: Annotated[Path, Option("File to write: .csv, .tsv, .parquet.", "FILE", "-o")],
+    out: Annotated[Path, Option("File to write (.csv).", "FILE", "-o")],
     files: Annotated[
         tuple[Path, ...], Argument("[FILES]...", "What has been recorded; also of a plan before.")
     ] = (),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import click
 
@@ -62,7 +62,7 @@ def show_(
 @command
 def run(
     name: Name,
-    out: Annotated[Path, Option("File to write: .csv, .tsv, .parquet.", "FILE", "-o")],
+    out: Annotated[Path, Option("File to write (.csv).", "FILE", "-o")],
     signal: Annotated[
         tuple[str, ...],
         Option(
@@ -119,9 +119,6 @@ def record(
     out: Annotated[Path, Option("Folder to write the recordings to.", "DIR", "-o")],
     rig: Annotated[str | None, Option("Rig to record on. Default: the protocol's.", "RIG")] = None,
     changes: Changes = {},  # noqa: B006
-    file_format: Annotated[
-        Literal["csv", "tsv", "parquet"], Option("Of the files.", flag="--format")
-    ] = "csv",
     only: Annotated[str | None, Option("Only runs with TEXT in their name.", "TEXT")] = None,
     seed: Seed = 0,
     jobs: Jobs = None,
@@ -136,7 +133,7 @@ def record(
 
     with stoppable(out), telling(True, f"recording {protocol}") as tell:
         recorded, earlier = record_protocol(
-            protocol, out, rig=rig, changes=changes, file_format=file_format, only=only, seed=seed,
+            protocol, out, rig=rig, changes=changes, only=only, seed=seed,
             jobs=jobs, force=force, progress=tell,
         )  # fmt: skip
     more = f", {len(earlier)} were there already" if earlier else ""

@@ -19,7 +19,7 @@ def simulate(
     model: ModelFile,
     file: Annotated[Path, Argument("FILE", "Recording with the model's inputs.")],
     reading: ReadOptions,
-    out: Annotated[Path, Option("File to write: .csv, .tsv, .parquet.", "FILE", "-o")],
+    out: Annotated[Path, Option("File to write (.csv).", "FILE", "-o")],
     initial: Annotated[
         str,
         Option(

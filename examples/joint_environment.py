@@ -1,6 +1,6 @@
 """Many copies of a muscled joint in MuJoCo, stepped together, to learn a controller on.
 
-    from mckibben.vector_environment import JointTracking
+    from joint_environment import JointTracking
 
     env = JointTracking("joint.xml", 128)  # of `mckibben export mjcf ... --example joint`
     observations, info = env.reset(seed=1)
@@ -15,19 +15,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import gymnasium
+import mujoco
 import numpy as np
+from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError, require
-from mckibben.system.extras import demand
-
-demand("gymnasium", "gym", "environments")
-demand("mujoco", "mujoco", "simulations in MuJoCo")
-
-import gymnasium  # noqa: E402
-import mujoco  # noqa: E402
-from mujoco.batch import Batch  # noqa: E402
 
 Observations = NDArray[np.float32]
 

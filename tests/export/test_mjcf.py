@@ -168,7 +168,7 @@ def test_its_body_attaches_to_another_model_and_its_sites_are_anywhere(tmp_path:
 
 
 @pytest.mark.parametrize("step", [0.0005, 0.004])
-@pytest.mark.parametrize("example", ["hanging", "joint"])
+@pytest.mark.parametrize("example", ["hanging", "joint", "arm"])
 def test_examples_stay_within_their_ranges(example: Any, step: float) -> None:
     model = compiled(mjcf(MUSCLE, rest_length=REST, example=example), step)
     data, random = mujoco.MjData(model), np.random.default_rng(0)

@@ -37,7 +37,7 @@ CONSTANT = 1e3
 GRAVITY = 9.81
 """Of the examples [m/s^2]."""
 
-Example = Literal["hanging", "joint"]
+Example = Literal["hanging", "joint", "arm"]
 
 
 class Sites(NamedTuple):
@@ -72,8 +72,9 @@ def export_mjcf(
         Of the actuator and its tendon; the names of all else begin with it.
     sites : Sites, optional
         Sites of the model that includes the file: then it has the defaults, tendons and actuator alone.
-    example : {"hanging", "joint"}
-        Without sites: a load on a muscle, whose body can be attached elsewhere; or a joint between two.
+    example : {"hanging", "joint", "arm"}
+        Without sites: a load on a muscle, whose body can be attached elsewhere; a joint between two;
+        a plate on three.
     lag : float
         Time constant of the regulator, from command to pressure [s]; 0 for none.
     force : bool
@@ -307,5 +308,37 @@ def joint(root: ET.Element, muscle: Balance, rest: float, name: str) -> list[Sit
     return [Sites(f"{name}_{k}_from", f"{name}_{k}_to") for k in (1, 2)]
 
 
-WORLDS = {"hanging": hanging, "joint": joint}
+def arm(root: ET.Element, muscle: Balance, rest: float, name: str) -> list[Sites]:
+    """Add a plate that hangs on three muscles and can tilt; return their ends."""
+    radius = 1.5 * stroke(muscle)
+    places = [(radius * math.cos(a), radius * math.sin(a)) for a in np.radians((90, 210, 330))]
+    tops, ends = (
+        "".join(
+            f'<site name="{name}_{k}_{end}" pos="{_row(x, y, 0.0)}"/>'
+            for k, (x, y) in enumerate(places, start=1)
+        )
+        for end in ("from", "to")
+    )
+    _world(
+        root,
+        f"""
+          <body name="base" pos="0 0 {_row(2 * rest)}">
+            <geom type="cylinder" size="{_row(1.2 * radius)} 0.004" contype="0" conaffinity="0"/>
+            {tops}
+            <body name="plate" pos="0 0 {_row(-rest)}">
+              <joint name="shortening" type="slide" axis="0 0 1" limited="true"
+                     range="{_range(muscle)}"/>
+              <joint name="tilt_x" type="hinge" axis="1 0 0" limited="true" range="-45 45"/>
+              <joint name="tilt_y" type="hinge" axis="0 1 0" limited="true" range="-45 45"/>
+              <geom type="cylinder" size="{_row(1.2 * radius)} 0.004"
+                    mass="{0.3 * pull(muscle) / GRAVITY:.3g}"/>
+              {ends}
+            </body>
+          </body>
+        """,
+    )
+    return [Sites(f"{name}_{k}_from", f"{name}_{k}_to") for k in (1, 2, 3)]
+
+
+WORLDS = {"hanging": hanging, "joint": joint, "arm": arm}
 """Examples, by name."""

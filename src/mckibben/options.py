@@ -520,8 +520,8 @@ class MJCFOptions:
     ] = None
     site_to: Annotated[str | None, Option("Site that it pulls.", "SITE")] = None
     example: Annotated[
-        Literal["hanging", "joint"],
-        Option("Without sites: a load on a muscle, or a joint between two."),
+        Literal["hanging", "joint", "arm"],
+        Option("Without sites: a load on a muscle, a joint between two, or a plate on three."),
     ] = "hanging"
     lag: Annotated[float, Option("Time constant from command to pressure.", "SECONDS")] = 0.0
     name: Annotated[str | None, Option("Name of the actuator. Default: of the file.", "NAME")] = (

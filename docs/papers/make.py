@@ -25,7 +25,7 @@ HEAD = """# The five papers
 
 Made by `python docs/papers/make.py`; do not edit. Each page begins with where every system, equation,
 table and figure of its paper is; what is printed stands beside what a full run gives.
-`mckibben reproduce NAME` runs one again, `--data FOLDER` on recordings of your own muscle. Models with
+`mckibben reproduce NAME` runs one again, `--data FOLDER` on recordings of its protocol. Models with
 the parameters that a paper prints are `mckibben.papers.paper.printed(NAME)`.
 
 | number | paper | what it asks | with your muscle |

@@ -201,7 +201,10 @@ def _lines(found: Reproduction, date: str, pictures: str) -> Iterator[str]:
         yield f"### {heading(figure, quick=found.quick)}\n"
         yield f"![{figure.text.title}]({pictures}/{figure.key}.png)\n"
     yield "## On your own rig\n"
-    yield f"`mckibben reproduce {found.name} --data FOLDER` takes {paper.data}.\n"
+    yield (
+        f"`mckibben reproduce {found.name} --data FOLDER` takes recordings of the same protocol, from "
+        f"`mckibben rig record {found.name}` or in files named as its runs.\n"
+    )
 
 
 def _indexed(item: Indexed, found: Reproduction) -> str:

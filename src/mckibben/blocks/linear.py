@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.system.extras import demand
@@ -94,14 +94,6 @@ class LinearSystem:
         if len(self.a):
             held = held + self.c @ np.linalg.solve(np.eye(len(self.a)) - self.a, self.b)
         return np.asarray(self.output_offset + held @ (inputs - self.input_offset))
-
-    def response(self, frequencies: Array) -> NDArray[np.complex128]:
-        """Return the response at frequencies [Hz], shape (f,), as an array of shape (f, m, k)."""
-        if not len(self.a):
-            return np.broadcast_to(self.d.astype(complex), (len(frequencies), *self.d.shape))
-        z = np.exp(2j * np.pi * frequencies * (self.sample_time or 1.0))
-        inner = z[:, np.newaxis, np.newaxis] * np.eye(len(self.a)) - self.a
-        return np.asarray(self.c @ np.linalg.solve(inner, self.b.astype(complex)) + self.d)
 
 
 def as_scipy(block: Block, sample_time: float | None = None) -> dlti | lti:

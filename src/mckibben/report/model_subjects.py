@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from mckibben.control import Tracked
     from mckibben.diagnosis.check import OutputCheck
     from mckibben.diagnosis.patterns import Pattern
-    from mckibben.diagnosis.responses import FrequencyResponse
     from mckibben.diagnosis.review import Followed
     from mckibben.studying.inverting import InverseCheck
 
@@ -213,26 +212,3 @@ def parts(one: Followed, points: int = POINTS) -> Drawing:
         for name, given, zero in ((one.output, above, False), ("error", below, True))
     ]
     return Drawing(tuple(panels), stacked=True)
-
-
-def frequency_response(found: FrequencyResponse) -> Drawing:
-    """Draw gain and angle over frequency, with bounds and measurements."""
-    given, wanted = found.input, found.output
-    unit = "" if given.unit == wanted.unit else f"{wanted.unit or '1'}/{given.unit or '1'}"
-    gain = axis_label(f"gain to {wanted.name}", unit)
-    rows: tuple[tuple[str, Literal["xy", "x"], Any, Any, Any], ...] = (
-        (gain, "xy", found.gain, found.gain_interval, found.measured_gain),
-        ("angle [deg]", "x", found.angle, found.angle_interval, found.measured_angle),
-    )
-    panels = []
-    for label, axes, values, interval, measured in rows:
-        name = label == gain  # in the first legend only
-        curves = [
-            Curve(found.measured_frequency, measured, "recorded" * name, "measured", "specks"),
-            Curve(found.frequency, values, "model" * name, "series-1"),
-        ]
-        for end, word in zip(interval or (), ("95 %", ""), strict=False):
-            curves.append(Curve(found.frequency, end, word * name, "series-1", "fine"))
-        panels.append(Panel("frequency [Hz]", label, tuple(curves), logarithmic=axes))
-    note = "" if found.measured_frequency.size else "No frequency was recorded with high coherence."
-    return Drawing(tuple(panels), stacked=True, note=note)

@@ -196,7 +196,7 @@ def models(every: Mapping[str, Any]) -> list[Item]:
 
 
 def description(found: ModelDescription) -> list[Item]:
-    """Return a model's equations, parameters, and frequency responses."""
+    """Return a model's equations and parameters."""
     rows = [
         [
             one.name,
@@ -217,11 +217,6 @@ def description(found: ModelDescription) -> list[Item]:
             summary=f"{len(rows)} parameters" if len(rows) > UNFOLDED else "",
         ),
     ]
-    for one in found.frequency_responses:
-        name = one.output.name
-        label = f"Gain and angle of {name} over the frequency of {one.input.name}"
-        plots = [interactive.plots(model_subjects.frequency_response(one))]
-        items.append(Figure(f"response {name}", plots, label, f"{label}; dots: measured.", "tall"))
     return items
 
 

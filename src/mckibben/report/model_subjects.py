@@ -30,8 +30,7 @@ from mckibben.report.drawing import (
 if TYPE_CHECKING:
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.control import Tracked
-    from mckibben.diagnosis.check import OutputCheck
-    from mckibben.diagnosis.patterns import Pattern
+    from mckibben.diagnosis.check import OutputCheck, Pattern
     from mckibben.diagnosis.review import Followed
     from mckibben.studying.inverting import InverseCheck
 

@@ -439,20 +439,18 @@ def check(found: Validation) -> list[Item]:
 
 def checked(one: OutputCheck) -> list[Item]:
     """Return what a residual depends on, with its means over each variable, and all tests."""
-    share, missing, tests = "Share of the variance [%]", [], []
-    for each in one.missing:
-        p = words.probability(each.p_value)
-        missing.append([words.missed(one, each), 100 * each.share, each.size, p])
-    for each in one.suspects:
-        p = words.probability(each.p_value)
-        tests.append([words.missed(one, each), 100 * each.share, p])
+    headings = ["Cause", "Share of the variance [%]", f"RMS [{one.unit}]"]
+    missing, tests = (
+        [[words.missed(one, each), 100 * each.share, each.size] for each in some]
+        for some in (one.missing, one.suspects)
+    )
     panels = [interactive.plots(model_subjects.pattern(one, each))[0] for each in one.patterns]
     caption = f"Mean residual of {one.output}, with 95 % intervals that allow for autocorrelation."
     return [
         Text(words.check_notes(one)),
-        Table(["Missed", share, f"RMS [{one.unit}]", "p"], missing) if missing else None,
+        Table(headings, missing) if missing else None,
         Figure(f"patterns {one.output}", [panels], caption, caption, columns=2) if panels else None,
-        Table(["Test", share, "p"], tests, summary="All tests") if tests else None,
+        Table(headings, tests, summary="All causes tested") if tests else None,
     ]
 
 

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from mckibben.comparison.choosing import Against
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.diagnosis.bands import Calibration
+    from mckibben.diagnosis.causes import Cause
     from mckibben.diagnosis.characterization import Characterization
-    from mckibben.diagnosis.check import Finding, OutputCheck, Validation
+    from mckibben.diagnosis.check import OutputCheck, Validation
     from mckibben.diagnosis.data_gaps import Gap
     from mckibben.diagnosis.review import Review
     from mckibben.planning.planner import Plan
@@ -270,43 +271,25 @@ def check_verdict(found: Validation, *, sized: bool = True) -> str:
     return " ".join(_residual(one, sized=sized) for one in found.outputs)
 
 
-def check_sentences(found: Validation) -> list[str]:
-    """Return all findings on residuals, whether they are white, and one line of advice each."""
-    said = []
-    for one in found.outputs:
-        own = [] if one.exact else [_missed(one, each) for each in one.missing]
-        said += [
-            f"{one.output}: {each}" if len(found.outputs) > 1 else each
-            for each in (*own, *check_notes(one))
-        ]
-    return said
-
-
 def check_notes(one: OutputCheck) -> list[str]:
-    """Return whether a residual is white, and advice on its main finding."""
-    said = []
-    if one.whiteness.p_value is not None:
-        white = "white" if one.whiteness.p_value > WHITE else "not white"
-        said.append(f"The residual of {one.output} is {white} ({_p(one.whiteness.p_value)}).")
-    if one.missing and not one.exact:
-        said.append(_advice(_largest(one)))
-    return [*filter(None, said)]
+    """Return whether a residual is white."""
+    p = one.whiteness.p_value
+    if p is None:
+        return []
+    white = "white" if p > WHITE else "not white"
+    return [f"The residual of {one.output} is {white} (p = {probability(p)})."]
 
 
-def missed(one: OutputCheck, finding: Finding) -> str:
-    """Return the main finding on a residual in a few words, with alternatives."""
-    causes = [
-        _KINDS[kind].format(channel=channel or "the input")
-        for kind, channel in ((finding.kind, finding.channel), *finding.or_causes)
-    ]
-    step, unit = (one.sample_time, "s") if one.sample_time else (1.0, "samples")
-    value = finding.coefficient or 0.0
-    number = ""
-    if finding.kind == "offset":
-        number = f" of {numeral(value, 2)} {one.unit}".rstrip()
-    elif finding.kind == "lag" and value:
-        number = f", about {numeral(value * step, 2)} {unit}"
-    return " or ".join(causes) + number
+def missed(one: OutputCheck, cause: Cause) -> str:
+    """Return a cause of a residual in a few words."""
+    what = _KINDS[cause.kind].format(channel=cause.channel)
+    value = cause.coefficient or 0.0
+    if cause.kind == "offset":
+        return f"{what} of {size(one.unit, value)}"
+    if cause.kind == "lag" and value:
+        step, unit = (one.sample_time, "s") if one.sample_time else (1.0, "samples")
+        return f"{what}, about {size(unit, value * step)}"
+    return what
 
 
 WHITE = 0.01
@@ -314,7 +297,6 @@ WHITE = 0.01
 
 _KINDS = {
     "offset": "an offset",
-    "runs": "offsets that differ between recordings",
     "curve": "the curve over {channel}",
     "load": "{channel}",
     "hysteresis": "the branch of {channel} (hysteresis)",
@@ -325,56 +307,29 @@ _KINDS = {
     "output": "the position (curve or stop)",
 }
 
-_ADVICE = {
-    "load": "Fit a model that reads {channel}.",
-    "hysteresis": "Compare models with other hysteresis, as to branches and minor loops.",
-    "lag": "Fit a model with a lag, or measure pressure at the muscle.",
-    "speed": "Compare rate-dependent models.",
-    "creep": "Compare models with viscoelastic states.",
-    "output": "Check the rig for a stop or contact at the ends of its range.",
-}
-
 
 def _residual(one: OutputCheck, *, sized: bool = True) -> str:
-    size = f"{numeral(one.rmse, 2)} {one.unit}".rstrip()
-    of_range = f"{percent(one.rmse / one.span)} of its range"
+    error = size(one.unit, one.rmse)
     if one.exact:
-        return f"The residual of {one.output}, {size} RMS, is within rounding or the sensor's step."
+        return (
+            f"The residual of {one.output}, {error} RMS, is within rounding or the sensor's step."
+        )
     if one.useless:
         return (
-            f"The model is of no use for {one.output}: {size} RMSE, where the mean is off by "
+            f"The model is of no use for {one.output}: its RMSE is {error}, that of the mean "
             f"{numeral(one.mean_error, 2)}."
         )
-    residual = f"The residual of {one.output}" + (f", {size} RMS ({of_range})," if sized else "")
+    of_range = f", {error} RMS ({percent(one.rmse / one.span)} of its range)," if sized else ""
+    residual = f"The residual of {one.output}{of_range}"
     if not one.missing:
-        return f"{residual} follows none of {one.n_tests} causes tested."
-    first = _largest(one)
+        return f"{residual} follows none of {len(one.suspects)} causes tested."
+    first = max(one.missing, key=lambda cause: cause.share)
     return f"{residual} follows {missed(one, first)}: {percent(first.share)} of its variance."
 
 
-def _largest(one: OutputCheck) -> Finding:
-    return max(one.missing, key=lambda finding: finding.share)
-
-
-def _missed(one: OutputCheck, finding: Finding) -> str:
-    what = missed(one, finding)
-    return (
-        f"{what[0].upper()}{what[1:]}: {numeral(finding.size, 2)} {one.unit} RMS, "
-        f"{percent(finding.share)} of the residual's variance ({_p(finding.p_value)})."
-    )
-
-
-def _advice(first: Finding) -> str:
-    return "" if first.or_causes else _ADVICE.get(first.kind, "").format(channel=first.channel)
-
-
-def _p(value: float) -> str:
-    return f"p = {probability(value)}".replace("= <", "<")
-
-
-def probability(value: float | None) -> str:
+def probability(value: float) -> str:
     """Return a formatted p-value."""
-    return "–" if value is None else "< 0.000001" if value < 1e-6 else numeral(value, 2)
+    return "0.000001 or less" if value <= 1e-6 else numeral(value, 2)
 
 
 # --- Data gaps and plans ----------------------------------------------------------------------------

@@ -180,7 +180,7 @@ def plan(
     if recorded:
         known = _known(recorded, plant, block)
         gaps, recorded_limits = gaps_of(known), limits_of_recordings(known)
-        own, wanted = recorded_limits | own, {gap.run for gap in gaps}
+        own, wanted = recorded_limits | own, {"repeats", *(gap.run for gap in gaps)}
         step = max(step if plant else 0.0, min(one.sample_time or step for one in recorded))
     elif muscle is not None:
         block, own = _of_muscle(muscle, plant)

@@ -153,9 +153,7 @@ QUANTITIES = (
     ("{output}", "output_range", "{y}", "output range"),
     ("noise of {input}", "input_noise", "{u}", "standard deviation of a sample"),
     ("noise of {output}", "output_noise", "{y}", "standard deviation of a sample"),
-    ("variance by input", "position_share", "", "share that a function of the input explains"),
-    ("variance by velocity", "direction_share", "", "share that the input's velocity explains"),
-    ("variance by branch", "loop_share", "", "share that input and direction explain together"),
+    ("variance explained", "loop_share", "", "share that input and direction explain together"),
     ("p of loop", "p_loop", "", "probability of such gaps between branches without a loop"),
     ("loop width e_w", "loop_width", "%", "largest cycles: branches at mid input over span"),
     ("branch distance at mid input", "mid_width", "{y}", "the same in the unit of the output"),
@@ -167,8 +165,6 @@ QUANTITIES = (
     ("dead zone after upper reversals", "dead_zone_upper", "{u}", "before the output moves back"),
     ("dead zone after lower reversals", "dead_zone_lower", "{u}", "the same from below"),
     ("gain", "gain", "{y}/{u}", "slope of the mean of both branches at mid input"),
-    ("onset", "onset", "{u}", "below it the slope is under a fifth of its mean"),
-    ("saturation", "saturation", "{u}", "above it the slope is under a fifth of its mean"),
     ("creep", "creep", "{y}", "in a hold of all inputs; positive: in the direction of motion"),
     ("creep time", "creep_time", "s", "time over which creep was measured"),
     ("drift", "drift", "{y}", "from one cycle to the next between the same extremes"),
@@ -197,12 +193,6 @@ def quantities(found: Characterization) -> Iterator[Quantity]:
         else:
             yield Quantity(shown[0], value, limits, shown[1], meaning)
     slope = unit_of("{y}/{u}")
-    for one in found.effects:
-        over = _spanning((one.low, one.high), one.unit)
-        name, meaning = f"effect of {one.channel}", f"on the output at equal input, {over}"
-        yield Quantity(name, one.change, one.limits, units["y"], meaning)
-        meaning = f"by one straight line, {over}"
-        yield Quantity(f"{name} on the slope", one.gain_change, one.gain_limits, slope, meaning)
     for level in found.levels:
         at = " and ".join(f"{name} at {size(unit, x)}" for name, x, unit in level.held)
         own = level.found
@@ -223,22 +213,10 @@ def characterization_sentences(found: Characterization) -> list[str]:
         f"{y} covers {_spanning(ends, found.output_unit)} while {u} covers "
         f"{_spanning(found.input_range, found.input_unit)}{gain}."
     ]
-    if found.follows_direction:
-        said.append(
-            f"{y} follows the direction of {u}, as friction does, and has no inverse by {u}: velocity "
-            f"explains {percent(found.direction_share)} of its variance, {u} "
-            f"{percent(found.position_share)}."
-        )
-    elif found.loop_width is not None and found.mid_width is not None:
+    if found.loop_width is not None and found.mid_width is not None:
         said.append(
             f"Loop width at mid {u}: {numeral(found.loop_width, 2)} % of the output range of the cycle, "
             f"{size(found.output_unit, found.mid_width)}."
-        )
-    elif found.adjusted:
-        names = listing([effect.channel for effect in found.effects])
-        said.append(
-            f"{u} covers less than half of its range while {names} are constant: their linear effects "
-            "are removed, and loop width is not measured."
         )
     elif found.branch_gap is not None:
         open_ = "Too few branches, or too much noise, to detect a loop: "
@@ -351,13 +329,6 @@ GAPS = {
     "creep": "Creep cannot be identified: the longest hold lasts {value} s, where {needed} s "
     "are needed.",
     "time": "Rate dependence and creep cannot be identified: {percent} of the recordings have time.",
-    "sampling": "Shapes of branches cannot be identified: {channels} has {value} samples a "
-    "branch, where {needed} are needed.",
-    "resolution": "Loops below {percent} of the range of {channels} cannot be identified: noise or the "
-    "steps of the sensor are that large.",
-    "clipped": "Behaviour beyond {levels} cannot be identified: {channels} stays at a limit for {value} "
-    "samples.",
-    "repeats": "Repeatability cannot be identified: {value} cycles of {channels} are recorded twice.",
 }
 GAPS["load"] = GAPS["resting"]
 PLAN = "{seconds} s: {parts}."
@@ -368,10 +339,7 @@ RUNS = {
     "random": "all inputs and loads moving at random{levels}",
     "speeds": "the same motion three times slower and three times faster",
     "holds": "holds of 30 s at several levels",
-    "repeats": "one run twice",
     "time": "time, or give the rate",
-    "sampling": "at a higher rate",
-    "sensor": "with a finer or wider sensor",
 }
 
 

@@ -137,7 +137,6 @@ PLUGINS: dict[str, dict[str, str]] = {
     },
     "faces": {
         "card": "mckibben.report.notebook:card",
-        "interactive": "mckibben.report.figures:interact",
         "plot": "mckibben.report.figures:plot",
     },
     "papers": {

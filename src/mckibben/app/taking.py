@@ -23,7 +23,6 @@ FIGURES = {
     "loops": "Measured and modelled loops",
     "fit": "Measured and modelled over time",
     "residuals": "Residuals",
-    "weights": "Weights over thresholds",
     "loop": "Loops of the recordings",
     "time": "Recordings over time",
 }
@@ -42,7 +41,7 @@ FLAGS = {
 class FigureOptions:
     """Options of a figure."""
 
-    figure: Annotated[Literal["loops", "fit", "residuals", "weights", "loop", "time"],
+    figure: Annotated[Literal["loops", "fit", "residuals", "loop", "time"],
                       Option("What is drawn, of the test recordings.")] = "loops"  # fmt: skip
     format: Annotated[Literal["pdf", "svg", "png"], Option("Of the file.")] = "pdf"
 

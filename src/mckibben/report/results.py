@@ -293,8 +293,8 @@ def board_table(board: Leaderboard, rows: Sequence[Row], keys: Sequence[str] = B
         [[name, *(one.text(each) for one in columns)] for name, each in zip(named, given, strict=True)],
         best=next((place for place, row in enumerate(rows) if row is board.best), None),
         titles=[
-            " ".join(filter(None, (_summary(row.model), *(one.flag(each) for one in columns))))
-            for row, each in zip(rows, given, strict=True)
+            _summary(row.model)
+            for row in rows
         ],
         keys=[
             [row.model, *(one.sorted_by(each) for one in columns)]

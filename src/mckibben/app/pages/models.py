@@ -151,8 +151,8 @@ def board(state: State) -> None:
             shown = [one for one in every if one.key in FIRST]
             lines = []
             for row in rows:
-                errors = [(one.flag(row), one.value(row)) for one in shown]
-                texts = [flag or ("–" if value is None else value) for flag, value in errors]
+                values = [one.value(row) for one in shown]
+                texts = ["–" if value is None else value for value in values]
                 lines.append([partial(_title, row), *texts])
             _choosable(state, ["Model", *(one.label for one in shown)], lines, compared)
             _remarks(rows, shown)
@@ -209,9 +209,7 @@ def figures(state: State) -> None:
         return
     found = columns_of(rows, rows[0]["unit"], sides.outputs, rows[0]["chosen_by"])
     with widgets.details("All figures of all models"):
-        texts = [
-            [f"{typeset(one.text(row))} {one.flag(row)}".strip() for one in found] for row in rows
-        ]
+        texts = [[typeset(one.text(row)) for one in found] for row in rows]
         lines = [[row["name"], *line] for row, line in zip(rows, texts, strict=True)]
         widgets.table(["Model", *(one.label for one in found)], lines)
         ui.label(

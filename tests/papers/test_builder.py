@@ -15,7 +15,7 @@ from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelError
 from mckibben.papers.experiment import Experiment, Labels, Runs, reproduce
 from mckibben.papers.paper import Paper, paper, papers
-from mckibben.report.reproduction import beside, drawing, heading, markdown, reproduction_page
+from mckibben.report.reproduction import comparison, drawing, heading, markdown, reproduction_page
 from mckibben.rigs import rig_names
 
 ROOT = Path(__file__).parents[2]
@@ -108,7 +108,7 @@ def test_printed_figures_stand_before_ours() -> None:
     assert table.rows[1][:3] == ("ours", None, 0.5)
     assert "failed because" not in table.columns  # nothing to say in it
     assert "0 to 2" in table.text.note
-    (panel,) = beside(table).panels
+    (panel,) = comparison(table).panels
     assert [curve.style for curve in panel.curves] == ["rings", "dots"]
     assert "quick" in heading(table, quick=True)
 

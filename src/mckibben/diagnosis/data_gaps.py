@@ -104,7 +104,7 @@ def data_gaps(
         To which a model is to be fitted.
     inputs, outputs : str or sequence of str, optional
         Channels; default those of pressures and displacements, or of pressure, length and force.
-        Loads and stiffening pressures are found beside them.
+        Loads and stiffening pressures are found by name.
     tests : sequence of Recording
         On which the model is to be used.
 

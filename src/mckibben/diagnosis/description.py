@@ -153,7 +153,7 @@ def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, f
 def parameters(block: Block, covariance: Array, half_width: float) -> tuple[Parameter, ...]:
     """Return every entry of ``block.pack()``, in order, with its meaning and uncertainty.
 
-    What is rounding beside the others, as a weight of 1e-17, is shown as 0.
+    Values that are rounding compared with the others, such as a weight of 1e-17, are shown as 0.
     """
     values, errors, chosen = block.pack(), np.sqrt(np.diag(covariance)), fixed(block)
     known = np.isfinite(errors)

@@ -57,8 +57,8 @@ class Cycle:
 
     def like(self, other: Cycle, within: float) -> bool:
         """Return whether another cycle has the same extremes, within a share of the amplitude."""
-        apart = max(abs(self.low - other.low), abs(self.high - other.high))
-        return apart <= within * self.amplitude
+        distance = max(abs(self.low - other.low), abs(self.high - other.high))
+        return distance <= within * self.amplitude
 
 
 FIGURES = ("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid")

@@ -1,6 +1,6 @@
 """A paper: authors, question, printed results, and the place of its equations and tables here.
 
-All of it is data, ``paper.toml`` in the paper's folder; the code beside it holds what must be computed.
+All of it is data, ``paper.toml`` in the paper's folder; the code there computes the rest.
 """
 
 from __future__ import annotations

@@ -494,7 +494,7 @@ def _right(study: Study) -> str:
     if isinstance(study.check, str):
         return study.check
     worst = max(study.check.outputs, key=lambda one: one.rmse / max(one.span, 1e-300))
-    return _residual(worst, sized=False)  # which stands beside
+    return _residual(worst, sized=False)  # the tile has the size
 
 
 def _how_far(study: Study) -> str:

@@ -23,7 +23,6 @@ TAKES_RECORDINGS: list[Callable[[Any], object]] = [
     mckibben.data_gaps,
     mckibben.plan,
     mckibben.review,
-    lambda given: mckibben.identify(given, "pi"),
     lambda given: mckibben.check(GPI, given),
     lambda given: mckibben.GPIEstimator().fit(given),
 ]

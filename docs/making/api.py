@@ -38,7 +38,7 @@ USES = {
     ),
     "fit": Use(
         "Fit a model",
-        "mckibben: fit identify; mckibben.studying.results: Fit; "
+        "mckibben: fit; mckibben.studying.results: Fit; "
         "mckibben.estimators.core.estimator: Estimator Diagnostics; "
         "mckibben: PIEstimator GPIEstimator MPIEstimator EUPIEstimator",
     ),

@@ -21,7 +21,6 @@ from .blocks.memoryless import Affine as Affine
 from .blocks.memoryless import PiecewiseLinear as PiecewiseLinear
 from .blocks.memoryless import Polynomial as Polynomial
 from .blocks.saving import load as load
-from .comparison.identifying import identify as identify
 from .comparison.ranking import compare as compare
 from .diagnosis.bands import calibrate as calibrate
 from .diagnosis.characterization import characterize as characterize

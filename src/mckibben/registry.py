@@ -135,15 +135,14 @@ PLUGINS: dict[str, dict[str, str]] = {
     },
     "faces": {
         "card": "mckibben.report.notebook:card",
-        "interactive": "mckibben.report.figures:interact",
         "plot": "mckibben.report.figures:plot",
     },
     "papers": {
-        "activation-pressure": "mckibben.papers.activation_pressure.run:RERUN",
-        "field-models": "mckibben.papers.field_models.run:RERUN",
-        "mpi-narmax": "mckibben.papers.mpi_narmax.run:RERUN",
-        "multistate-friction": "mckibben.papers.multistate_friction.run:RERUN",
-        "sdchm": "mckibben.papers.sdchm.run:RERUN",
+        "activation-pressure": "mckibben.papers.activation_pressure.run:run",
+        "field-models": "mckibben.papers.field_models.run:run",
+        "mpi-narmax": "mckibben.papers.mpi_narmax.run:run",
+        "multistate-friction": "mckibben.papers.multistate_friction.run:run",
+        "sdchm": "mckibben.papers.sdchm.run:run",
     },
     "protocols": {
         "activation-pressure": "mckibben.papers.activation_pressure.protocol:activation_pressure",

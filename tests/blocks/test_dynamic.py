@@ -9,14 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from mckibben.blocks.base import Block
-from mckibben.blocks.compose import Parallel, Series
-from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.dynamics.process_model import ProcessModel
-from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.blocks.fields import DISPLACEMENT
-from mckibben.blocks.memoryless import Affine, Negative
-from mckibben.diagnosis.responses import linear_response
 from mckibben.papers.paper import printed
 
 STEP = 0.01
@@ -62,38 +55,6 @@ def test_delays_between_samples_are_exact(delay: float) -> None:
     expected = lsim(continuous(model), late, time)[1][::fine]
     y = model.simulate(INPUT, initial="virgin", sample_time=STEP)
     np.testing.assert_allclose(y, expected, atol=1e-9 * np.ptp(expected))
-
-
-LINEAR = {
-    "transfer function": TransferFunction.example(),
-    "delays": TransferFunction((0.0, 0.0, 1.5), (-0.9,), STEP, 1.0, 2.0),
-    "P1DZ": ProcessModel(2.0, (0.3,), None, 0.2, 0.0234),
-    "P2DUZ, held": ProcessModel(2.0, (0.1,), 0.2, 0.3, 0.0251, 1.0, 2.0, "zero"),
-    "creep": Creep((0.1, 0.05), (0.3, 4.0)),
-    "series": Series(
-        (
-            ProcessModel(2.0, (0.3,), None, None, 0.02, 1.0, 3.0),
-            Creep((0.1,), (0.4,)),
-            Affine(2.0, 1.0, DISPLACEMENT, DISPLACEMENT),
-            Negative(DISPLACEMENT, DISPLACEMENT),
-        )
-    ),
-    "parallel": Parallel((ProcessModel(2.0, (0.3,)), TransferFunction((1.0, 0.5), (-0.7,), STEP))),
-}
-
-
-@pytest.mark.parametrize("name", LINEAR)
-def test_frequency_responses_are_those_of_an_impulse(name: str) -> None:
-    block: Block = LINEAR[name]
-    rest = getattr(block, "input_offset", 0.0)
-    impulse = np.full(6000, rest)
-    impulse[1] += 1.0
-    answer = np.asarray(block.simulate(impulse, sample_time=STEP))
-    frequency = np.array([0.2, 3.0, 20.0])
-    powers = np.exp(-2j * np.pi * STEP * np.outer(frequency, np.arange(5999)))
-    expected = powers @ (answer - answer[0])[1:]
-    found = linear_response(block, STEP, frequency)[:, 0, 0]
-    np.testing.assert_allclose(found, expected, rtol=1e-4)
 
 
 def test_printed_numbers() -> None:

@@ -104,19 +104,10 @@ def lacking(plant: str, seed: int) -> Iterator[Case]:
     slow = np.column_stack([own.at_one_speed(60.0, 1.0) for _ in range(own.width)])
     yield every("other speeds", "rate", slow, slow, held)
     yield every("holds", "creep", moving, moving)
-    yield every("repeats", "repeats", moving, held)
-    yield every("all but one cycle", "repeats", np.tile(own.cycles(5.0, 1.0), (own.width, 1)).T)
     yield every("turning back", "hysteresis", np.sort(moving, axis=0))
     yield "the upper half", "range", own.complete(lambda x: 0.5 * x), [own.record(moving)]
-    thin = round(0.7 / own.step)
     runs = own.complete()
-    thinned = [{name: x[::thin] for name, x in run.channels.items()} for run in runs]
-    yield "most samples", "sampling", [Recording(x, thin * own.step) for x in thinned], []
     yield "time", "time", [Recording(dict(run.channels), None) for run in runs], []
-    name = own.outputs[0]
-    step = max(float(np.ptp(run[name])) for run in runs) / 25
-    coarse = [run.with_channels(**{name: step * np.round(run[name] / step)}) for run in runs]
-    yield "resolution", "resolution", coarse, []
     if own.width > 1:
         tied = own.complete(lambda x: np.repeat(x[:, :1], own.width, axis=1))
         yield "independent motion", "coupling", tied, []

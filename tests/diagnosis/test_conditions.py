@@ -7,7 +7,7 @@ import pytest
 
 from mckibben import PI, DataError, Recording
 from mckibben.diagnosis.characterization import characterize
-from mckibben.signals import random_wave, staircase
+from mckibben.signals import staircase
 
 STEP = 0.01
 TIME = np.arange(3000) * STEP
@@ -42,58 +42,25 @@ def test_what_another_input_does_is_not_taken_for_the_own() -> None:
     ramps = np.concatenate([np.zeros(3000), np.linspace(0, 4, 500), np.full(500, 4.0)])
     clean = characterize(still, "pressure_1", "displacement")
     told = characterize(two(ramps), "pressure_1", "displacement")
-    apart = characterize(two(ramps), "pressure_1", "displacement", beside=["pressure_2"])
+    apart = characterize(two(ramps), "pressure_1", "displacement", scheduling=["pressure_2"])
     assert told == apart  # channels of one quantity are inputs all
     assert abs(apart.creep or 0.0) < 0.1
     assert apart.loop_width == pytest.approx(clean.loop_width, rel=0.02)
     assert apart.n_recordings == apart.n_stretches == 1
 
 
-def test_a_step_of_payload_is_no_creep() -> None:
+def test_a_payload_that_steps_within_branches_is_refused() -> None:
     u = staircase(TIME, [0.0, 3.0, 1.0, 4.0], hold=7.0, ramp=0.5)
     payload = np.where(TIME % 7.5 > 3.0, 20.0, 5.0)
     run = Recording({"pressure": u, "displacement": u - 0.1 * payload, "force": payload}, STEP)
-    found = characterize(run)
-    assert found.creep is None
-    (effect,) = found.effects
-    assert effect.change == pytest.approx(-1.5, rel=0.01)
-
-
-@pytest.mark.parametrize("torque", [-4.0, 4.0])
-def test_a_torque_that_moves_with_the_pressure_does_not_turn_its_sign(torque: float) -> None:
-    rng = np.random.default_rng(5)
-    load = SLOW / 5.0 + 0.3 * np.sin(TIME * 1.7)
-    angle = MUSCLE.simulate(SLOW) + 10 * torque * load + 0.01 * rng.standard_normal(TIME.size)
-    run = Recording({"pressure": SLOW, "torque": load, "angle": angle}, STEP)
-    found = characterize(run, output="angle")
-    assert found.adjusted
-    assert not found.falls
-    assert (found.gain or 0.0) > 0
-    low, high = found.effects[0].limits
-    assert low < 10 * torque * float(np.ptp(load)) < high
-    # of what straight lines leave, no width is that of the muscle
-    assert found.loop_width is None
-    assert set(found.intervals) <= {"gain", "branch_gap"}
-
-
-def test_the_effect_of_another_input_is_in_its_interval_where_noise_is_slow() -> None:
-    """In 95 % of recordings; of 60, eight or more are missed with a probability of 1.6 %."""
-    missed = 0
-    for seed in range(60):
-        u, v = (random_wave(TIME, 0.5, 5.0, seed=seed + k) for k in (0, 1000))
-        white = np.random.default_rng(seed).standard_normal(TIME.size + 99)
-        y = u + 0.1 * u**2 - 2 * v + np.convolve(white, np.ones(100) / 10, "valid")
-        run = Recording({"pressure_1": u, "pressure_2": v, "displacement": y}, STEP)
-        (effect,) = characterize(run, "pressure_1").effects
-        low, high = effect.limits
-        missed += not low < -2 * (effect.high - effect.low) < high
-    assert missed < 8
+    with pytest.raises(DataError, match="force"):
+        characterize(run)
 
 
 def test_inputs_that_move_as_one_are_refused() -> None:
     one = two(0.5 * np.concatenate([SLOW, np.zeros(1000)])).slice(0, 3000)
     with pytest.raises(DataError, match="pressure_2"):
-        characterize(one, "pressure_1", "displacement", beside=["pressure_2"])
+        characterize(one, "pressure_1", "displacement", scheduling=["pressure_2"])
 
 
 def isometric(length: float, gain: float, gap: float, seed: int) -> Recording:
@@ -112,7 +79,7 @@ LENGTHS = ((0.0, 200.0, 0.1), (10.0, 140.0, -0.05), (20.0, 70.0, -0.2))
 @pytest.mark.parametrize("asked", [(), ("displacement",)])
 def test_every_held_length_has_its_loop_and_its_gain(asked: tuple[str, ...]) -> None:
     runs = [isometric(*each, seed) for seed in range(2) for each in LENGTHS]
-    found = characterize(runs, output="force", beside=asked)
+    found = characterize(runs, output="force", scheduling=asked)
     assert found.has_loop
     assert [level.held for level in found.levels] == [
         (("displacement", length, "mm"),) for length, _, _ in LENGTHS
@@ -129,6 +96,3 @@ def test_every_held_length_has_its_loop_and_its_gain(asked: tuple[str, ...]) -> 
     )
     assert (found.n_recordings, found.n_samples) == (6, 6 * TIME.size)
     assert sorted(cycle.recording for cycle in found.cycles) == sorted(3 * list(range(6)))
-    (effect,) = found.effects
-    assert effect.channel == "displacement"
-    assert effect.change == pytest.approx(-5 * 20 - 130 * 2.5, rel=0.1)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import approx_fprime
 from scipy.signal import lfilter
 
-from mckibben import DataError, ModelError, Recording, identify
+from mckibben import DataError, ModelError, Recording
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.free_run import run_free
@@ -171,19 +171,6 @@ def test_bad_data_and_settings_are_refused() -> None:
         load("estimators", "oe")(n_poles=10, n_zeros=10).fit(recording.slice(0, 25))
     with pytest.raises(ModelError, match="n_zeros"):
         load("estimators", "oe")(n_zeros=0).fit(recording)
-
-
-def test_identify_chooses_orders_by_cross_validation() -> None:
-    orders = {"n_poles": (1, 2), "n_zeros": (2,)}
-    choice = identify([recorded(s, 300) for s in range(4)], "arx", orders)
-    assert choice.orders == {"n_poles": 2, "n_zeros": 2}
-    assert len(choice.tried) == 2
-
-
-@pytest.mark.parametrize("family", ["rdpi", "air"])
-def test_identify_asks_for_orders_where_none_are_usual(family: str) -> None:
-    with pytest.raises(ModelError, match=f"'{family}'.*orders"):
-        identify(recorded(0, 300), family)
 
 
 def test_a_model_is_matched_by_ranges() -> None:

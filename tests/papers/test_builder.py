@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import subprocess
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -14,11 +13,10 @@ import pytest
 from mckibben import Recording, registry
 from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelError
-from mckibben.papers.experiment import Experiment, Labels, Rerun, Runs, reproduce
+from mckibben.papers.experiment import Experiment, Labels, Runs, reproduce
 from mckibben.papers.paper import Paper, paper, papers
-from mckibben.report.reproduction import beside, drawing, heading, markdown, reproduction_page
-from mckibben.rigs import load_rig, record, rig_names
-from mckibben.signals.protocol import protocol
+from mckibben.report.reproduction import comparison, drawing, heading, markdown, reproduction_page
+from mckibben.rigs import rig_names
 
 ROOT = Path(__file__).parents[2]
 PAGES = ROOT / "docs" / "papers"
@@ -87,7 +85,7 @@ def test_pages_are_of_full_runs_after_the_last_change_of_what_they_report(name: 
     for picture in re.findall(r"!\[.*?\]\((.*?)\)", text):
         assert (PAGES / picture).is_file(), picture
     numbers = f"tests/golden/data/papers/{name}.json"
-    room = registry.load("papers", name).run.__module__.replace(".", "/").rpartition("/")[0]
+    room = registry.load("papers", name).__module__.replace(".", "/").rpartition("/")[0]
     changed = subprocess.run(
         ["git", "log", "-1", "--format=%cs", "--", numbers, f"src/{room}/paper.toml"],
         cwd=ROOT,
@@ -110,7 +108,7 @@ def test_printed_figures_stand_before_ours() -> None:
     assert table.rows[1][:3] == ("ours", None, 0.5)
     assert "failed because" not in table.columns  # nothing to say in it
     assert "0 to 2" in table.text.note
-    (panel,) = beside(table).panels
+    (panel,) = comparison(table).panels
     assert [curve.style for curve in panel.curves] == ["rings", "dots"]
     assert "quick" in heading(table, quick=True)
 
@@ -146,19 +144,23 @@ def test_pages_name_the_paper_and_its_figures() -> None:
     assert len(ids) == len(set(ids))  # scripts find their data by them
 
 
-def test_own_recordings_are_sorted_or_the_paper_says_what_is_missing() -> None:
+def test_recordings_are_runs_of_the_protocol_by_name() -> None:
     time = np.arange(0.0, 60.0, 0.02)
-    falling = 3.0 + np.sin(time) * (2.0 - time / 40)
-    rising = 3.0 + np.sin(time) * (1.0 + time / 80)
     runs = [
         Recording({"pressure": u, "displacement": 5 * u}, 0.02, meta={"name": name})
-        for name, u in (("a", rising), ("b", falling))
+        for name in ("irregular-triangle", "decaying-triangle")
+        for u in [3.0 + np.sin(time)]
     ]
-    rerun: Rerun = registry.load("papers", "field-models")
-    assert rerun.sort(runs) == [Labels("test", {}), Labels("train", {})]
-    with pytest.raises(DataError, match="two files"):
-        rerun.sort(runs[:1])
-    with pytest.raises(DataError, match="two recordings"):
+    made = experiment()
+    made.data = runs
+    assert made.record().names("train") == ["decaying-triangle"]
+    with pytest.raises(DataError, match="decaying-triangle"):
+        reproduce("field-models", data=runs[:1])
+    with pytest.raises(DataError, match="other"):
+        reproduce("field-models", data=[*runs, runs[0].with_meta(name="other")])
+    with pytest.raises(DataError, match="displacement"):
+        reproduce("field-models", data=[one.select(["pressure"]) for one in runs])
+    with pytest.raises(DataError, match="no recording"):
         reproduce("field-models", data=[])
 
 
@@ -168,31 +170,3 @@ def test_runs_are_chosen_by_role_and_label() -> None:
     assert runs.names("train") == runs.names(p0=1.0) == ["a"]
     assert runs.of("a", "p0") == 1.0
     assert len(runs.select()) == 2
-
-
-@pytest.mark.parametrize("scale", [0.3, 1.0])
-def test_sines_and_random_waves_are_seen_without_their_names(scale: float) -> None:
-    plan = protocol("activation-pressure")
-    wanted = [run.name for run in plan.runs if run.labels["force"] in (50.0, 150.0)]
-    rig = load_rig("mckibben-530").changed({"muscle.length": 530.0 * scale})
-    rerun: Rerun = registry.load("papers", plan.name)
-    own = {"rest_length": 530.0 * scale}
-    made = [
-        (run.labels, replace(one, meta=own | {"name": run.name}).with_derived(["contraction"]))
-        for run, one in record(plan, rig, runs=wanted)
-    ]
-    found = rerun.sort([one for _, one in made])
-    for (labels, one), labelled in zip(made, found, strict=True):
-        assert labelled is not None
-        assert labelled.labels["stage"] == labels["stage"], one.name
-        assert labelled.labels["force"] == pytest.approx(labels["force"], abs=1.0)
-        if labels["stage"] == "hysteresis":
-            assert labelled.labels["frequency"] == labels["frequency"]
-    with pytest.raises(DataError, match="sines"):
-        rerun.sort([one for labels, one in made if labels["stage"] == "random"])
-    bare = [one.select(["pressure", "displacement", "force"]) for _, one in made]
-    bare = [replace(one, meta={}) for one in bare]
-    with pytest.raises(DataError, match="rest_length"):
-        reproduce("activation-pressure", data=bare)
-    with pytest.raises(DataError, match="slow cycle"):
-        rerun.sort([one for labels, one in made if labels["stage"] != "static"])

@@ -1,10 +1,9 @@
-"""The paper's sequence: on one's own recordings, and on the command line."""
+"""The paper's sequence: in Python and on the command line."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,8 +15,7 @@ from mckibben.blocks.force.multistate_friction import MultistateFriction
 from mckibben.blocks.saving import load
 from mckibben.errors import DataError
 from mckibben.papers.experiment import reproduce
-from mckibben.papers.multistate_friction.run import sort
-from mckibben.rigs import Rig, load_rig, record
+from mckibben.rigs import load_rig, record
 from mckibben.signals.protocol import protocol
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
@@ -32,25 +30,6 @@ OTHER = {
 }
 """What another stand has: half as long again in length and pressure."""
 
-NAMES = ("isometric-300mm", "isometric-288mm", "isometric-276mm", "isobaric-3bar", "isobaric-6bar")
-
-
-def stripped(rig: Rig, names: tuple[str, ...]) -> tuple[list[Recording], list[Any]]:
-    """Return runs of the protocol on a rig without what they are for, and that."""
-    recordings, labels = list[Recording](), list[Any]()
-    for run, one in record("multistate-friction", rig, runs=names):
-        labels.append((run.role, dict(run.labels)))
-        meta = {key: value for key, value in one.meta.items() if key not in ("protocol", "role")}
-        recordings.append(Recording(one.channels, one.sample_time, units=one.units, meta=meta))
-    return recordings, labels
-
-
-@pytest.fixture(scope="module")
-def other() -> tuple[list[Recording], list[Any]]:
-    """Runs of another stand, with minor loops at the pressure that identifies."""
-    rig = load_rig("mas10-test-stand").changed(OTHER)
-    return stripped(rig, (*NAMES, "isobaric-minor-loops"))
-
 
 def test_the_protocol_is_in_proportion_to_the_stand() -> None:
     rig = load_rig("mas10-test-stand")
@@ -64,52 +43,16 @@ def test_the_protocol_is_in_proportion_to_the_stand() -> None:
         protocol("multistate-friction", load_rig("mas20-hanging"))
 
 
-def test_own_runs_are_sorted_by_what_was_driven(
-    other: tuple[list[Recording], list[Any]],
-) -> None:
-    recordings, labels = other
-    noisy = [
-        one.with_channels(
-            length=one["length"] + 0.05 * np.random.default_rng(0).standard_normal(len(one)),
-            pressure=one["pressure"] + 0.05 * np.random.default_rng(1).standard_normal(len(one)),
-        )
-        for one in recordings
-    ]
-    for given in (recordings, noisy):
-        found = [(one.role, dict(one.labels)) for one in sort(given) if one]
-        assert found == labels
-    both = recordings[0].with_channels(length=200.0 + 20.0 * np.sin(recordings[0].time))
-    assert sort([*recordings, both])[-1] is None
-    with pytest.raises(DataError, match="held at 1 values"):
-        sort([recordings[0], *recordings[3:]])
-    with pytest.raises(DataError, match="held at 0 values"):
-        sort(recordings[:3])
-    with pytest.raises(DataError, match="'force'"):
-        sort([one.select(["length", "pressure"]) for one in recordings])
-
-
-@pytest.mark.long
-def test_one_loop_of_another_stand_is_enough(other: tuple[list[Recording], list[Any]]) -> None:
-    recordings = [*other[0][:3], other[0][4]]
-    given = [one.with_meta(name=str(place)) for place, one in enumerate(recordings)]
-    both = given[0].with_channels(length=200.0 + 20.0 * np.sin(given[0].time))
-    found = reproduce("multistate-friction", data=[*given, both.with_meta(name="odd")], quick=True)
-    keys = {table.key for table in found.tables}
-    assert keys == {"laws", "static", "closed", "loops", "friction"}
-    assert "Recordings that are not used: odd." in found.notes
-    search = next(one for one in found.figures if one.key == "search").panels[""]
-    for steps, costs in search.values():
-        assert np.all(np.diff(steps) > 0)
-        assert costs[-1] < 0.8 * costs[0]
-    (closed,) = (table for table in found.to_dict()["tables"] if table["key"] == "closed")
-    assert closed["rows"][0]["r²"] > 0.99
-    assert closed["rows"][0]["RMSE [N]"] < 10.0
-
-
 @pytest.mark.long
 def test_the_paper_can_be_typed(cli: Cli, tmp_path: Path) -> None:
     """Static law, extraction, friction: commands give the numbers of the re-run."""
-    names = ("isometric-200mm", "isometric-192mm", "isometric-184mm", "isobaric-4bar")
+    names = (
+        "isometric-200mm",
+        "isometric-192mm",
+        "isometric-184mm",
+        "isobaric-4bar",
+        "isobaric-2bar",
+    )
     files = [tmp_path / f"{name}.csv" for name in names]
     for file, (_, one) in zip(files, record("multistate-friction", runs=names), strict=True):
         write(one, file)

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from mckibben import Recording
-from mckibben.errors import DataError, DataWarning
-from mckibben.papers.experiment import Reproduction, Runs, reproduce
+from mckibben.papers.experiment import Reproduction, reproduce
 from mckibben.papers.sdchm.loops import (
     BALANCE,
-    EXTENSOR,
     OURS,
     PUBLISHED,
     SDIHC,
@@ -21,10 +18,7 @@ from mckibben.papers.sdchm.loops import (
     held,
     widths,
 )
-from mckibben.papers.sdchm.protocol import TEST, quick
-from mckibben.papers.sdchm.run import DAMPED, LINEAR, by_group, sort
-from mckibben.rigs import load_rig, record
-from mckibben.signals.protocol import Protocol, protocol
+from mckibben.papers.sdchm.run import DAMPED, LINEAR
 
 OUTPUTS = ("displacement_1", "displacement_2", "displacement_3")
 
@@ -33,54 +27,6 @@ def rows(found: Reproduction, key: str) -> dict[str, dict[str, Any]]:
     """Return the rows of a table by their first cells."""
     (table,) = (table for table in found.tables if table.key == key)
     return {str(row[0]): dict(zip(table.columns, row, strict=True)) for row in table.rows}
-
-
-def unlabelled(plan: Protocol) -> list[Recording]:
-    """Return a protocol's pressures as recordings, with noise; displacements are the pressures'."""
-    rng = np.random.default_rng(0)
-    made = []
-    for run in plan.runs:
-        names = run.inputs.channels
-        channels = {n: run.inputs[n] + 0.01 * rng.standard_normal(len(run.inputs)) for n in names}
-        moved = {f"displacement_{k}": 20.0 * channels[f"pressure_{k}"] for k in (1, 2, 3)}
-        made.append(Recording(channels | moved, run.inputs.sample_time))
-    return made
-
-
-def test_sorting_gives_the_labels_of_the_protocol() -> None:
-    plan = protocol("sdchm")
-    found = sort(unlabelled(plan))
-    for run, labels in zip(plan.runs, found, strict=True):
-        assert labels is not None
-        expected = dict(run.labels)
-        if expected.get("extensor") == "moving":
-            expected["p0"] = labels.labels["p0"]
-        assert labels.labels == expected, run.name
-    roles = {one.role for one in found if one and one.labels["stage"] == "network"}
-    assert roles == {"train", "validation", "test"}
-    ends = [one for one in found if one and one.labels["p0"] in (0.0, 2.5)]
-    assert {one.role for one in ends if one.labels["stage"] == "network"} == {"train"}
-
-
-def test_what_is_missing_is_named() -> None:
-    plan = protocol("sdchm")
-    alone = replace(plan, runs=tuple(run for run in plan.runs if run.labels["driven"] != "2"))
-    with pytest.raises(DataError, match="pressure_2"):
-        sort(unlabelled(alone))
-    one, *rest = unlabelled(replace(plan, runs=plan.runs[:4]))
-    with pytest.raises(DataError, match=EXTENSOR):
-        sort([*rest, one.select([name for name in one.channels if name != EXTENSOR])])
-
-
-def test_groups_are_lettered_as_in_the_paper() -> None:
-    plan = protocol("sdchm")
-    names = [run.name for run in plan.select(stage="prediction", p0=0.1)]
-    data = unlabelled(replace(plan, runs=tuple(plan[name] for name in names)))
-    labels = [one for one in sort(unlabelled(plan)) if one and one.labels["stage"] == "prediction"]
-    runs = Runs(dict(zip(names, data, strict=True)), dict(zip(names, labels, strict=False)))
-    groups = [group for _, group, *_ in by_group(runs, names)]
-    assert [group[:3] for group in groups] == [f"({letter})" for letter in "abcdefghijkl"]
-    assert (groups[1], groups[11]) == ("(b) p1, y2", "(l) p1 p2 p3, y3")
 
 
 def test_widths_are_of_the_own_range_and_of_the_range_that_moves() -> None:
@@ -122,26 +68,3 @@ def test_on_the_rig_of_the_paper() -> None:
         figure.key for figure in found.figures
     }
     assert all(len(figure.panels) == 12 for figure in found.figures if figure.key == "coupling")
-
-
-@pytest.mark.long
-def test_on_recordings_of_another_arm() -> None:
-    """Another length, diameter and range of pressure; fewer recordings; no labels but their channels."""
-    sizes = {"muscle.length": 400.0, "muscle.diameter": 25.0, "extensor.length": 400.0}
-    arm = load_rig("soft-arm").changed({"range.pressure.high": 2.0, **sizes})
-    plan, _ = quick()
-    chosen = ("network-p0-0.0", f"network-p0-{TEST[1]}", "network-p0-1.8", "coupling-drive-1")
-    names = [run.name for run in plan.runs if run.name.startswith(chosen)]
-    with pytest.warns(DataWarning, match="limited to 0 to 2 bar"):
-        data = [
-            Recording({name: one[name] for name in one.channels}, one.sample_time)
-            for _, one in record(plan, arm, runs=names, jobs=1)
-        ]
-    found = reproduce("sdchm", data=data, quick=True, jobs=1)
-    errors = {name: row["RMSE of y1 [mm]"] for name, row in rows(found, "along").items()}
-    assert errors[BALANCE] < 0.3 * errors[LINEAR]
-    assert {table.key for table in found.tables} == {
-        *("coupling", "stiffness", "orders", "gains", "identification"),
-        *("along", "groups", "levels"),
-    }
-    assert not any("random" in sentence for sentence in found.summary)

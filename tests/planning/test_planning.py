@@ -48,7 +48,7 @@ def test_commands_keep_to_limits_and_come_home(seed: int) -> None:
         "force": Limit(0.0, 90.0, 60.0, 0.0),
         "torque": Limit(2.0, 2.0, 1.0, 2.0),
     }
-    parts = motion(limits, 60.0, STEP, {"holds", "repeats"}, np.random.default_rng(seed))
+    parts = motion(limits, 60.0, STEP, True, np.random.default_rng(seed))
     commands = np.concatenate([part for _, part in parts])
     assert len(commands) == pytest.approx(60.0 / STEP, abs=1)
     for column, limit in zip(commands.T, limits.values(), strict=True):

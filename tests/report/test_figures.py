@@ -186,7 +186,7 @@ def test_what_cannot_be_drawn_is_named_and_leaves_no_file(tmp_path: Path) -> Non
             write_figure([measured(50)], path, kind)
     with pytest.raises(DataError, match="force"):
         write_figure([measured(50)], path, "time", input="pressure", output="force")
-    for name in ("leaderboard", "fit", "loops", "residuals", "weights"):
+    for name in ("leaderboard", "fit", "loops", "residuals"):
         with pytest.raises(ModelError):
             write_figure(study(blocks={}), path, name)
     assert list(tmp_path.iterdir()) == []

@@ -25,9 +25,6 @@ def model(run: Recording) -> Any:
 WORK: dict[str, Callable[[Recording, Any], object]] = {
     "comparing": lambda run, p: mckibben.compare(run, models=["pi"], jobs=1, progress=p),
     "studying": lambda run, p: mckibben.study(run, models=["pi"], jobs=1, progress=p),
-    "identifying pi": lambda run, p: mckibben.identify(
-        run, "pi", {"n_operators": (3, 4)}, n_folds=2, jobs=1, progress=p
-    ),
     "fitting": lambda run, p: mckibben.GPIEstimator(n_operators=3).fit(run, progress=p),
     "checking": lambda run, p: mckibben.check(model(run), run, progress=p),
     "tracking": lambda run, p: track(
@@ -40,7 +37,7 @@ WORK: dict[str, Callable[[Recording, Any], object]] = {
 }
 
 
-LONG = ("comparing", "studying", "identifying pi", "checking", "tuning")
+LONG = ("comparing", "studying", "checking", "tuning")
 
 
 @pytest.mark.parametrize(

@@ -119,8 +119,8 @@ def channels_of(
 ) -> Channels:
     """Return the channels of a comparison: as named, otherwise by names and units.
 
-    A force beside other inputs is a load. Force is modelled over length or displacement, where that
-    varies and nothing else is moved; models of it find the pressure themselves.
+    A force is a load if there are other inputs. Force is modelled over length or displacement, where
+    that varies and nothing else is moved; models of it find the pressure themselves.
 
     Raises
     ------

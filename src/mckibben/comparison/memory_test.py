@@ -80,7 +80,7 @@ def paired_gaps(
     pairs : sequence of (str, str), length k
         As for `memory_test`.
     names : sequence of str
-        Inputs, of which the first that moves stands in for one that rests.
+        Inputs; the first that moves replaces one that is constant.
     """
     pairs = [(_moving(names, recordings, given), output) for given, output in pairs]
     return np.concatenate(

@@ -8,23 +8,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mckibben.diagnosis.conditions import (
-    COVERS,
-    Effect,
-    effects,
-    levelled,
-    others_of,
-    standing,
-    without,
-)
+from mckibben.diagnosis.conditions import COVERS, constant_segments, levelled, others_of
 from mckibben.diagnosis.excitation import extremes
 from mckibben.diagnosis.loops import (
     FIGURES,
     Cycle,
     branches_of,
-    curves_of,
     drift,
     explained,
+    gains_of,
     gap_of,
     largest_of,
     loops_of,
@@ -41,10 +33,8 @@ LEVEL, NO_GAP = 0.01, 0.01
 below which there is no loop.
 """
 
-EXPLAINED, POSITION = 0.5, 0.1
-"""Variance shares: the velocity's at least, and the input's at most, if the output depends on
-direction only; also the branches' at least, for their shape to be measured.
-"""
+EXPLAINED = 0.5
+"""Smallest share of the variance explained by branches for their shape to be measured."""
 
 REPEATS = 3
 """Smallest number of values for an interval."""
@@ -55,11 +45,8 @@ SHAPE = {
 }
 """Quantities that are measured only if there is a loop."""
 
-BY_POSITION = {
-    *("gain", "onset", "saturation", "asymmetry", "width_centroid", "branch_gap", "drift"),
-    *("dead_zone_upper", "dead_zone_lower", "creep", "creep_time", "closure_error"),
-}
-"""Quantities without meaning if the output depends on direction only."""
+OTHERS = {"gain", "drift", "creep", "creep_time"}
+"""Further quantities without meaning if input and direction explain little of the output."""
 
 
 @dataclass(frozen=True)
@@ -95,9 +82,8 @@ class Characterization(DrawsItself):
         Enclosed area [input unit x output unit], and its ratio to the bounding rectangle [%].
     dead_zone_upper, dead_zone_lower : float or None
         Change of the input after upper and lower reversals before the output moves [input unit].
-    gain, onset, saturation : float or None
-        Slope of the mean of both branches at mid input [output unit/input unit], and the inputs below
-        and above which it stays under a fifth of its mean.
+    gain : float or None
+        Slope of the mean of both branches at mid input [output unit/input unit].
     branch_gap, p_loop : float or None
         Mean distance of falling and rising output at the same input, positive where the output lags
         [output unit], and the probability of such gaps without a loop. From four branches on drift
@@ -109,16 +95,12 @@ class Characterization(DrawsItself):
         Increase of e_w at twice the speed [%], and the mean speeds compared [input unit/s].
     closure_error : float or None
         Return-point memory: output after a minor loop against that before it [%].
-    position_share, direction_share, loop_share : float
-        Share of the output's variance that functions of the input alone, of its velocity alone, and of
-        the input and its direction together explain.
+    loop_share : float
+        Share of the output's variance that the input and its direction explain.
     n_stretches : int or None
         Segments in which other inputs are constant; None where nothing else moves.
     falls : bool
         Whether the output falls as the input grows.
-    effects : tuple of Effect
-        Effects of other inputs; ``adjusted`` if they are never constant, and their effect was
-        removed: then only gain and branch gap are measured.
     levels : tuple of Level
         Levels at which other inputs are constant. The loop is that of the level of largest output
         motion.
@@ -150,8 +132,6 @@ class Characterization(DrawsItself):
     dead_zone_upper: float | None = None
     dead_zone_lower: float | None = None
     gain: float | None = None
-    onset: float | None = None
-    saturation: float | None = None
     branch_gap: float | None = None
     creep: float | None = None
     creep_time: float | None = None
@@ -159,14 +139,10 @@ class Characterization(DrawsItself):
     rate_dependence: float | None = None
     speeds: Range | None = None
     closure_error: float | None = None
-    position_share: float = 0.0
-    direction_share: float = 0.0
     loop_share: float = 0.0
     p_loop: float | None = None
     n_stretches: int | None = None
     falls: bool = False
-    effects: tuple[Effect, ...] = ()
-    adjusted: bool = False
     levels: tuple[Level, ...] = ()
     intervals: dict[str, Range] = field(default_factory=dict)
 
@@ -190,17 +166,9 @@ class Characterization(DrawsItself):
         small = limits is not None and max(map(abs, limits)) <= NO_GAP * self.output_span
         return False if small else None
 
-    @property
-    def follows_direction(self) -> bool:
-        """Whether the output depends on the direction of motion, as friction does, and not on position.
-
-        Such an output has no onset and no trend over the input, and no inverse by position.
-        """
-        return self.direction_share >= EXPLAINED and self.position_share <= POSITION
-
     def to_dict(self) -> dict[str, Any]:
         """Return everything for JSON, with None for undetermined quantities."""
-        return asdict(self) | {"follows_direction": self.follows_direction}
+        return asdict(self)
 
 
 def characterize(
@@ -208,7 +176,7 @@ def characterize(
     input: str = "pressure",  # noqa: A002
     output: str = "displacement",
     *,
-    beside: Sequence[str] = (),
+    scheduling: Sequence[str] = (),
 ) -> Characterization:
     """Measure width and shape of the loop, memory, creep and rate dependence of a muscle.
 
@@ -216,9 +184,7 @@ def characterize(
     Ranges are those of all recordings together.
 
     Other inputs, such as pressures of other muscles, loads or lengths, have a separate loop at
-    every level at which they are constant; the one of largest output motion is reported. If they
-    are never constant while the input moves, their linear effect is removed, and only gain and mean
-    gap of the branches are measured.
+    every level at which they are constant; the one of largest output motion is reported.
 
     Parameters
     ----------
@@ -226,9 +192,9 @@ def characterize(
         One muscle; every recording starts with unknown memory.
     input, output : str
         Channels.
-    beside : sequence of str
-        Other inputs that move the output. Channels of the input's quantity, loads, and channels that
-        every recording holds, not all of them alike, are among them anyway.
+    scheduling : sequence of str
+        Other inputs that move the output, in addition to channels of the input's quantity, loads, and
+        channels that are constant within recordings and differ between them.
 
     Returns
     -------
@@ -238,7 +204,7 @@ def characterize(
     ------
     DataError
         On no recordings, a missing or constant channel, units that differ between recordings, fewer
-        than ten samples, or an input that moves only together with others.
+        than ten samples, or an input that moves only while others do.
 
     Examples
     --------
@@ -253,33 +219,28 @@ def characterize(
     (2, 1.0)
     """
     runs = listed(recordings)
-    others = others_of(runs, input, output, beside) if runs else []
+    others = others_of(runs, input, output, scheduling) if runs else []
     if not others:
         return _measured(runs, input, output)
-    moved = effects(runs, input, output, others)
     levels = _levels(runs, input, output, others)
-    if levels:
-        found = replace(
-            max(
-                (level.found for level in levels),
-                key=lambda one: (one.loop_width is not None, one.output_span),
-            ),
-            cycles=tuple(cycle for level in levels for cycle in level.found.cycles),
-            n_stretches=sum(level.found.n_recordings for level in levels),
-            levels=tuple(levels) if len(levels) > 1 else (),
-        )
-    elif moved:
-        found = _measured(without(runs, input, output, moved), input, output)
-        found = _blanked(found, (SHAPE | BY_POSITION) - {"gain", "branch_gap"})
-        found = replace(found, adjusted=True)
-    else:
+    if not levels:
         raise DataError(
-            f"it never moves while {', '.join(others)} are constant, so its effect cannot be identified",
+            f"it never moves while constant: {', '.join(others)}; its effect cannot be identified",
             file=runs[0].source,
             channel=input,
             remedy="record one in which it moves alone; models of several inputs need no such recording",
         )
-    return replace(found, effects=moved, **_counts(runs, input, output))
+    found = max(
+        (level.found for level in levels),
+        key=lambda one: (one.loop_width is not None, one.output_span),
+    )
+    return replace(
+        found,
+        cycles=tuple(cycle for level in levels for cycle in level.found.cycles),
+        n_stretches=sum(level.found.n_recordings for level in levels),
+        levels=tuple(levels) if len(levels) > 1 else (),
+        **_counts(runs, input, output),
+    )
 
 
 def _levels(
@@ -289,13 +250,13 @@ def _levels(
     levels = []
     low, high = extremes(runs, given)
     span = high - low
-    for at, parts in standing(runs, given, others):
+    for at, parts in constant_segments(runs, given, others):
         stretches = [part for _, part in parts]
         if all(np.ptp(part[wanted]) == 0 for part in stretches):
             continue
         found = _measured(stretches, given, wanted)
         if all(cycle.amplitude < COVERS * span for cycle in found.cycles):
-            found = _blanked(found, SHAPE - {"branch_gap"})  # of small cycles
+            found = _blanked(found, SHAPE)  # of small cycles
         if found.loop_width is not None or found.branch_gap is not None:
             held = tuple((name, x, runs[0].units[name]) for name, x in zip(others, at, strict=True))
             cycles = tuple(replace(c, recording=parts[c.recording][0]) for c in found.cycles)
@@ -326,13 +287,9 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
     growth, growth_limits, speeds = rate_dependence(loops) or (None, None, None)
     upper, lower = dead_zones(tracks, scale)
     crept = creep(runs, given, wanted, scale)
-    curves = curves_of(branches, largest, scale)
-    gains, onsets, saturations = ([curve[k] for curve in curves] for k in range(3))
     repeated: dict[str, Sequence[float | None]] = {
         **{name: [loop.figures[name] for loop in largest] for name in FIGURES},
-        "gain": gains,
-        "onset": () if None in onsets else onsets,
-        "saturation": () if None in saturations else saturations,
+        "gain": gains_of(branches, largest, scale),
         "dead_zone_upper": upper,
         "dead_zone_lower": lower,
         "creep": [moved for _, moved in crept],
@@ -346,7 +303,7 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
     figures: dict[str, Any] = {
         name: float(np.median(each)) if each else None for name, each in known.items()
     }
-    position, direction, both = explained(tracks)
+    share = explained(tracks)
     found = Characterization(
         input=given,
         output=wanted,
@@ -363,15 +320,11 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
         p_loop=p_loop,
         rate_dependence=growth,
         speeds=speeds,
-        position_share=position,
-        direction_share=direction,
-        loop_share=both,
+        loop_share=share,
         falls=scale.sign < 0,
         intervals={name: found for name, found in limits.items() if found is not None},
     )
-    absent = set() if both >= EXPLAINED else (SHAPE | BY_POSITION) - {"branch_gap"}
-    if found.follows_direction:
-        absent |= BY_POSITION
+    absent = set() if share >= EXPLAINED else SHAPE | OTHERS
     low, high = gap_limits or (1.0, 1.0)
     if found.has_loop is False or low <= 0 <= high:
         absent |= SHAPE

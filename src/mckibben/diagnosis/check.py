@@ -1,4 +1,4 @@
-"""Model check: whether residuals are noise, and otherwise what they depend on."""
+"""Model check: residuals of free runs, their autocorrelation, and what they depend on."""
 
 from __future__ import annotations
 
@@ -12,18 +12,14 @@ from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.comparison.choosing import useful
+from mckibben.diagnosis.causes import Cause, averaged, block_length, causes
 from mckibben.diagnosis.description import ModelDescription
 from mckibben.diagnosis.free_runs import Run, runs_of
-from mckibben.diagnosis.patterns import Pattern, Whiteness, bins, whiteness
-from mckibben.diagnosis.regression import FTest, Regression
-from mckibben.diagnosis.suspects import Group, averaged, block_length, suspects
 from mckibben.recording import Recording, listed
+from mckibben.statistics import NORMAL_95, correlation_length
 from mckibben.system.progress import Tell, one_by_one, telling
 from mckibben.system.showing import DrawsItself
 from mckibben.system.threads import one_blas_thread
-
-LEVEL = 0.01
-"""Probability of a false finding for a correct model, over all tests and outputs (Bonferroni)."""
 
 FEWEST_BLOCKS = 6
 """Smallest number of blocks of a recording that is tested."""
@@ -36,43 +32,74 @@ UNMOVED, OFF_GRID = 0.05, 0.01
 this from the grid.
 """
 
-AGAINST = {"curve": "input", "load": "load", "hysteresis": "branch"}
-"""Axis over which residuals are averaged, by kind of group."""
+TESTED, PER_LAG = 12, 20
+"""Largest number of lags tested together, and samples needed per lag."""
 
-LAST = ("runs", "offset")
-"""Groups without a shape, tested with the others: any other misfit shifts the mean."""
+SHOWN, PAIRS = 50, 5
+"""Largest number of single lags drawn; samples needed per lag, as its multiple."""
 
-ALONE = ("drift", "offset")
-"""Groups that count as findings only if no other does: any misfit has a mean and a trend."""
+NORMAL_99 = 2.5758
+"""Half width, in standard deviations, of the central 99 % of a normal distribution."""
+
+BINS = 10
+"""Number of bins, of equal numbers of samples."""
 
 
 @dataclass(frozen=True)
-class Finding:
-    """A tested cause of a residual.
+class Whiteness:
+    """The autocorrelation of a residual.
 
     Parameters
     ----------
-    kind, channel : str
-        As `mckibben.diagnosis.suspects.Group` has them.
-    p_value : float
-        p-value of noise alone, given the findings before.
-    share : float
-        Share of the residual's variance explained, 0 to 1, given the findings before.
-    size : float
-        The same as a root mean square, unit of the output.
-    coefficient : float or None
-        The offset [unit of the output], or how much later measured motion is than modelled [samples].
-    or_causes : tuple of (str, str)
-        Alternatives from which it is not distinguished.
+    lags : tuple of int
+        In samples, from 1.
+    autocorrelation, band : tuple of float
+        At every lag, and how far from zero 99 % of those of white noise are.
+    n_tested : int
+        Lags tested together, the first ones.
+    p_value : float or None
+        Probability of white noise as far from zero; None where recordings are too short.
     """
 
-    kind: str
+    lags: tuple[int, ...]
+    autocorrelation: tuple[float, ...]
+    band: tuple[float, ...]
+    n_tested: int
+    p_value: float | None
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Mean residual of ``n`` samples between two ends, and its 95 % interval for correlated noise.
+
+    ``label`` is the branch, "rising" or "falling", where there are two.
+    """
+
+    label: str
+    low: float
+    high: float
+    n: int
+    mean: float
+    interval: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Mean residual over one variable.
+
+    Parameters
+    ----------
+    against : str
+        ``input``, ``load``, ``output`` or ``branch``.
+    channel, unit : str
+        What it is against.
+    bins : tuple of Bin
+    """
+
+    against: str
     channel: str
-    p_value: float
-    share: float
-    size: float
-    coefficient: float | None = None
-    or_causes: tuple[tuple[str, str], ...] = ()
+    unit: str
+    bins: tuple[Bin, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +120,10 @@ class OutputCheck:
         The same of the mean, which a model has to beat to be of use.
     exact : bool
         Whether nothing is left but rounding, or the sensor's steps.
-    missing : tuple of Finding
-        What the model misses, most important first.
-    suspects : tuple of Finding
+    missing : tuple of Cause
+        Significant causes of the residual, largest first.
+    suspects : tuple of Cause
         All that was tested, each by itself.
-    n_tests : int
-        Tests that share `LEVEL`.
     whiteness : Whiteness
     patterns : tuple of Pattern
         Means of the residual over inputs, loads, modelled output and branches.
@@ -111,9 +136,8 @@ class OutputCheck:
     rmse: float
     mean_error: float
     exact: bool
-    missing: tuple[Finding, ...]
-    suspects: tuple[Finding, ...]
-    n_tests: int
+    missing: tuple[Cause, ...]
+    suspects: tuple[Cause, ...]
     whiteness: Whiteness
     patterns: tuple[Pattern, ...]
 
@@ -131,7 +155,7 @@ class OutputCheck:
         """Return it for JSON."""
         found = asdict(self)
         found["range"] = found.pop("span")
-        return found | {"right": self.right, "level": LEVEL}
+        return found | {"right": self.right}
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,10 +211,9 @@ def check(
 ) -> Validation:
     """Check a model on recordings, and find what its residuals depend on.
 
-    The model runs free, from an honest start of its memory. What it leaves is tested for following a
-    lag of the output, inputs, their branches by region (hysteresis that is left), recorded loads, time,
-    speed, holds (creep) and the modelled output. The tests hold for noise whose samples are like their
-    neighbours and whose size varies; they share one level.
+    The model runs free. Its residual is regressed, in cross-validation over segments, on a lag of the
+    output, inputs, their branches (remaining hysteresis), recorded loads, time, speed, holds (creep) and
+    the modelled output.
 
     Parameters
     ----------
@@ -254,34 +277,18 @@ def _output(
     if exact:
         # what rounding follows is the arithmetic, or the sensor's steps
         residuals = [0.0 * e for e in residuals]
-    every_group, tables = suspects(model, tested, place, every)
-    groups = [group for group in every_group if group.kind != "start"]
     left = [averaged(e, every) for e, run in zip(residuals, runs, strict=True) if run in tested]
-    regression = Regression(left, tables)
-
-    def pattern(
-        against: str, name: str, unit: str, values: list[Array], way: int | None = None
-    ) -> Pattern:
-        means = [averaged(x, every) for x in values]
-        branches = None if way is None else [table[:, way] for table in tables]
-        return Pattern(against, name, unit, bins(left, means, every, regression, branches))
-
+    missing, suspects = causes(model, tested, place, left, every)
+    found = dict.fromkeys((one.kind, one.channel) for one in suspects)
     patterns = [
-        pattern(
-            *(AGAINST[group.kind], group.channel, runs[0].recording.units[group.channel]),
-            [run.recording[group.channel] for run in tested],
-            group.columns[0] if group.kind == "hysteresis" else None,
-        )
-        for group in groups
-        if group.kind in AGAINST
+        _pattern(against, name, runs[0].recording.units[name], left, tested, every)
+        for kind, against in (("curve", "input"), ("hysteresis", "branch"), ("load", "load"))
+        for each, name in found
+        if each == kind
     ]
     modelled = [run.modelled[:, place] for run in tested]
-    patterns.append(pattern("output", channel.name, channel.unit, modelled))
-    n_tests = len(model.outputs) * len(groups)
-    always = [
-        p for group in every_group if group.kind in ("offset", "start") for p in group.columns
-    ]
-    search = _Search(regression, left, groups, LEVEL / n_tests, always)
+    bins_of = bins(left, [averaged(y, every) for y in modelled], every)
+    patterns.append(Pattern("output", channel.name, channel.unit, bins_of))
     return OutputCheck(
         output=channel.name,
         unit=channel.unit,
@@ -290,87 +297,80 @@ def _output(
         rmse=rmse,
         mean_error=_rms([y - mean for y in measured]),
         exact=exact,
-        missing=search.missing(),
-        suspects=tuple(search.finding(group) for group in groups),
-        n_tests=n_tests,
+        missing=missing,
+        suspects=suspects,
         whiteness=whiteness(residuals),
         patterns=tuple(patterns),
     )
 
 
-class _Search:
-    """Forward selection of groups that explain a residual, the most important first."""
+def _pattern(
+    against: str, name: str, unit: str, left: list[Array], runs: Sequence[Run], every: int
+) -> Pattern:
+    values = [averaged(run.recording[name], every) for run in runs]
+    branches = [np.gradient(x) for x in values] if against == "branch" else None
+    return Pattern(against, name, unit, bins(left, values, every, branches))
 
-    def __init__(
-        self,
-        regression: Regression,
-        left: Sequence[Array],
-        groups: Sequence[Group],
-        level: float,
-        always: Sequence[int],
-    ) -> None:
-        self.regression, self.groups, self.level = regression, groups, level
-        self.always = always
-        self.residual = np.concatenate(left)
 
-    def missing(self) -> tuple[Finding, ...]:
-        """Return the significant groups, each given those before."""
-        found: list[Finding] = []
-        known: tuple[int, ...] = ()
-        for kinds in ({g.kind for g in self.groups} - set(LAST), *({kind} for kind in LAST)):
-            left = [g for g in self.groups if g.kind in kinds and not (found and g.kind in ALONE)]
-            while certain := [g for g in left if self._certain(g, known)]:
-                best = max(certain, key=lambda group: self._gain(group, known))
-                others = {
-                    (group.kind, group.channel): None
-                    for group in certain
-                    if group is not best
-                    and not self._certain(best, (*known, *group.beside, *group.columns))
-                }
-                found.append(self.finding(best, known, tuple(others)))
-                known = (*known, *best.columns)
-                left = [
-                    g
-                    for g in left
-                    if g is not best and (g.kind, g.channel) not in others and g.kind not in ALONE
-                ]
-        return tuple(found)
+def whiteness(residuals: Sequence[Array]) -> Whiteness:
+    """Return the autocorrelation of a residual, pieces (n,), and whether it is white noise.
 
-    def finding(
-        self, group: Group, known: tuple[int, ...] = (), others: tuple[tuple[str, str], ...] = ()
-    ) -> Finding:
-        """Return what a group explains in addition to others."""
-        test = self._test(group, known)
-        coefficient, about = None, float(self.residual.mean())
-        if group.kind == "lag":
-            coefficient = float(group.delay)
-        elif group.kind == "offset":
-            coefficient, about = self.regression.coefficient(group.columns[0]), 0.0
-        total = float(np.sum((self.residual - about) ** 2))
-        return Finding(
-            *(group.kind, group.channel, test.p_value),
-            share=min(test.explained / total, 1.0) if total > 0 else 0.0,
-            size=float(np.sqrt(test.explained / self.residual.size)),
-            coefficient=coefficient,
-            or_causes=others,
-        )
+    Products of samples at a lag are compared with their own scatter, so that white noise whose size
+    depends on the input or the run passes as what it is.
+    """
+    from scipy.special import chdtrc
 
-    def _test(self, group: Group, known: Sequence[int]) -> FTest:
-        beside = set(known) | set(group.beside)
-        return self.regression.test(group.columns, tuple(sorted(beside - set(group.columns))))
+    room, n = max(map(len, residuals)) // (PAIRS + 1), sum(map(len, residuals))
+    lags = np.arange(1, min(SHOWN, room) + 1)
+    if room > SHOWN:
+        lags = np.union1d(lags, np.geomspace(SHOWN, room, SHOWN).astype(int))
+    mean = float(np.concatenate(residuals).mean())
+    left = [e - mean for e in residuals]
+    power = float(sum(e @ e for e in left))
+    found, scatter = np.zeros(lags.size), np.zeros(lags.size)
+    for place, lag in enumerate(lags.tolist()):
+        products = np.concatenate([e[lag:] * e[: len(e) - lag] for e in left if len(e) > lag])
+        # the mean was taken off: what noise itself would give is below zero
+        found[place] = products.sum() + len(products) / n * power / n
+        scatter[place] = products @ products
+    tested, deviation = min(TESTED, room, n // PER_LAG), np.sqrt(scatter)
+    ratio = np.divide(found, deviation, out=np.zeros(lags.size), where=deviation > 0)
+    p_value = float(chdtrc(tested, float(np.sum(ratio[:tested] ** 2)))) if tested else None
+    by_lag = [(x / (power or 1.0)).tolist() for x in (found, NORMAL_99 * deviation)]
+    return Whiteness(tuple(lags.tolist()), tuple(by_lag[0]), tuple(by_lag[1]), tested, p_value)
 
-    def _certain(self, group: Group, known: tuple[int, ...]) -> bool:
-        return self._test(group, known).p_value <= self.level
 
-    def _gain(self, group: Group, known: tuple[int, ...]) -> float:
-        """Return the variance that a group explains beyond noise, by Mallows' C_p.
+def bins(
+    left: Sequence[Array],
+    values: Sequence[Array],
+    every: int,
+    branches: Sequence[Array] | None = None,
+) -> tuple[Bin, ...]:
+    """Return means of a residual in bins of equal numbers of samples.
 
-        Beside mean and start, and with what it is beside: a branch by region may move the curve, too.
-        """
-        before = {*known, *self.always}
-        new = {*group.beside, *group.columns} - before
-        found = self.regression.test(tuple(sorted(new)), tuple(sorted(before)))
-        return found.explained - 2 * found.by_noise
+    Parameters
+    ----------
+    left, values : sequence of array, shape (n,)
+        Means over blocks of ``every`` samples.
+    branches : sequence of array, shape (n,), optional
+        Positive on the rising branch and negative on the falling one, for a mean of each.
+    """
+    e, x = np.concatenate(left), np.concatenate(values)
+    way = np.zeros(x.size) if branches is None else np.sign(np.concatenate(branches))
+    ends = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)))
+    places = np.clip(np.searchsorted(ends, x, "right") - 1, 0, ends.size - 2)
+    labels = {"": 0} if branches is None else {"rising": 1, "falling": -1}
+    memory, found = correlation_length(left), []
+    for k in range(ends.size - 1):
+        for label, sign in labels.items():
+            own = e[(places == k) & (way == sign)]
+            if own.size:
+                mean = float(own.mean())
+                half = NORMAL_95 * float(own.std()) * np.sqrt(min(memory / own.size, 1.0))
+                ends_of = float(ends[k]), float(ends[k + 1])
+                limits = mean - half, mean + half
+                found.append(Bin(label, *ends_of, own.size * every, mean, limits))
+    return tuple(found)
 
 
 def _rms(pieces: Sequence[Array]) -> float:

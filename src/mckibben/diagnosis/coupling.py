@@ -9,9 +9,11 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.comparison.channels import Channels, any_moves, moved_by
-from mckibben.diagnosis.conditions import FOLLOWS
 from mckibben.recording import Recording
 from mckibben.statistics import dependence
+
+FOLLOWS = 0.9
+"""R² of an input's regression on the others above which their effects are not separable."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,12 +25,12 @@ class Coupling:
     inputs, outputs : tuple of str
         Channels.
     effects : array, shape (outputs, inputs)
-        What an input over its whole measured range does to an output, in the output's unit; NaN where
-        inputs move together, so that nobody can tell whose effect it is.
+        Change of an output over an input's whole measured range, in the output's unit; NaN where
+        inputs are collinear.
     units : tuple of str
         Of the outputs.
     explained : tuple of float
-        Share of each output's variance that the line explains: the rest is bent, or remembers.
+        Share of each output's variance that linear regression explains.
     """
 
     inputs: tuple[str, ...]

@@ -9,28 +9,24 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mckibben.arrays import true_runs
 from mckibben.comparison.channels import channels_of
 from mckibben.comparison.shared_rows import without_copies
 from mckibben.diagnosis.excitation import Excitation, extremes
 from mckibben.errors import DataError
 from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording, listed
-from mckibben.signals.reversals import third_differences
 from mckibben.statistics import dependence
 
 if TYPE_CHECKING:
     from mckibben.comparison.channels import Names
 
 FEWEST_SAMPLES, MOST_SAMPLES = 10, 20_000
-"""Smallest number of samples of a recording, and largest number used for correlations and sensor
-resolution.
-"""
+"""Smallest number of samples of a recording, and largest number used for correlations."""
 
 AT_END, OFF_REST = 0.1, 0.1
 """Shares of a range: distance from an end for a turning point to be at it; distance from the most
@@ -40,16 +36,6 @@ frequent value to be away from rest.
 LARGE, SIMILAR, FEWEST_BRANCHES = 0.25, 1.5, 4
 """Speeds are compared among branches over this share of the range, whose lengths differ by at most
 this factor, if there are this many.
-"""
-
-REPEATED, LASTING, CYCLE_POINTS = 0.02, 1.1, 9
-"""Two cycles are equal if channels agree within this share of their ranges at this many points, and
-durations within this factor.
-"""
-
-OWN_NOISE = 3.0
-"""Scatter of an output, relative to that of the inputs (in shares of their ranges), that counts as
-its own noise.
 """
 
 Found = Iterator[tuple[float, tuple[str, ...]]]
@@ -118,7 +104,7 @@ def data_gaps(
         To which a model is to be fitted.
     inputs, outputs : str or sequence of str, optional
         Channels; default those of pressures and displacements, or of pressure, length and force.
-        Loads and stiffening pressures are found beside them.
+        Loads and stiffening pressures are found by name.
     tests : sequence of Recording
         On which the model is to be used.
 
@@ -311,69 +297,9 @@ def _together(known: Excitation) -> Found:
         yield share, (known.moving[one], known.moving[other])
 
 
-def _samples_of_branch(known: Excitation) -> Found:
-    """Yield the number of samples per branch, as the median over the input's travel."""
-    for name in known.swinging:
-        branches = sorted(known.branches[name], key=lambda branch: branch.last - branch.first)
-        way = np.cumsum([branch.travel for branch in branches])
-        if branches:
-            middle = branches[int(np.searchsorted(way, 0.5 * way[-1]))]
-            yield middle.last - middle.first, (name,)
-
-
-def _resolution(known: Excitation) -> Found:
-    """Yield the noise of an output, or its sensor's resolution if larger, as a share of its range."""
-    first = known.recordings[0]
-
-    def scatter(name: str) -> float:
-        return third_differences(first[name])[0] / known.span(name)
-
-    for name in known.outputs if known.moving else ():
-        if known.moves(name):
-            noisy = scatter(name) > OWN_NOISE * max(map(scatter, known.moving))
-            values = known.pooled([name])[:, 0]
-            levels = np.unique(values[:: max(1, values.size // MOST_SAMPLES)])
-            stepped = 2 < levels.size < min(values.size, MOST_SAMPLES) / 5
-            step = float(np.quantile(np.diff(levels), 0.1)) if stepped else 0.0
-            yield max(known.noise[name] if noisy else 0.0, step) / known.span(name), (name,)
-
-
-def _clipped(known: Excitation) -> Found:
-    """Yield the number of successive samples at one end of the range of a noisy output."""
-    for name in known.outputs:
-        steps = np.abs(np.diff(known.pooled([name])[:MOST_SAMPLES, 0]))
-        if known.moves(name) and known.noise[name] > steps[steps > 0].min(initial=np.inf):
-            at_ends = [one[name] == end for one in known.recordings for end in known.ranges[name]]
-            yield max(int(np.diff(true_runs(at)).max(initial=0)) for at in at_ends), (name,)
-
-
 def _untimed(known: Excitation) -> Found:
     """Yield the share of recordings with time."""
     yield float(np.mean([one.sample_time is not None for one in known.recordings])), known.inputs
-
-
-def _repeated_cycles(known: Excitation) -> Found:
-    """Yield the number of repeated cycles of an input, with all other driving channels equal."""
-    from scipy.spatial import cKDTree
-
-    pairs = 0
-    for name in known.swinging:
-        cycles = []
-        large = LARGE * known.span(name)
-        for one, other in pairwise(known.branches[name]):
-            follows = one.recording == other.recording and one.last == other.first
-            if follows and min(one.travel, other.travel) > large:
-                recording = known.recordings[one.recording]
-                # from the middle of one branch to that of the next: turning points are flat
-                first, last = (branch.middle(recording[name]) for branch in (one, other))
-                at = np.linspace(first, last, CYCLE_POINTS).round().astype(int)
-                path = [recording[u][at] / known.span(u) for u in known.moving]
-                ends = np.array([one.start, other.start, other.end]) / known.span(name)
-                lasts = np.log((last - first) * (recording.sample_time or 1.0)) / np.log(LASTING)
-                cycles.append([*np.concatenate([ends, *path]) / REPEATED, lasts])
-        pairs += len(cKDTree(cycles).query_pairs(1.0, p=np.inf)) if cycles else 0
-    if known.swinging:
-        yield pairs, known.swinging
 
 
 RULES = (
@@ -388,10 +314,6 @@ RULES = (
     Rule("minor loops", _inner_reversals, operator.lt, 3, "random", 0.75),
     Rule("load", _constant(lambda known: known.loads), operator.lt, 1.0, "random", 0.6),
     Rule("spring load", _load_by_output, operator.gt, 0.98, "random", 0.6),
-    Rule("clipped", _clipped, operator.ge, 10, "sensor", 0.6),
     Rule("creep", _hold, operator.lt, 8.0, "holds", 0.55, timed=True),
-    Rule("sampling", _samples_of_branch, operator.lt, 8, "sampling", 0.5),
-    Rule("resolution", _resolution, operator.gt, 0.02, "sensor", 0.45),
-    Rule("repeats", _repeated_cycles, operator.lt, 1, "repeats", 0.2),
 )
 """Data gaps: the value computed, its threshold, and the run that closes the gap."""

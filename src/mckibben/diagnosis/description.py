@@ -1,4 +1,4 @@
-"""Description of a model on recordings: equations, parameters with uncertainty, frequency response."""
+"""Description of a model on recordings: equations, and parameters with uncertainty."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.equations import Quantity, quantities, written
 from mckibben.blocks.inverse import commands
 from mckibben.blocks.notation import Written
-from mckibben.diagnosis.responses import FrequencyResponse, frequency_responses
 from mckibben.errors import DataError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.uncertainty import (
@@ -72,8 +71,6 @@ class ModelDescription:
         Its equations with its numbers, in LaTeX.
     parameters : tuple of Parameter
         In the order of ``block.pack()``.
-    frequency_responses : tuple of FrequencyResponse
-        Of linear models.
     recordings : tuple of str
         Names of those that all this rests on.
     fitted : bool
@@ -82,7 +79,6 @@ class ModelDescription:
 
     written: Written
     parameters: tuple[Parameter, ...]
-    frequency_responses: tuple[FrequencyResponse, ...]
     recordings: tuple[str, ...]
     fitted: bool
 
@@ -123,11 +119,8 @@ def describe(
         covariance, n_effective = uncertainty(block, recordings)
         freedom = n_effective - np.isfinite(np.diag(covariance)).sum()
         half = float(stdtrit(np.maximum(freedom, 1.0), 0.5 + LEVEL / 2))
-        responses = frequency_responses(block, recordings, covariance, half)
     names = tuple(recording.name for recording in recordings)
-    return ModelDescription(
-        written(block), parameters(block, covariance, half), responses, names, fitted
-    )
+    return ModelDescription(written(block), parameters(block, covariance, half), names, fitted)
 
 
 def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, float]:
@@ -160,7 +153,7 @@ def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, f
 def parameters(block: Block, covariance: Array, half_width: float) -> tuple[Parameter, ...]:
     """Return every entry of ``block.pack()``, in order, with its meaning and uncertainty.
 
-    What is rounding beside the others, as a weight of 1e-17, is shown as 0.
+    Values that are rounding compared with the others, such as a weight of 1e-17, are shown as 0.
     """
     values, errors, chosen = block.pack(), np.sqrt(np.diag(covariance)), fixed(block)
     known = np.isfinite(errors)

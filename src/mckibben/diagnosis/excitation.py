@@ -54,11 +54,6 @@ class Branch:
         """Distance covered."""
         return abs(self.end - self.start)
 
-    def middle(self, u: Array) -> int:
-        """Return the sample of a channel at its midpoint."""
-        gone = np.abs(u[self.first : self.last + 1] - self.start)
-        return self.first + int(np.argmax(gone >= 0.5 * self.travel))
-
 
 @dataclass(frozen=True)
 class Excitation:

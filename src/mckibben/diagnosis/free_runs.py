@@ -10,16 +10,13 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, check_units
-from mckibben.blocks.free_run import PERIODIC, measured_start, refuse_runaway, run_free
+from mckibben.blocks.free_run import refuse_runaway, run_free
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 
 FEWEST, SHORTEST = 60, 10
 """Smallest number of samples that can be tested, in total and per recording."""
-
-SHIFTS = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
-"""Largest error of the first measured output, in RMS residuals."""
 
 SAME_TIME = 1e-3
 """Relative difference up to which sample times are equal."""
@@ -69,7 +66,7 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
     for recording in recordings:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore", RuntimeWarning)
-            modelled = _modelled(block, recording, outputs, recordings)
+            modelled = run_free(block, recording, outputs, recordings)
         measured = recording.matrix(outputs)
         refuse_runaway(block, recording, modelled, measured)
         found.append(Run(recording, recording.matrix(inputs), measured, modelled))
@@ -99,32 +96,6 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
             channel=still[0],
             remedy="record while it moves, or name another column with `columns[CHANNEL]=COLUMN`",
         )
-
-
-def _modelled(
-    block: Block, recording: Recording, outputs: Sequence[str], recordings: Sequence[Recording]
-) -> Array:
-    """Return modelled outputs, with the start state that best explains the whole recording.
-
-    The excursion before the first sample that explains the first measured output is known no better
-    than that one sample, and a memory may keep the error for long. So outputs about the first one are
-    tried, and the block's own rule.
-    """
-    free = run_free(block, recording, outputs, recordings)
-    if block.n_states == 0 or recording.meta.get(PERIODIC):
-        return free
-    tried = [block.simulate(recording).matrix(outputs), free]
-    if not np.mean((tried[0] - free) ** 2) > 0:
-        return free
-    measured, name = recording.matrix(outputs), outputs[0]
-    noise = float(np.sqrt(np.mean((measured[:, 0] - free[:, 0]) ** 2)))
-    for shift in SHIFTS:
-        first = np.append(measured[0, 0] + shift * noise, measured[1:, 0])
-        moved = recording.with_channels({name: recording.units[name]}, **{name: first})
-        start = measured_start(block, moved, outputs)
-        tried.append(block.simulate(recording, initial=start.tolist()).matrix(outputs))
-    errors = [float(np.sum((measured - one) ** 2)) for one in tried]
-    return tried[int(np.nanargmin(errors))] if np.isfinite(errors).any() else free
 
 
 def _refuse(recording: Recording, block: Block, step: float | None) -> None:

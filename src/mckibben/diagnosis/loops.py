@@ -31,11 +31,8 @@ PART, SLIGHT = 0.5, 0.005
 """Share of the other branch that a branch at either end of a recording must have to make a loop; mean
 width over the output range below which it is not measured where a loop is wide."""
 
-FLAT, REACH = 0.2, 2
-"""Share of the mean slope below which the output saturates; half width of a slope's window."""
-
 BINS = 12
-"""Number of bins of input or velocity, for explained variance."""
+"""Number of bins of input, for explained variance."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +57,8 @@ class Cycle:
 
     def like(self, other: Cycle, within: float) -> bool:
         """Return whether another cycle has the same extremes, within a share of the amplitude."""
-        apart = max(abs(self.low - other.low), abs(self.high - other.high))
-        return apart <= within * self.amplitude
+        distance = max(abs(self.low - other.low), abs(self.high - other.high))
+        return distance <= within * self.amplitude
 
 
 FIGURES = ("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid")
@@ -245,61 +242,35 @@ def gap_of(found: Branches, sign: float) -> tuple[float | None, Range | None, fl
     return gap, (gap - half, gap + half), p
 
 
-Curve = tuple[float | None, float | None, float | None]
-"""Gain, onset and saturation of a curve."""
+def gains_of(found: Branches, loops: Sequence[Loop], scale: Scale) -> list[float]:
+    """Return the mean slope of rising and falling output at mid input, over a fifth of the range.
 
-
-def curves_of(found: Branches, loops: Sequence[Loop], scale: Scale) -> list[Curve]:
-    """Return gain, onset and saturation of rising and falling output, if determined.
-
-    Of the largest loops where they cover the input range, else of all branches. The gain is the mean
-    slope of both at mid input over a fifth of the range; below the onset and above the saturation the
-    slopes of both stay under a fifth of their mean.
+    Of the largest loops where they cover the input range, else of all branches.
     """
     curves = [
         (loop.levels, loop.up, loop.down)
         for loop in loops
         if loop.cycle.amplitude >= LARGE * scale.u.span
     ] or [(found.levels, *found.means)]
-    return [
-        _curve_of(u[known], np.array([up[known], down[known]]), scale)
-        for u, up, down in curves
-        if (known := np.isfinite(up + down)).any()
-    ]
-
-
-def _curve_of(u: Array, both: Array, scale: Scale) -> Curve:
     centre, fifth = 0.5 * (scale.u.low + scale.u.high), 0.1 * scale.u.span
-    gain = onset = saturation = None
-    if u[0] <= centre - fifth and u[-1] >= centre + fifth:
-        low, high = np.interp([centre - fifth, centre + fifth], u, both.mean(axis=0))
-        gain = float(high - low) / (2 * fifth)
-    if u.size >= 4 * REACH:
-        rises = scale.sign * (both[:, 2 * REACH :] - both[:, : -2 * REACH])
-        slopes, at = rises / (u[2 * REACH :] - u[: -2 * REACH]), u[REACH:-REACH]
-        steep = np.flatnonzero(slopes.max(axis=0) >= max(FLAT * slopes.mean(), 0.0))
-        # A flat end counts when more than one slope is flat there, so that noise makes none.
-        onset = float(at[steep[0]]) if steep.size and steep[0] > 1 else None
-        saturation = float(at[steep[-1]]) if steep.size and steep[-1] < at.size - 2 else None
-    return gain, onset, saturation
+    ends, gains = [centre - fifth, centre + fifth], []
+    for u, up, down in curves:
+        known = np.isfinite(up + down)
+        if known.any() and u[known][0] <= ends[0] and u[known][-1] >= ends[1]:
+            low, high = np.interp(ends, u[known], 0.5 * (up + down)[known])
+            gains.append(float(high - low) / (2 * fifth))
+    return gains
 
 
-def explained(tracks: Sequence[Track]) -> list[float]:
-    """Return the shares of the output's variance that input, velocity, and input with direction explain.
-
-    Velocity is the change of the input from sample to sample. By means over bins with as many samples.
-    """
+def explained(tracks: Sequence[Track]) -> float:
+    """Return the share of the output's variance that input and direction explain, by means over bins."""
     u, y = (np.concatenate([getattr(track, name) for track in tracks]) for name in "uy")
-    v = np.concatenate([np.gradient(track.u) for track in tracks])
-    position, velocity = (
-        np.searchsorted(np.quantile(x, np.linspace(0, 1, BINS + 1)[1:-1]), x) for x in (u, v)
-    )
-    shares = []
-    for bins in (position, velocity, 2 * position + (v > 0)):
-        count, total = np.bincount(bins), np.bincount(bins, y)
-        left = np.var(y - (total / np.maximum(count, 1))[bins])
-        shares.append(float(1 - left / np.var(y)) if np.ptp(y) > 0 else 0.0)
-    return shares
+    rising = np.concatenate([np.gradient(track.u) > 0 for track in tracks])
+    ends = np.quantile(u, np.linspace(0, 1, BINS + 1)[1:-1])
+    bins = 2 * np.searchsorted(ends, u) + rising
+    count, total = np.bincount(bins), np.bincount(bins, y)
+    left = np.var(y - (total / np.maximum(count, 1))[bins])
+    return float(1 - left / np.var(y)) if np.ptp(y) > 0 else 0.0
 
 
 def drift(loops: Sequence[Loop]) -> list[float]:

@@ -145,8 +145,8 @@ def rate_dependence(loops: Sequence[Loop]) -> tuple[float, Range, Range] | None:
     """Return the increase of loop width at twice the speed [%], its 95 % interval, and the speeds.
 
     By a straight line over the logarithm of the mean speed, of three or more closed cycles between like
-    extremes that differ most in speed; the first of a recording, which starts from an unknown memory,
-    apart.
+    extremes that differ most in speed, without the first of a recording, which starts from an unknown
+    memory.
     """
     from scipy.special import stdtrit
 

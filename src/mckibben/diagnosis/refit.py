@@ -71,7 +71,7 @@ def refitted(
 ) -> Refit | str:
     """Refit a model of the same kind to logs, or return why that is not possible.
 
-    ``older`` recordings are fitted beside the logs; those without its channels are left out.
+    ``older`` recordings are fitted as well; those without its channels are left out.
     """
     kinds = " ".join(_kinds(old))
     known = map(declared, registry.names("estimators"))
@@ -81,7 +81,7 @@ def refitted(
     inputs, outputs = ([c.name for c in channels] for channels in (old.inputs, old.outputs))
     names = [*inputs, *outputs]
     whole = [log.select(names) for log in logs]
-    beside = [one.select(names) for one in older if all(name in one for name in names)]
+    older_runs = [one.select(names) for one in older if all(name in one for name in names)]
     driving = [name for name in inputs if name not in old.scheduling]
     settings = {"seed": seed} | estimator.channel_settings(driving, outputs, old.scheduling)
     for part in old.parts if isinstance(old, Series) else (old,):
@@ -90,8 +90,8 @@ def refitted(
             settings["n_operators"] = len(thresholds) - (thresholds[0] == 0)
 
     def fitted(recordings: Sequence[Recording], rows: Sequence[Mask]) -> Block:
-        masks = [*rows, *(np.ones(len(one), dtype=bool) for one in beside)]
-        found: Block = estimator(**settings).fit([*recordings, *beside], rows=masks).model_
+        masks = [*rows, *(np.ones(len(one), dtype=bool) for one in older_runs)]
+        found: Block = estimator(**settings).fit([*recordings, *older_runs], rows=masks).model_
         return found
 
     def missed(block: Block, log: Recording) -> Array:
@@ -119,7 +119,7 @@ def refitted(
     of_old, of_new = (bootstrap.rmse(each) for each in errors)
     ratio = interval(of_new / np.maximum(of_old, np.finfo(float).tiny))
     missed_by = [float(np.sqrt((each**2).mean(axis=0)).mean()) for each in errors]
-    return Refit(new, missed_by[0], missed_by[1], ratio, len(parts), len(beside))
+    return Refit(new, missed_by[0], missed_by[1], ratio, len(parts), len(older_runs))
 
 
 def _kinds(block: Block) -> list[str]:

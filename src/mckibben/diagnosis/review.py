@@ -144,9 +144,9 @@ def review(
     Parameters
     ----------
     log : Recording or sequence of Recording
-        With ``reference_...`` channels beside what is measured, such as `track` writes; with
+        With ``reference_...`` channels and the measured ones, as `track` writes them; with
         ``command_...`` channels where commands are logged. Recordings without any reference are older
-        data, which a refit is given beside the log.
+        data, to which a refit is fitted as well.
     model : Block, optional
         What ran; default what the compensator undoes.
     compensator : Block, optional
@@ -292,12 +292,12 @@ def _commands(
         return asked, "" if asked is None else "compensator"
     sent = {name: log[COMMAND + name] for name in inputs}
     later = {name: _shifted(values, 1.0) for name, values in sent.items()}
-    beside = asked or {name: log[name] for name in inputs if name in log}
+    expected = asked or {name: log[name] for name in inputs if name in log}
 
     def off(way: Mapping[str, Array]) -> float:
-        return float(sum(np.sum((way[name] - values) ** 2) for name, values in beside.items()))
+        return float(sum(np.sum((way[name] - values) ** 2) for name, values in expected.items()))
 
-    # a command is logged when it is sent, for the reference of the next sample, or beside that
+    # a command is logged when it is sent, for the reference of the next sample, or together with it
     return min((later, sent), key=off), "command"
 
 

@@ -51,8 +51,8 @@ class Spread:
         span = high - low
         if span < NARROWEST:
             raise DataError(
-                f"it {f'moves by {span:.3g} in all' if span else f'is constant at {low:g}'}, so there "
-                "is no hysteresis to see",
+                f"it {f'moves by {span:.3g} in all' if span else f'is constant at {low:g}'}, so "
+                "hysteresis cannot be measured",
                 file=source,
                 channel=channel,
                 remedy="record while it moves, check its column and unit, or name another channel",
@@ -60,8 +60,8 @@ class Spread:
         levels = [noise_level(signal, span) for signal in signals if signal.size > 1]
         known = [level for level in levels if not np.isnan(level)]
         noise = float(np.median(known)) if known else float("nan")
-        apart = np.diff(readings)
-        step = float(apart[apart > ROUNDING * span].min())
+        steps = np.diff(readings)
+        step = float(steps[steps > ROUNDING * span].min())
         return cls(low, high, 0.0 if noise < ROUNDING * span else noise, step)
 
 

@@ -21,7 +21,7 @@ from mckibben.report.builder import Code, Item, Page, Section, Table, Text
 from mckibben.report.results import board_table
 
 SHOWN = 8
-"""Models of a section, and the chosen one; the rest are in the file beside."""
+"""Models of a section, and the chosen one; the rest are in ``measured.csv``."""
 
 FILES = ["measured.html", "measured.md", "measured.csv"]
 """What is written."""

@@ -31,7 +31,7 @@ LEAST_WIDTH = 0.01
 """RMS of the measured branch gaps over the range tested on, below which no width is scored."""
 
 KEYS = ("set", "task", "recording", "row")
-"""Columns of predictions beside the outputs; rows are samples from 0."""
+"""Columns of predictions in addition to the outputs; rows are samples from 0."""
 
 HEAD = "model,set,task,rmse,unit,percent,width"
 """Of the leaderboard's lines."""

@@ -20,7 +20,7 @@ from mckibben.blocks.base import Block
 from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelWarning
 from mckibben.papers.paper import FigureText, Paper, TableText, paper
-from mckibben.recording import REST_LENGTH, Recording, conversion
+from mckibben.recording import Recording
 from mckibben.rigs import Rig, load_rig, record
 from mckibben.signals.protocol import Protocol, Role, protocol
 from mckibben.system.progress import telling
@@ -148,17 +148,6 @@ class Runs(dict[str, Recording]):
         return self.labels[name].labels[label]
 
 
-class Rerun(NamedTuple):
-    """Interface of a paper's module.
-
-    ``run`` fills an `Experiment`. ``sort`` takes recordings of one's own and returns what each is for,
-    or None for one without use; it raises DataError where one that is needed is missing.
-    """
-
-    run: Callable[[Experiment], None]
-    sort: Callable[[Sequence[Recording]], Sequence[Labels | None]]
-
-
 @dataclass
 class Experiment:
     """A paper's experiment in progress.
@@ -202,7 +191,7 @@ class Experiment:
         *,
         until: float = 0.3,
     ) -> Runs:
-        """Return the runs of the paper's protocol on the rig, or the user's recordings, sorted.
+        """Return the runs of the paper's protocol on the rig, or the user's recordings of it.
 
         Parameters
         ----------
@@ -214,7 +203,7 @@ class Experiment:
             Share of the whole work that is done then.
         """
         if self.data is not None:
-            return self._given([self._complete(one) for one in self.data])
+            return self._labelled(self.data)
         plan = protocol(self.name, self.rig) if what is None else what
         names = [run.name for run in plan.runs] if names is None else names
         tell, runs = self.within(0.0, until), dict[str, Recording]()
@@ -224,36 +213,28 @@ class Experiment:
             tell(len(runs) / len(names), f"recorded {run.name}")
         return Runs(runs, {name: Labels(plan[name].role, plan[name].labels) for name in runs})
 
-    def _complete(self, one: Recording) -> Recording:
-        """Return a recording with all channels that the paper needs; raise an error otherwise."""
-        one = one.with_derived(self.paper.channels)
-        for channel in self.paper.channels:
-            if channel not in one:
-                has = ", ".join(one.channels)
-                remedy = (
-                    f"`columns[{channel}]=COLUMN`, or take the file out if it is of something else"
+    def _labelled(self, data: Sequence[Recording]) -> Runs:
+        """Return recordings of the protocol, by what the rig noted or by their names."""
+        plan = protocol(self.name)
+        planned = {run.name: Labels(run.role, run.labels) for run in plan.runs}
+        runs = Runs({}, labels := {})
+        for one in data:
+            noted = one.meta.get("protocol") == self.name
+            own = Labels(one.meta["role"], one.meta["labels"]) if noted else planned.get(one.name)
+            if own is None:
+                raise DataError(
+                    f"{one.name!r} is no run of the protocol",
+                    file=one.source,
+                    remedy=f"name it as the run that it is: {', '.join([*planned][:6])}, ...",
                 )
-                if any(conversion(channel, name, 1.0) for name in one.channels):
-                    remedy = f"state {REST_LENGTH}"
-                problem = f"{self.name} needs it, and there are {has}"
-                raise DataError(problem, file=one.source, channel=channel, remedy=remedy)
-        return one
-
-    def _given(self, data: Sequence[Recording]) -> Runs:
-        """Return recordings with roles: as noted by a rig, or by their driving signals."""
-        labels: Sequence[Labels | None]
-        if all(one.meta.get("protocol") == self.name for one in data):
-            labels = [Labels(one.meta["role"], one.meta["labels"]) for one in data]
-        else:
-            labels = registry.load("papers", self.name).sort(data)
-        runs = Runs({}, used := {})
-        for place, (one, label) in enumerate(zip(data, labels, strict=True), start=1):
-            if label is not None:
-                name = f"{one.name}-{place}" if one.name in runs else one.name
-                runs[name], used[name] = one, label
-        unused = [str(one.name) for one, label in zip(data, labels, strict=True) if label is None]
-        if unused:
-            self.warned[f"Recordings that are not used: {', '.join(unused)}."] = None
+            whole = one.with_derived(self.paper.channels)
+            whole.matrix(self.paper.channels)  # raises an error for what is absent
+            runs[one.name], labels[one.name] = whole, own
+        there = {(label.role, label.labels.get("stage")) for label in labels.values()}
+        for name, label in planned.items():
+            if (label.role, label.labels.get("stage")) not in there:
+                remedy = "record at least one run of every kind"
+                raise DataError(f"there is no run like {name} of the protocol", remedy=remedy)
         return runs
 
     def fit(
@@ -395,7 +376,7 @@ def reproduce(
     rig : Rig or str, optional
         That is recorded, and on which loops are closed; default the protocol's, with ``data`` none.
     data : sequence of Recording, optional
-        Recordings of one's own instead; what each is for is found from what was driven.
+        Recordings of the protocol instead, as a rig wrote them or named as its runs.
     quick : bool
         Whether to leave out what takes long.
     seed, jobs
@@ -414,9 +395,9 @@ def reproduce(
     ModelError, DataError
         If there is no such paper, or a recording that it needs is missing.
     """
-    rerun: Rerun = registry.load("papers", name)
+    run: Callable[[Experiment], None] = registry.load("papers", name)
     if data is not None and not data:
-        raise DataError("there is no recording", remedy=f"give what it needs: {paper(name).data}")
+        raise DataError("there is no recording", remedy=f"record its protocol: {name}")
     if rig is None and data is None:
         rig = protocol(name).rig
     plant = load_rig(rig) if isinstance(rig, str) else rig
@@ -436,38 +417,11 @@ def reproduce(
     kept = Checkpoints(folder, name, quick, seed)
     with one_blas_thread(), telling(progress, name) as tell:
         experiment = Experiment(name, plant, data, quick, seed, jobs, kept, tell or _no_progress)
-        rerun.run(experiment)
+        run(experiment)
     if clear:
         kept.clear()
     on = f"{len(data)} recordings" if data is not None else f"rig {plant.name}" if plant else ""
     return experiment.done(on)
-
-
-def demand_one_sign(recordings: Sequence[Recording], channel: str) -> None:
-    """Raise an error for recordings of opposite signs."""
-    peaks = np.array([one[channel][np.argmax(np.abs(one[channel]))] for one in recordings])
-    strong = np.abs(peaks) > 0.1 * np.abs(peaks).max()
-    usual = np.sign(np.sum(np.sign(peaks[strong]))) or 1.0
-    for place in np.flatnonzero(strong & (np.sign(peaks) != usual)):
-        raise _turned(
-            "it has another sign than in the other recordings", recordings[place], channel
-        )
-
-
-def demand_rise(recordings: Sequence[Recording], by: str, channel: str) -> None:
-    """Raise an error for recordings in which a channel is constant, or falls as another rises."""
-    for one in recordings:
-        for name in (by, channel):
-            if np.ptp(one[name]) == 0:
-                remedy = "take the file out, or name another column"
-                raise DataError("it does not move", file=one.source, channel=name, remedy=remedy)
-        if np.corrcoef(one[by], one[channel])[0, 1] < 0:
-            raise _turned(f"it falls as the {by} rises", one, channel)
-
-
-def _turned(problem: str, one: Recording, channel: str) -> DataError:
-    remedy = f"turn its sign: `calibration[{channel}]=COLUMN:-1:0:{one.units[channel] or 1}`"
-    return DataError(problem, file=one.source, channel=channel, remedy=remedy)
 
 
 def rms(errors: Array) -> float:

@@ -1,6 +1,6 @@
 """A paper: authors, question, printed results, and the place of its equations and tables here.
 
-All of it is data, ``paper.toml`` in the paper's folder; the code beside it holds what must be computed.
+All of it is data, ``paper.toml`` in the paper's folder; the code there computes the rest.
 """
 
 from __future__ import annotations
@@ -69,10 +69,10 @@ class FigureText(_Strict):
 class Paper(_Strict):
     """A paper.
 
-    ``data`` is what recordings of one's own it needs; ``given`` what is taken from the paper or set,
-    and ``found`` what the recordings determine. Sentences of ``summary`` have fields in braces, which
-    the experiment fills; one without its fields is left out. ``notes`` are what differs from the paper,
-    ``quick`` what a quick run leaves out. Tables, figures and printed models are by key.
+    ``given`` is what is taken from the paper or set, ``found`` what the recordings determine.
+    Sentences of ``summary`` have fields in braces, which the experiment fills; one without its fields
+    is left out. ``notes`` are differences from the paper, ``quick`` what a quick run omits. Tables,
+    figures and printed models are by key.
     """
 
     number: int
@@ -82,7 +82,6 @@ class Paper(_Strict):
     published: str = ""
     doi: str = ""
     protocol: Words
-    data: Words
     channels: tuple[str, ...]
     given: tuple[Words, ...]
     found: tuple[Words, ...]
@@ -106,7 +105,7 @@ class Paper(_Strict):
 @cache
 def paper(name: str) -> Paper:
     """Return a paper by its short name; raise a `ModelError` that lists them if unknown."""
-    module = registry.load("papers", name).run.__module__
+    module = registry.load("papers", name).__module__
     text = resources.files(module.rpartition(".")[0]).joinpath("paper.toml").read_text("utf-8")
     return Paper.model_validate(tomllib.loads(text))
 

@@ -32,28 +32,28 @@ Parts = list[tuple[str, Array]]
 
 
 def motion(
-    limits: Limits, seconds: float, step: float, wanted: set[str], rng: np.random.Generator
+    limits: Limits, seconds: float, step: float, holds: bool, rng: np.random.Generator
 ) -> Parts:
     """Return motion that starts and ends at rest, in parts.
 
-    Random motion comes first; full cycles and holds follow where they are wanted and there is time.
+    Random motion comes first, then full cycles and holds, where there is time.
 
     Parameters
     ----------
     limits : Limits
     seconds, step : float
         Duration of all, and sample time [s].
-    wanted : set of str
-        "repeats" for full cycles, "holds" for holds.
+    holds : bool
+        Whether to hold.
     """
     low, high, rest = (
         np.array([getattr(one, end) for one in limits.values()]) for end in ("low", "high", "rest")
     )
     crossing = PEAK * max(one.crossing for one in limits.values())
     stops: list[tuple[str, Array, float]] = []  # levels to go to, and how long to stay there
-    if "repeats" in wanted and (2 * CYCLES + 1) * crossing <= SHARE * seconds:
+    if (2 * CYCLES + 1) * crossing <= SHARE * seconds:
         stops += [("repeats", end, 0.0) for end in (low, *(high, low) * CYCLES)]
-    for count in (2, 1) if "holds" in wanted else ():
+    for count in (2, 1) if holds else ():
         stays = SHARE * seconds / count - crossing
         if stays >= HOLD:
             shares = rng.uniform(0.15, 0.85, (count, low.size))

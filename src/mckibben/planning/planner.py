@@ -110,16 +110,16 @@ def plan(
     own = {} if plant is None else limits_of_rig(plant)
     recorded_limits: Limits = {}
     gaps: tuple[Gap, ...] = ()
-    wanted = {"holds", "repeats"}
+    holds = True
     step = 0.0 if plant is None else plant.sample_time
     if recorded:
         known = _known(recorded, plant)
         gaps, recorded_limits = gaps_of(known), limits_of_recordings(known)
-        own, wanted = recorded_limits | own, {gap.run for gap in gaps}
+        own, holds = recorded_limits | own, any(gap.run == "holds" for gap in gaps)
         step = max(step, min(one.sample_time or math.inf for one in recorded))
     within = narrowed(own, limits or {})
     check_possible(within, seconds, plant)
-    parts = motion(within, seconds, step, wanted, np.random.default_rng(seed))
+    parts = motion(within, seconds, step, holds, np.random.default_rng(seed))
     commands = np.concatenate([part for _, part in parts])
     planned = Recording(dict(zip(within, commands.T, strict=True)), step)
     return Plan(

@@ -27,7 +27,7 @@ def check_json(found: Validation, model_file: str) -> dict[str, Any]:
     """Return a check with its verdict in words, for JSON."""
     return found.to_dict() | {
         "verdict": words.check_verdict(found),
-        "sentences": words.check_sentences(found),
+        "sentences": [said for one in found.outputs for said in words.check_notes(one)],
         "model_file": model_file,
         "notes_of_reading": notes_by_file([run.recording for run in found.runs]),
     }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,15 +15,6 @@ Given = Mapping[str, Any]
 
 FORGOTTEN = 1e-6
 """Share of a gap between branches below which none is left: the rest is rounding."""
-
-DIVERGED = 10.0
-"""Error, relative to the output's standard deviation, above which a model counts as diverged."""
-
-ROUNDING = 1e-9
-"""Error over the same below which there is none."""
-
-ERRORS = ("chosen", "test", "train", "worst", "interval", "difference")
-"""Columns of errors, which are in the unit of the output."""
 
 
 @dataclass(frozen=True)
@@ -64,28 +54,13 @@ class Column:
         if self.key == "r2" and value is not None and value < 0:
             return "below 0"  # how far is a matter of how little the test varies
         if isinstance(value, list):
-            return " to ".join(numeral(self._rounded(end, row), self.digits) for end in value)
-        return numeral(self._rounded(value, row), self.digits)
-
-    def flag(self, row: Given) -> str:
-        """Return a warning about a row's value; usually none."""
-        value = self.value(row)
-        if self.key == "r2" and value is not None and value < 100 * (1 - DIVERGED**2):
-            return "diverged"
-        if self.key not in ("chosen", "test", "train", "worst") or value is None:
-            return ""
-        return "diverged" if value > DIVERGED * _deviation(row) else ""
+            return " to ".join(numeral(end, self.digits) for end in value)
+        return numeral(value, self.digits)
 
     def sorted_by(self, row: Given) -> float | str | None:
         """Return the sort key of a value: the midpoint of an interval."""
         value = self.value(row)
         return sum(value) / len(value) if isinstance(value, list) else value
-
-    def _rounded(self, value: float | None, row: Given) -> float | None:
-        if self.key not in ERRORS or value is None:
-            return value
-        deviation = _deviation(row)
-        return 0.0 if abs(value) < ROUNDING * deviation < math.inf else value
 
 
 def columns_of(
@@ -144,19 +119,14 @@ def columns_of_board(board: Leaderboard) -> tuple[Column, ...]:
     return columns_of(rows, board.unit, board.outputs, board.chosen_by)
 
 
+DIVERGED = 10.0
+"""Error, relative to the output's standard deviation, above which a model counts as diverged."""
+
+
 def diverged(row: Given) -> bool:
     """Return whether a model diverged in the test."""
     share = (row.get("test") or {}).get("r2")
     return share is not None and share < 1 - DIVERGED**2
-
-
-def _deviation(row: Given) -> float:
-    """Return the standard deviation of the measured test output; infinite if unknown."""
-    test = row.get("test") or {}
-    error, share = test.get("rmse"), test.get("r2")
-    if not error or share is None or not math.isfinite(share) or share >= 1:
-        return math.inf
-    return float(error / math.sqrt(1 - share))
 
 
 def _inside(*path: str) -> Callable[[Given], Any]:

@@ -97,8 +97,6 @@ class Panel:
         Whether to draw the line y = 0.
     categories : tuple of str
         Words for y = 0, 1, ... from the top down, instead of numbers.
-    logarithmic : {"", "x", "xy"}
-        Which axes are.
     least : float
         Least height of the y axis, so that rounding does not fill it.
     """
@@ -111,7 +109,6 @@ class Panel:
     marks: tuple[Mark, ...] = ()
     zero: bool = False
     categories: tuple[str, ...] = ()
-    logarithmic: Literal["", "x", "xy"] = ""
     least: float = 0.0
 
     @property

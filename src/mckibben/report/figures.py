@@ -20,7 +20,6 @@ from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.base import driving
 from mckibben.recording import Recording
 from mckibben.report import (
-    interactive,
     model_subjects,
     printed,
     subjects,
@@ -126,23 +125,6 @@ def plot(thing: Any, kind: str | None, ax: Any, choices: Mapping[str, Any]) -> A
             )
         printed.draw_into(axes, drawing)
     return axes[0] if len(axes) == 1 else axes
-
-
-def interact(thing: Any, kind: str | None, choices: Mapping[str, Any]) -> Any:
-    """Draw a figure with plotly; see `DrawsItself.interactive`."""
-    demand("plotly", "notebook", "interactive figures")
-    from plotly.graph_objects import Figure
-
-    drawing = replace(draw(thing, kind, **choices), stacked=True)
-    (found,) = interactive.plots(drawing)
-    # with a background of its own, it is readable in dark notebooks too
-    look = {
-        "template": "plotly_white",
-        "height": 420 if len(drawing.panels) == 1 else 240 * len(drawing.panels),
-        "legend": {"orientation": "h", "y": 1, "yanchor": "bottom", "x": 0},
-    }
-    plain = interactive.resolved(found, printed.COLOURS)
-    return Figure(data=plain["data"], layout=look | plain["layout"])
 
 
 def pair_of(recording: Recording) -> tuple[str, str] | None:
@@ -314,12 +296,6 @@ def _one_each(
     return replace(drawing, panels=tuple(panels), note=left_out(named))
 
 
-def _weights(block: Block, recording: Recordings | None = None) -> Drawing:
-    """Draw weights over thresholds, for all recordings alike."""
-    del recording
-    return model_subjects.weights({"model": block})
-
-
 # --- Studies ----------------------------------------------------------------------------------------
 
 
@@ -343,11 +319,6 @@ def _study_recordings(drawn: Callable[..., Drawing]) -> Callable[[Study], Drawin
         )
 
     return draw_study
-
-
-def _study_weights(study: Study) -> Drawing:
-    rows = study.leaderboard.rows
-    return model_subjects.weights({row.model: row.block for row in rows if row.block is not None})
 
 
 def _inverse(study: Study) -> Drawing:
@@ -407,7 +378,7 @@ FIGURES: Mapping[str, Mapping[str, Callable[..., Drawing]]] = MappingProxyType(
     {
         "recording": {"loop": _loop, "time": _time},
         "rig": {"loop": _of_rig(_loop), "time": _of_rig(_time)},
-        "block": {"loop": _block_loop, "weights": _weights, **_AGAINST},
+        "block": {"loop": _block_loop, **_AGAINST},
         "leaderboard": {"errors": model_subjects.leaderboard, **_AGAINST},
         "study": {
             "loops": _of_study("loops"),
@@ -416,7 +387,6 @@ FIGURES: Mapping[str, Mapping[str, Callable[..., Drawing]]] = MappingProxyType(
             "leaderboard": lambda study: model_subjects.leaderboard(study.leaderboard),
             "fit": _of_study("fit"),
             "residuals": _of_study("residuals"),
-            "weights": _study_weights,
             "inverse": _inverse,
         },
         "characterization": {"cycles": _cycles},

@@ -91,13 +91,11 @@ def _plot(panels: tuple[Panel, ...]) -> Json:
             "anchor": y,
             "rangemode": "tozero" if panel.categories else "normal",
             "showticklabels": last,
-            **({"type": "log"} if "x" in panel.logarithmic else {}),
             **({"matches": "x"} if row else {}),
         }
         layout[f"yaxis{y[1:]}"] = _axis(panel.y_label) | {
             "domain": [bottom, min(bottom + height, 1.0)],
             "zeroline": panel.zero,
-            **({"type": "log"} if "y" in panel.logarithmic else {}),
             **({"range": list(panel.y_range)} if panel.y_range else {}),
             **_ticks(panel),
         }

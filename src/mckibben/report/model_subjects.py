@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
-from mckibben.blocks.equations import channel_units, unit_of
-from mckibben.blocks.hysteresis.eupi import EUPI
-from mckibben.blocks.hysteresis.gpi import GPI
-from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
 from mckibben.errors import ModelError
 from mckibben.report.drawing import (
     N_COLOURS,
@@ -30,9 +25,7 @@ from mckibben.report.drawing import (
 if TYPE_CHECKING:
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.control import Tracked
-    from mckibben.diagnosis.check import OutputCheck
-    from mckibben.diagnosis.patterns import Pattern
-    from mckibben.diagnosis.responses import FrequencyResponse
+    from mckibben.diagnosis.check import OutputCheck, Pattern
     from mckibben.diagnosis.review import Followed
     from mckibben.studying.inverting import InverseCheck
 
@@ -40,8 +33,6 @@ OFF_THE_CHART = 3.0
 """Cross-validated errors beyond so many times the largest test error would squeeze all others."""
 
 BRANCHES = (("rising", "series-1"), ("falling", "series-6"))
-
-OperatorSum = PI | GPI | EUPI | RateDependentPI
 
 
 def leaderboard(board: Leaderboard) -> Drawing:
@@ -77,48 +68,6 @@ def leaderboard(board: Leaderboard) -> Drawing:
     off = [name for name, out in zip(names, far, strict=True) if out]
     note = f"Cross-validation far to the right, not drawn: {', '.join(off)}." if off else ""
     return Drawing((Panel(label, "", tuple(curves), categories=names),), note=note)
-
-
-def weights(blocks: Mapping[str, Block]) -> Drawing:
-    """Draw the weights over the thresholds of all sums of play operators in the models.
-
-    Raises
-    ------
-    ModelError
-        If no model has any.
-    """
-    panels = []
-    for place, (model, block) in enumerate(blocks.items()):
-        for part in operator_sums(block):
-            unit = unit_of(part, "thresholds", (0,), channel_units(part)) or ""
-            x_label = axis_label("threshold", unit)
-            r = np.array(part.thresholds)
-            w = np.array(part.weights)
-            title = model if part is block else f"{model}: {part.kind}"
-            drawn = {title: w}
-            if isinstance(part, RateDependentPI):
-                drawn[f"{title}, per rate"] = np.array(part.rate_weights)
-            for heading, values in drawn.items():
-                stems = Curve(r, values, colour=series_colour(place), style="stems")
-                panels.append(Panel(x_label, "weight", (stems,), heading, zero=True))
-    if not panels:
-        raise ModelError(
-            "no model here is a weighted sum of play operators, so it has no weights to draw",
-            remedy="draw the fit or the loops",
-        )
-    note = "" if len(panels) <= N_COLOURS else f"{len(panels) - N_COLOURS} more are not shown."
-    return Drawing(tuple(panels[:N_COLOURS]), note=note)
-
-
-def operator_sums(block: Block) -> Iterator[OperatorSum]:
-    """Yield the parts of a model that are weighted sums of play operators, at any depth."""
-    if isinstance(block, OperatorSum):
-        yield block
-    elif hasattr(block, "forward"):
-        yield from operator_sums(block.forward)
-    else:
-        for part in getattr(block, "parts", ()):
-            yield from operator_sums(part)
 
 
 Course = tuple[Array, str, str, Style]
@@ -213,26 +162,3 @@ def parts(one: Followed, points: int = POINTS) -> Drawing:
         for name, given, zero in ((one.output, above, False), ("error", below, True))
     ]
     return Drawing(tuple(panels), stacked=True)
-
-
-def frequency_response(found: FrequencyResponse) -> Drawing:
-    """Draw gain and angle over frequency, with bounds and measurements."""
-    given, wanted = found.input, found.output
-    unit = "" if given.unit == wanted.unit else f"{wanted.unit or '1'}/{given.unit or '1'}"
-    gain = axis_label(f"gain to {wanted.name}", unit)
-    rows: tuple[tuple[str, Literal["xy", "x"], Any, Any, Any], ...] = (
-        (gain, "xy", found.gain, found.gain_interval, found.measured_gain),
-        ("angle [deg]", "x", found.angle, found.angle_interval, found.measured_angle),
-    )
-    panels = []
-    for label, axes, values, interval, measured in rows:
-        name = label == gain  # in the first legend only
-        curves = [
-            Curve(found.measured_frequency, measured, "recorded" * name, "measured", "specks"),
-            Curve(found.frequency, values, "model" * name, "series-1"),
-        ]
-        for end, word in zip(interval or (), ("95 %", ""), strict=False):
-            curves.append(Curve(found.frequency, end, word * name, "series-1", "fine"))
-        panels.append(Panel("frequency [Hz]", label, tuple(curves), logarithmic=axes))
-    note = "" if found.measured_frequency.size else "No frequency was recorded with high coherence."
-    return Drawing(tuple(panels), stacked=True, note=note)

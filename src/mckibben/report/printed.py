@@ -201,11 +201,6 @@ def draw_panel(axis: Axes, panel: Panel, bottom: bool) -> None:
             textcoords="offset points",
             fontsize=6,
         )
-    for letter in panel.logarithmic:
-        axis.set(**{f"{letter}scale": "log"})
-        scale = axis.xaxis if letter == "x" else axis.yaxis
-        scale.set_major_formatter("{x:g}")  # powers of ten would be set as mathematics
-        scale.set_minor_formatter("")
     if panel.y_range is not None:
         axis.set_ylim(panel.y_range)
     if bottom:

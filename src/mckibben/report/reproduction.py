@@ -29,8 +29,8 @@ FEWEST = 40
 
 def heading(one: Table | Figure, *, quick: bool = False) -> str:
     """Return a title, with the corresponding item of the paper, and whether the run was quick."""
-    beside_ = f" ({one.text.of})" if one.text.of else ""
-    return f"{one.text.title}{beside_}{', quick run' if quick else ''}"
+    of = f" ({one.text.of})" if one.text.of else ""
+    return f"{one.text.title}{of}{', quick run' if quick else ''}"
 
 
 def reproduction_page(found: Reproduction) -> str:
@@ -40,7 +40,7 @@ def reproduction_page(found: Reproduction) -> str:
     pictured = [table for table in found.tables if table.text.drawn]
     published = ". ".join(filter(None, (paper.authors, paper.published, paper.doi)))
     charts = [
-        chart(f"beside-{k}", beside(table), heading(table), "tall" * (len(table.rows) > 12))
+        chart(f"comparison-{k}", comparison(table), heading(table), "tall" * (len(table.rows) > 12))
         for k, table in enumerate(pictured)
     ]
     figures = [
@@ -59,7 +59,7 @@ def reproduction_page(found: Reproduction) -> str:
                 [Text([paper.question, f"{paper.protocol} Here: {found.on}.", *quick])],
             ),
             Section("results", "Results", [Text(found.summary, listed=True)]),
-            Section("beside", "Printed beside ours", charts),
+            Section("comparison", "Printed and ours", charts),
             Section("tables", "Tables", tables(found)),
             Section("differences", "What differs from the paper", [Text(found.notes, listed=True)]),
             Section("figures", "Figures", figures),
@@ -92,7 +92,7 @@ def chart(
     return builder.Figure(name, [interactive.plots(drawn)], label, label, shape, columns)
 
 
-def beside(table: Table) -> Drawing:
+def comparison(table: Table) -> Drawing:
     """Return a table's drawn columns: printed values as open rings, ours in colours.
 
     Drawn are those in the unit of ``table.text.drawn``, and all others if none names a unit of its own.
@@ -201,7 +201,10 @@ def _lines(found: Reproduction, date: str, pictures: str) -> Iterator[str]:
         yield f"### {heading(figure, quick=found.quick)}\n"
         yield f"![{figure.text.title}]({pictures}/{figure.key}.png)\n"
     yield "## On your own rig\n"
-    yield f"`mckibben reproduce {found.name} --data FOLDER` takes {paper.data}.\n"
+    yield (
+        f"`mckibben reproduce {found.name} --data FOLDER` takes recordings of the same protocol, from "
+        f"`mckibben rig record {found.name}` or in files named as its runs.\n"
+    )
 
 
 def _indexed(item: Indexed, found: Reproduction) -> str:

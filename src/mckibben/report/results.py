@@ -183,7 +183,7 @@ def models(every: Mapping[str, Any]) -> list[Item]:
 
 
 def description(found: ModelDescription) -> list[Item]:
-    """Return a model's equations, parameters, and frequency responses."""
+    """Return a model's equations and parameters."""
     rows = [
         [
             one.name,
@@ -204,11 +204,6 @@ def description(found: ModelDescription) -> list[Item]:
             summary=f"{len(rows)} parameters" if len(rows) > UNFOLDED else "",
         ),
     ]
-    for one in found.frequency_responses:
-        name = one.output.name
-        label = f"Gain and angle of {name} over the frequency of {one.input.name}"
-        plots = [interactive.plots(model_subjects.frequency_response(one))]
-        items.append(Figure(f"response {name}", plots, label, f"{label}; dots: measured.", "tall"))
     return items
 
 
@@ -284,8 +279,8 @@ def board_table(board: Leaderboard, rows: Sequence[Row], keys: Sequence[str] = B
         [[name, *(one.text(each) for one in columns)] for name, each in zip(named, given, strict=True)],
         best=next((place for place, row in enumerate(rows) if row is board.best), None),
         titles=[
-            " ".join(filter(None, (_summary(row.model), *(one.flag(each) for one in columns))))
-            for row, each in zip(rows, given, strict=True)
+            _summary(row.model)
+            for row in rows
         ],
         keys=[
             [row.model, *(one.sorted_by(each) for one in columns)]
@@ -430,20 +425,18 @@ def check(found: Validation) -> list[Item]:
 
 def checked(one: OutputCheck) -> list[Item]:
     """Return what a residual depends on, with its means over each variable, and all tests."""
-    share, missing, tests = "Share of the variance [%]", [], []
-    for each in one.missing:
-        p = words.probability(each.p_value)
-        missing.append([words.missed(one, each), 100 * each.share, each.size, p])
-    for each in one.suspects:
-        p = words.probability(each.p_value)
-        tests.append([words.missed(one, each), 100 * each.share, p])
+    headings = ["Cause", "Share of the variance [%]", f"RMS [{one.unit}]"]
+    missing, tests = (
+        [[words.missed(one, each), 100 * each.share, each.size] for each in some]
+        for some in (one.missing, one.suspects)
+    )
     panels = [interactive.plots(model_subjects.pattern(one, each))[0] for each in one.patterns]
     caption = f"Mean residual of {one.output}, with 95 % intervals that allow for autocorrelation."
     return [
         Text(words.check_notes(one)),
-        Table(["Missed", share, f"RMS [{one.unit}]", "p"], missing) if missing else None,
+        Table(headings, missing) if missing else None,
         Figure(f"patterns {one.output}", [panels], caption, caption, columns=2) if panels else None,
-        Table(["Test", share, "p"], tests, summary="All tests") if tests else None,
+        Table(headings, tests, summary="All causes tested") if tests else None,
     ]
 
 

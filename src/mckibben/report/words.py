@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from mckibben.comparison.choosing import Against
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.diagnosis.bands import Calibration
+    from mckibben.diagnosis.causes import Cause
     from mckibben.diagnosis.characterization import Characterization
-    from mckibben.diagnosis.check import Finding, OutputCheck, Validation
+    from mckibben.diagnosis.check import OutputCheck, Validation
     from mckibben.diagnosis.data_gaps import Gap
     from mckibben.diagnosis.review import Review
     from mckibben.planning.planner import Plan
@@ -152,9 +153,7 @@ QUANTITIES = (
     ("{output}", "output_range", "{y}", "output range"),
     ("noise of {input}", "input_noise", "{u}", "standard deviation of a sample"),
     ("noise of {output}", "output_noise", "{y}", "standard deviation of a sample"),
-    ("variance by input", "position_share", "", "share that a function of the input explains"),
-    ("variance by velocity", "direction_share", "", "share that the input's velocity explains"),
-    ("variance by branch", "loop_share", "", "share that input and direction explain together"),
+    ("variance explained", "loop_share", "", "share that input and direction explain together"),
     ("p of loop", "p_loop", "", "probability of such gaps between branches without a loop"),
     ("loop width e_w", "loop_width", "%", "largest cycles: branches at mid input over span"),
     ("branch distance at mid input", "mid_width", "{y}", "the same in the unit of the output"),
@@ -166,8 +165,6 @@ QUANTITIES = (
     ("dead zone after upper reversals", "dead_zone_upper", "{u}", "before the output moves back"),
     ("dead zone after lower reversals", "dead_zone_lower", "{u}", "the same from below"),
     ("gain", "gain", "{y}/{u}", "slope of the mean of both branches at mid input"),
-    ("onset", "onset", "{u}", "below it the slope is under a fifth of its mean"),
-    ("saturation", "saturation", "{u}", "above it the slope is under a fifth of its mean"),
     ("creep", "creep", "{y}", "in a hold of all inputs; positive: in the direction of motion"),
     ("creep time", "creep_time", "s", "time over which creep was measured"),
     ("drift", "drift", "{y}", "from one cycle to the next between the same extremes"),
@@ -196,12 +193,6 @@ def quantities(found: Characterization) -> Iterator[Quantity]:
         else:
             yield Quantity(shown[0], value, limits, shown[1], meaning)
     slope = unit_of("{y}/{u}")
-    for one in found.effects:
-        over = _spanning((one.low, one.high), one.unit)
-        name, meaning = f"effect of {one.channel}", f"on the output at equal input, {over}"
-        yield Quantity(name, one.change, one.limits, units["y"], meaning)
-        meaning = f"by one straight line, {over}"
-        yield Quantity(f"{name} on the slope", one.gain_change, one.gain_limits, slope, meaning)
     for level in found.levels:
         at = " and ".join(f"{name} at {size(unit, x)}" for name, x, unit in level.held)
         own = level.found
@@ -222,22 +213,10 @@ def characterization_sentences(found: Characterization) -> list[str]:
         f"{y} covers {_spanning(ends, found.output_unit)} while {u} covers "
         f"{_spanning(found.input_range, found.input_unit)}{gain}."
     ]
-    if found.follows_direction:
-        said.append(
-            f"{y} follows the direction of {u}, as friction does, and has no inverse by {u}: velocity "
-            f"explains {percent(found.direction_share)} of its variance, {u} "
-            f"{percent(found.position_share)}."
-        )
-    elif found.loop_width is not None and found.mid_width is not None:
+    if found.loop_width is not None and found.mid_width is not None:
         said.append(
             f"Loop width at mid {u}: {numeral(found.loop_width, 2)} % of the output range of the cycle, "
             f"{size(found.output_unit, found.mid_width)}."
-        )
-    elif found.adjusted:
-        names = listing([effect.channel for effect in found.effects])
-        said.append(
-            f"{u} covers less than half of its range while {names} are constant: their linear effects "
-            "are removed, and loop width is not measured."
         )
     elif found.branch_gap is not None:
         open_ = "Too few branches, or too much noise, to detect a loop: "
@@ -270,43 +249,25 @@ def check_verdict(found: Validation, *, sized: bool = True) -> str:
     return " ".join(_residual(one, sized=sized) for one in found.outputs)
 
 
-def check_sentences(found: Validation) -> list[str]:
-    """Return all findings on residuals, whether they are white, and one line of advice each."""
-    said = []
-    for one in found.outputs:
-        own = [] if one.exact else [_missed(one, each) for each in one.missing]
-        said += [
-            f"{one.output}: {each}" if len(found.outputs) > 1 else each
-            for each in (*own, *check_notes(one))
-        ]
-    return said
-
-
 def check_notes(one: OutputCheck) -> list[str]:
-    """Return whether a residual is white, and advice on its main finding."""
-    said = []
-    if one.whiteness.p_value is not None:
-        white = "white" if one.whiteness.p_value > WHITE else "not white"
-        said.append(f"The residual of {one.output} is {white} ({_p(one.whiteness.p_value)}).")
-    if one.missing and not one.exact:
-        said.append(_advice(_largest(one)))
-    return [*filter(None, said)]
+    """Return whether a residual is white."""
+    p = one.whiteness.p_value
+    if p is None:
+        return []
+    white = "white" if p > WHITE else "not white"
+    return [f"The residual of {one.output} is {white} (p = {probability(p)})."]
 
 
-def missed(one: OutputCheck, finding: Finding) -> str:
-    """Return the main finding on a residual in a few words, with alternatives."""
-    causes = [
-        _KINDS[kind].format(channel=channel or "the input")
-        for kind, channel in ((finding.kind, finding.channel), *finding.or_causes)
-    ]
-    step, unit = (one.sample_time, "s") if one.sample_time else (1.0, "samples")
-    value = finding.coefficient or 0.0
-    number = ""
-    if finding.kind == "offset":
-        number = f" of {numeral(value, 2)} {one.unit}".rstrip()
-    elif finding.kind == "lag" and value:
-        number = f", about {numeral(value * step, 2)} {unit}"
-    return " or ".join(causes) + number
+def missed(one: OutputCheck, cause: Cause) -> str:
+    """Return a cause of a residual in a few words."""
+    what = _KINDS[cause.kind].format(channel=cause.channel)
+    value = cause.coefficient or 0.0
+    if cause.kind == "offset":
+        return f"{what} of {size(one.unit, value)}"
+    if cause.kind == "lag" and value:
+        step, unit = (one.sample_time, "s") if one.sample_time else (1.0, "samples")
+        return f"{what}, about {size(unit, value * step)}"
+    return what
 
 
 WHITE = 0.01
@@ -314,7 +275,6 @@ WHITE = 0.01
 
 _KINDS = {
     "offset": "an offset",
-    "runs": "offsets that differ between recordings",
     "curve": "the curve over {channel}",
     "load": "{channel}",
     "hysteresis": "the branch of {channel} (hysteresis)",
@@ -325,56 +285,29 @@ _KINDS = {
     "output": "the position (curve or stop)",
 }
 
-_ADVICE = {
-    "load": "Fit a model that reads {channel}.",
-    "hysteresis": "Compare models with other hysteresis, as to branches and minor loops.",
-    "lag": "Fit a model with a lag, or measure pressure at the muscle.",
-    "speed": "Compare rate-dependent models.",
-    "creep": "Compare models with viscoelastic states.",
-    "output": "Check the rig for a stop or contact at the ends of its range.",
-}
-
 
 def _residual(one: OutputCheck, *, sized: bool = True) -> str:
-    size = f"{numeral(one.rmse, 2)} {one.unit}".rstrip()
-    of_range = f"{percent(one.rmse / one.span)} of its range"
+    error = size(one.unit, one.rmse)
     if one.exact:
-        return f"The residual of {one.output}, {size} RMS, is within rounding or the sensor's step."
+        return (
+            f"The residual of {one.output}, {error} RMS, is within rounding or the sensor's step."
+        )
     if one.useless:
         return (
-            f"The model is of no use for {one.output}: {size} RMSE, where the mean is off by "
+            f"The model is of no use for {one.output}: its RMSE is {error}, that of the mean "
             f"{numeral(one.mean_error, 2)}."
         )
-    residual = f"The residual of {one.output}" + (f", {size} RMS ({of_range})," if sized else "")
+    of_range = f", {error} RMS ({percent(one.rmse / one.span)} of its range)," if sized else ""
+    residual = f"The residual of {one.output}{of_range}"
     if not one.missing:
-        return f"{residual} follows none of {one.n_tests} causes tested."
-    first = _largest(one)
+        return f"{residual} follows none of {len(one.suspects)} causes tested."
+    first = max(one.missing, key=lambda cause: cause.share)
     return f"{residual} follows {missed(one, first)}: {percent(first.share)} of its variance."
 
 
-def _largest(one: OutputCheck) -> Finding:
-    return max(one.missing, key=lambda finding: finding.share)
-
-
-def _missed(one: OutputCheck, finding: Finding) -> str:
-    what = missed(one, finding)
-    return (
-        f"{what[0].upper()}{what[1:]}: {numeral(finding.size, 2)} {one.unit} RMS, "
-        f"{percent(finding.share)} of the residual's variance ({_p(finding.p_value)})."
-    )
-
-
-def _advice(first: Finding) -> str:
-    return "" if first.or_causes else _ADVICE.get(first.kind, "").format(channel=first.channel)
-
-
-def _p(value: float) -> str:
-    return f"p = {probability(value)}".replace("= <", "<")
-
-
-def probability(value: float | None) -> str:
+def probability(value: float) -> str:
     """Return a formatted p-value."""
-    return "–" if value is None else "< 0.000001" if value < 1e-6 else numeral(value, 2)
+    return "0.000001 or less" if value <= 1e-6 else numeral(value, 2)
 
 
 # --- Data gaps and plans ----------------------------------------------------------------------------
@@ -396,13 +329,6 @@ GAPS = {
     "creep": "Creep cannot be identified: the longest hold lasts {value} s, where {needed} s "
     "are needed.",
     "time": "Rate dependence and creep cannot be identified: {percent} of the recordings have time.",
-    "sampling": "Shapes of branches cannot be identified: {channels} has {value} samples a "
-    "branch, where {needed} are needed.",
-    "resolution": "Loops below {percent} of the range of {channels} cannot be identified: noise or the "
-    "steps of the sensor are that large.",
-    "clipped": "Behaviour beyond {levels} cannot be identified: {channels} stays at a limit for {value} "
-    "samples.",
-    "repeats": "Repeatability cannot be identified: {value} cycles of {channels} are recorded twice.",
 }
 GAPS["load"] = GAPS["resting"]
 PLAN = "{seconds} s: {parts}."
@@ -413,10 +339,7 @@ RUNS = {
     "random": "all inputs and loads moving at random{levels}",
     "speeds": "the same motion three times slower and three times faster",
     "holds": "holds of 30 s at several levels",
-    "repeats": "one run twice",
     "time": "time, or give the rate",
-    "sampling": "at a higher rate",
-    "sensor": "with a finer or wider sensor",
 }
 
 
@@ -571,7 +494,7 @@ def _right(study: Study) -> str:
     if isinstance(study.check, str):
         return study.check
     worst = max(study.check.outputs, key=lambda one: one.rmse / max(one.span, 1e-300))
-    return _residual(worst, sized=False)  # which stands beside
+    return _residual(worst, sized=False)  # the tile has the size
 
 
 def _how_far(study: Study) -> str:

@@ -177,10 +177,10 @@ def study(
     looped, loop = channels.inputs, None
     if len(channels.inputs) == len(channels.outputs) == 1:
         looped = (moved_by([*recordings, *tests], looped[0], list(recordings[0].channels)),)
-        beside = {*channels.inputs, *(channels.scheduling or ())} - set(looped)
+        others = {*channels.inputs, *(channels.scheduling or ())} - set(looped)
         with suppress(DataError):  # of a load that follows the input, which is a data gap
             loop = characterize(
-                [*recordings, *tests], looped[0], channels.outputs[0], beside=sorted(beside)
+                [*recordings, *tests], looped[0], channels.outputs[0], scheduling=sorted(others)
             )
     so_far = Study(
         train=plan.data.split.train,
@@ -218,8 +218,7 @@ def study(
             check=check_on_test(block, split, on_test, names),
             description=describe(block, split.train, fitted=True),
         )
-    if loop is None or not loop.follows_direction:
-        so_far = replace(so_far, inverse=invert_best(board, so_far.test[0]))
+    so_far = replace(so_far, inverse=invert_best(board, so_far.test[0]))
     undone = so_far.inverse
     if not channels.single and undone is not None:
         try:

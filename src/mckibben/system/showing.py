@@ -35,7 +35,7 @@ class DrawsItself(ShowsItself):
         ----------
         kind : str, optional
             Which figure. Of a recording ``"loop"`` or ``"time"``; of a model ``"loop"``, its answer to a
-            falling triangle, ``"weights"``, or against a ``recording`` ``"loops"``, ``"fit"`` or
+            falling triangle, or against a ``recording`` ``"loops"``, ``"fit"`` or
             ``"residuals"``; of a leaderboard ``"errors"`` or, against a ``recording``, as a model; of a
             rig ``"loop"`` or ``"time"``; of a characterization ``"cycles"``; of a loop that was closed
             ``"time"``. Default: the first that can be drawn.
@@ -56,19 +56,3 @@ class DrawsItself(ShowsItself):
             On absent channels, or another number of axes.
         """
         return load("faces", "plot")(self, kind, ax, choices)
-
-    def interactive(self, kind: str | None = None, **choices: Any) -> Any:
-        """Draw it with plotly: the same figures, to zoom and read.
-
-        Parameters
-        ----------
-        kind : str, optional
-            As for `plot`.
-        **choices
-            As for `plot`.
-
-        Returns
-        -------
-        plotly.graph_objects.Figure
-        """
-        return load("faces", "interactive")(self, kind, choices)

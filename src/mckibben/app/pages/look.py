@@ -164,9 +164,9 @@ def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) ->
 
 def _words(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
     """Show the characterization: a few sentences, and all numbers behind a fold-out."""
-    beside = tuple(n for n in (*sides.inputs, *(sides.scheduling or ())) if n != pair[0])
-    key = "characterization", state.workspace.digest(), pair, beside
-    make = partial(characterize, runs, *pair, beside=beside)
+    others = tuple(n for n in (*sides.inputs, *(sides.scheduling or ())) if n != pair[0])
+    key = "characterization", state.workspace.digest(), pair, others
+    make = partial(characterize, runs, *pair, scheduling=others)
     with mark(ui.element("div"), "words"):
         later(key, make, lambda found: widgets.items(results.characterization(found)), height=120)
 

@@ -150,8 +150,8 @@ def board(state: State) -> None:
             shown = [one for one in every if one.key in FIRST]
             lines = []
             for row in rows:
-                errors = [(one.flag(row), one.value(row)) for one in shown]
-                texts = [flag or ("–" if value is None else value) for flag, value in errors]
+                values = [one.value(row) for one in shown]
+                texts = ["–" if value is None else value for value in values]
                 lines.append([partial(_title, row), *texts])
             _choosable(state, ["Model", *(one.label for one in shown)], lines, compared)
             _remarks(rows, shown)

@@ -15,7 +15,7 @@ def characterize(
     reading: ReadOptions,
     input: Annotated[str | None, Option("Input. Default: by name.", "CHANNEL")] = None,  # noqa: A002
     output: Annotated[str | None, Option("Output. Default: by name.", "CHANNEL")] = None,
-    beside: Annotated[
+    scheduling: Annotated[
         tuple[str, ...],
         Option("Other input: use only samples where it is constant; repeatable.", "CHANNEL"),
     ] = (),
@@ -26,8 +26,8 @@ def characterize(
     from mckibben.recording import notes_by_file, reading_notes
     from mckibben.report import results, text
 
-    recordings, *pair = read_pair(files, input, output, reading, beside)
-    found = find(recordings, *pair, beside=beside)
+    recordings, *pair = read_pair(files, input, output, reading, scheduling)
+    found = find(recordings, *pair, scheduling=scheduling)
     about = found.to_dict() | {"notes": notes_by_file(recordings)}
     show(
         about,

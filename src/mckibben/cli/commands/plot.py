@@ -20,7 +20,7 @@ def plot(
     ] = None,
     kind: Annotated[
         str | None,
-        Option("time, loop (default); with --model also fit (default), loops, residuals, weights."),
+        Option("time, loop (default); with --model also fit (default), loops, residuals."),
     ] = None,
     input: Annotated[str | None, Option("Input. Default: by name.", "CHANNEL")] = None,  # noqa: A002
     output: Annotated[str | None, Option("Output. Default: by name.", "CHANNEL")] = None,

@@ -22,7 +22,7 @@ def reproduce(
     listed: Annotated[bool, Option("List the papers.", flag="--list")] = False,
     quick: Annotated[bool, Option("Skip the slow parts.")] = False,
     data: Annotated[
-        Path | None, Option("Your own recordings instead of the rig's; see docs/papers.", "FOLDER")
+        Path | None, Option("Recordings of the protocol, instead of the rig's.", "FOLDER")
     ] = None,
     rig: Annotated[
         str | None, Option("Rig to record, and to close loops on. Default: the paper's.", "RIG")

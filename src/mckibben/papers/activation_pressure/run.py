@@ -11,27 +11,19 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.force.activation import ActivationPressure
-from mckibben.errors import DataError
 from mckibben.estimators.core.data import training_data
 from mckibben.estimators.force.activation import (
-    STATIC_SHARE,
     by_force,
-    frequencies,
     outermost,
 )
 from mckibben.papers.experiment import (
     Curves,
     Experiment,
-    Labels,
-    Rerun,
     Runs,
-    demand_one_sign,
-    demand_rise,
     rms,
 )
 from mckibben.recording import Recording
-from mckibben.signals import reversals
-from mckibben.signals.protocol import Role, protocol
+from mckibben.signals.protocol import protocol
 
 THEIRS, OURS = "the paper's", "ours"
 QUALITIES = ("RMSE [% of range]", "correlation")
@@ -95,45 +87,6 @@ def by_condition(runs: Runs, stage: str) -> Recordings:
         row = f"{row}, {name}" if any(row == key[2] for key in found) else row
         found[force, frequency, row] = runs[name].with_derived(["contraction"])
     return dict(sorted(found.items()))
-
-
-REPEATS = 0.1
-"""Share of the range by which peaks of a sine differ at most: those of a random wave differ by more."""
-
-
-def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
-    """Sort recordings into slow cycles, sines and random waves by pressure, and by force."""
-    demand_one_sign(recordings, "force")
-    runs = training_data(recordings, "pressure", "contraction", None, ("force",)).runs
-    forces = {i: force for force, own in by_force(runs).items() for i in own}
-    at = frequencies(runs).tolist()
-    moving = [one for one, frequency in zip(recordings, at, strict=True) if frequency > 0]
-    moved = all("displacement" in one for one in moving)
-    demand_rise(moving, "pressure", "displacement" if moved else "contraction")
-    found: list[Labels | None] = []
-    for place, recording in enumerate(recordings):
-        pressure = recording["pressure"]
-        turns = pressure[reversals(pressure)[1:-1]]
-        peaks = turns[turns > pressure.mean()]
-        repeats = peaks.size < 3 or float(np.ptp(peaks)) < REPEATS * float(np.ptp(pressure))
-        slow = repeats and at[place] < STATIC_SHARE * max(at)
-        stage = "static" if slow else "hysteresis" if repeats else "random"
-        labels = {
-            "stage": stage,
-            "force": forces[place],
-            "frequency": 0.0 if slow else float(f"{at[place]:.2g}"),
-        }
-        role: Role = "test" if stage == "random" else "train"
-        found.append(Labels(role, labels) if at[place] > 0 else None)
-    stages = {one.labels["stage"] for one in found if one}
-    for stage, what in (("hysteresis", "sines"), ("static", "a slow cycle over its whole range")):
-        if stage not in stages:
-            raise DataError(
-                f"there are no {stage} runs: no recording has {what} of the pressure",
-                channel="pressure",
-                remedy=f"record {what}, at every force held",
-            )
-    return found
 
 
 def static(model: ActivationPressure, recording: Recording) -> Array:
@@ -308,6 +261,3 @@ def _sample(conditions: Sequence[tuple[float, float, str]]) -> list[tuple[float,
     )
     corners = {(forces[f], frequencies[w]) for f, w in wanted if conditions}
     return list({one[:2]: one for one in conditions if one[:2] in corners}.values())
-
-
-RERUN = Rerun(run, sort)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,19 +13,15 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.memoryless import Affine
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.ranking import compare
-from mckibben.errors import DataError, MckibbenError, ModelError
+from mckibben.errors import MckibbenError, ModelError
 from mckibben.metrics import score
 from mckibben.papers.experiment import (
     Cell,
     Curves,
     Experiment,
-    Labels,
-    Rerun,
-    demand_rise,
 )
 from mckibben.papers.paper import paper
 from mckibben.recording import Recording
-from mckibben.signals import reversals
 
 SEEDS, QUICK_SEEDS = 10, 3
 """Seeds that each of the paper's methods is identified with."""
@@ -114,30 +110,6 @@ def run(experiment: Experiment) -> None:
     _board_table(experiment, board)
     shown = _summary(experiment, tried, board)
     _figures(experiment, {"calibration": train, "test": test}, tried, shown)
-
-
-def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
-    """Sort recordings: decreasing cycles, or the longest, to calibrate; the longest other to test."""
-    if len(recordings) < 2:
-        raise DataError(
-            "there is one recording",
-            file=recordings[0].source,
-            remedy="give one to calibrate and one to test, or cut it in two files",
-        )
-
-    demand_rise(recordings, "pressure", "displacement")
-
-    def rank(one: Recording) -> tuple[bool, float]:
-        pressure = one["pressure"]
-        peaks = pressure[reversals(pressure)]
-        peaks = peaks[peaks > pressure.mean()]
-        rises = np.diff(peaks).max(initial=-np.inf)
-        return bool(peaks.size > 2 and rises < 0.02 * np.ptp(pressure)), one.duration or len(one)
-
-    train = max(recordings, key=rank)
-    test = max((one for one in recordings if one is not train), key=lambda one: rank(one)[1])
-    roles = {id(train): Labels("train", {}), id(test): Labels("test", {})}
-    return [roles.get(id(one)) for one in recordings]
 
 
 def matched(model: Block, recording: Recording) -> Series:
@@ -316,6 +288,3 @@ def _figures(
             near = {n: x for n, x in every.items() if np.abs(x - y.mean()).max() < 2 * np.ptp(y)}
             panels[whose] = {name: (one.time, x) for name, x in ({one.origin: y} | near).items()}
         experiment.figure(title, panels)
-
-
-RERUN = Rerun(run, sort)

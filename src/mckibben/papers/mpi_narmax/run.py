@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain, count
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -19,26 +19,17 @@ from mckibben.papers.experiment import (
     Cell,
     Curves,
     Experiment,
-    Labels,
-    Rerun,
     Runs,
-    demand_one_sign,
-    demand_rise,
 )
 from mckibben.papers.mpi_narmax import protocol
 from mckibben.recording import Recording
 from mckibben.rigs import Rig
 from mckibben.signals import cycles, resample, sine
-from mckibben.signals.holds import moves
 
 VARYING = 4  # status in which the force varies
 AS_PRINTED, ALL_RATES, PLAIN = "MPI-NARMAX", "MPI-NARMAX, all rates", "MPI-NARMAX, ours"
 MORE, OURS, PRESSURE = "MPI-NARMAX, more records", "balance", "balance, on recorded pressure"
 HEADLINE = (AS_PRINTED, ALL_RATES, PLAIN, OURS)
-
-FREE, CONSTANT, STILL, REPEATS = 0.1, 0.5, 0.1, 0.1
-"""Shares: of the largest force, below which there is none, and by which loads differ; of a run's own,
-by which a constant one moves; of the input's range, by which a held one, and repeated peaks, differ."""
 
 
 @dataclass(frozen=True)
@@ -93,56 +84,6 @@ def driven(recordings: Sequence[Recording]) -> str:
         remedy = "add the voltage of the valve to all of them, or the pressure"
         raise DataError("the recordings share no input", channel="voltage", remedy=remedy)
     return shared[0]
-
-
-def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
-    """Sort runs: without load, constant load, constant input, pulls, random."""
-    drive = driven(recordings)
-    forces = [np.abs(one["force"]) for one in recordings]
-    largest = max(float(np.percentile(f, 99)) for f in forces) if moves(forces) else np.inf
-    span = float(np.ptp(np.concatenate([one[drive] for one in recordings])))
-    labels = [_label(one, drive, largest, span) for one in recordings]
-    kinds = ("free", "weight", "held", "pulls", "random")
-    by = {kind: [one for one in labels if one["stage"] == kind] for kind in kinds}
-    varying = by["pulls"] or by["random"]
-    for runs, what in ((by["free"], "without load"), (varying, "moved under a varying force")):
-        if not runs:
-            raise DataError(f"no recording is {what}", channel="force", remedy="record one, too")
-    demand_one_sign(recordings, "force")
-    cycled = ("free", "weight", "pulls")
-    both = zip(recordings, labels, strict=True)
-    demand_rise([one for one, label in both if label["stage"] in cycled], drive, "displacement")
-    if len(by["weight"] + by["pulls"] + by["random"]) == 1:
-        remedy = "record another load: the strongest that varies is tested on"
-        raise DataError("there is one recording under a load", channel="force", remedy=remedy)
-    by["free"][0]["status"] = 1
-    numbers, last = chain((2, 3), count(VARYING + 1)), 0.0
-    for one in sorted(by["weight"], key=lambda one: float(one["force"])):
-        if one["force"] > last + FREE * largest:
-            one["status"], last = next(numbers), one["force"]
-    strongest = max(varying, key=lambda one: float(one["force"]))
-    strongest["status"] = VARYING
-    tests = by["held"] + [strongest] + by["random"][1:][-1:] * bool(by["pulls"])
-    for one in tests:
-        one["role"] = "test"
-    return [Labels(one.pop("role", "train"), one) for one in labels]
-
-
-def _label(one: Recording, drive: str, largest: float, span: float) -> dict[str, Any]:
-    """Return the kind of a run, its force [N], and the frequency of its motion [Hz]."""
-    u, force, step = one[drive], np.abs(one["force"]), one.sample_time or 1.0
-    low, high = np.percentile(force, (1, 99))
-    whole = cycles(u)
-    repeats = bool(whole) and np.ptp([u[cycle].max() for cycle in whole]) < REPEATS * np.ptp(u)
-    period = np.median([cycle.stop - 1 - cycle.start for cycle in whole]) if repeats else np.inf
-    label = {"force": float(high), "frequency": float(f"{1 / (period * step):.2g}")}
-    if high < FREE * largest or high - low < CONSTANT * high:
-        return label | {"stage": "free" if high < FREE * largest else "weight"}
-    pulled = int(np.argmax(np.abs(force - np.median(force[:10])) > FREE * high))
-    if np.ptp(np.percentile(u[pulled:], (1, 99))) < STILL * span:
-        level = float(f"{np.median(u[pulled:]):.2g}")
-        return label | {"stage": "held", "level": level, "start": pulled * step}
-    return label | {"stage": "pulls" if repeats else "random"}
 
 
 def _fit(study: Study) -> None:
@@ -327,6 +268,3 @@ def _track(study: Study, rig: Rig) -> None:
     facts = {"middle": middle, "amplitude": amplitude}
     experiment.table("tracked", ["RMSE [mm]", "largest [mm]"], rows, **facts)
     experiment.figure("tracked", {"": drawn})
-
-
-RERUN = Rerun(run, sort)

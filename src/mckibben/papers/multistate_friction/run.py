@@ -14,7 +14,6 @@ from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.laws import PolynomialForce
 from mckibben.blocks.force.multistate_friction import MultistateFriction
 from mckibben.control import track
-from mckibben.errors import DataError
 from mckibben.estimators.catalogue import full_name
 from mckibben.estimators.force.multistate import extract_hysteresis
 from mckibben.metrics import score
@@ -23,17 +22,13 @@ from mckibben.papers.experiment import (
     Curves,
     Experiment,
     Fitted,
-    Labels,
-    Rerun,
     Runs,
-    demand_rise,
     rms,
 )
 from mckibben.papers.multistate_friction.protocol import SAMPLE_TIME
 from mckibben.recording import Recording
 from mckibben.signals import cycles
 from mckibben.signals.excitations import irregular_triangle
-from mckibben.signals.protocol import Role
 
 STATIC, LAW = "static law alone", "force-bilinear"
 PAPERS, OURS, EIGHTEEN = "11 parameters, the paper's", "11 parameters, ours", "18 parameters"
@@ -269,42 +264,3 @@ def _feedforward(experiment: Experiment, found: Hysteresis) -> None:
     experiment.table("feedforward", columns, rows, stroke=stroke, at=found.chosen)
     experiment.figure("feedforward", dict([*panels.items()][:2]))
     experiment.says(tracked={str(row[1]): row[2] for row in rows[: len(ways)]})
-
-
-HELD, STROKES = 0.5, 0.1
-"""Of what is driven, what is held moves less; a stroke of this share is as much as the top pressure."""
-
-
-def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
-    """Return the isometric and isobaric runs, and the one that identifies friction.
-
-    That is the largest loop at the pressure nearest to two thirds of the highest, as 4 of 6 bar.
-    """
-    kinds: list[tuple[str, float, float]] = []
-    top = max(float(one["pressure"].max()) for one in recordings)
-    for length, bar, _ in ([one[c] for c in ("length", "pressure", "force")] for one in recordings):
-        stroke, swing = (np.ptp(np.percentile(x, [1, 99])) for x in (length, bar))
-        moved, driven = stroke / (STROKES * length.max()), swing / top
-        held = "length" if moved < HELD * driven else "pressure" if driven < HELD * moved else ""
-        size = np.median([np.ptp(length[cycle]) for cycle in cycles(-length)] or [stroke])
-        level = round(float(np.median(bar if held == "pressure" else length)), 1)
-        kinds.append((held, level, float(size)))
-    for held, other, least in (("length", "pressure", 3), ("pressure", "length", 1)):
-        if (n := len({level for kind, level, _ in kinds if kind == held})) < least:
-            message = f"it is held at {n} values while the {other} moves, of at least {least}"
-            raise DataError(message, channel=held, remedy=f"record runs that hold the {held}")
-    isometric = [one for one, kind in zip(recordings, kinds, strict=True) if kind[0] == "length"]
-    demand_rise(isometric, "pressure", "force")
-    loops = {place: kind for place, kind in enumerate(kinds) if kind[0] == "pressure"}
-    chosen = min(loops, key=lambda place: (abs(loops[place][1] - top / 1.5), -loops[place][2]))
-    stages = {"length": "static", "pressure": "friction"}
-    roles: list[Role] = [
-        "test" if i in loops and i != chosen else "train" for i in range(len(kinds))
-    ]
-    return [
-        Labels(role, {"stage": stages[held], held: level}) if held else None
-        for role, (held, level, _) in zip(roles, kinds, strict=True)
-    ]
-
-
-RERUN = Rerun(run, sort)

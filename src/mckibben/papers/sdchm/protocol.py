@@ -6,8 +6,7 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator, Sections 2.2 and 5.
 The paper's signals are sines of 0.02 Hz, on one muscle at a time or on all three alike. Its equation
 starts them in the middle of their range, with a jump at every change of amplitude; here each cycle
 starts at its minimum. Runs in which all pressures are random at once are ours: the paper's patterns
-visit but a few lines among all combinations of pressures, and a model can be close along them and
-anything at all beside.
+cover few of the combinations of pressures, and a model that is accurate on them may be wrong elsewhere.
 """
 
 from __future__ import annotations

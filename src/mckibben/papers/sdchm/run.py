@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import cycle, product
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
 from mckibben.metrics import err, loop_width, rmse
-from mckibben.papers.experiment import Cell, Experiment, Fitted, Labels, Rerun, Runs, rms
+from mckibben.papers.experiment import Cell, Experiment, Fitted, Runs, rms
 from mckibben.papers.sdchm import loops
-from mckibben.papers.sdchm.loops import BALANCE, EXTENSOR, OURS, PUBLISHED, numbered
+from mckibben.papers.sdchm.loops import BALANCE, OURS, PUBLISHED, numbered
 from mckibben.papers.sdchm.protocol import PATTERNS, quick
 from mckibben.recording import Recording
 from mckibben.signals import cycles
-from mckibben.signals.protocol import Role
 
 LINEAR, MEMORY, TOO = "linear function of the pressures", "coupled memory", ", joint runs too"
 RAW, DAMPED = "raw network, as published", "raw network, damped"
@@ -38,10 +36,6 @@ Panels = dict[str, dict[str, tuple[Array, Array]]]
 def run(experiment: Experiment) -> None:
     """Record the patterns, identify the coupled models, predict, and track with their inverses."""
     runs = experiment.record(*(quick() if experiment.quick else ()))
-    if any("saturated" in one.meta for one in runs.values()):  # a rig that withstands less
-        labels = dict(zip(runs, sort([*runs.values()]), strict=True))
-        kept = {name: one for name, one in labels.items() if one is not None}
-        runs = Runs({name: runs[name] for name in kept}, kept)
     _motions(experiment, runs)
     _fits(experiment, runs)
     _parts(experiment, runs)
@@ -238,81 +232,3 @@ def _groups(experiment: Experiment, runs: Runs) -> None:
         experiment.table("groups", columns, groups, p0=min(runs.of(n, "p0") for n in names))
         experiment.figure("prediction", panels)
         experiment.table("levels", GROUPS, levels)
-
-
-# -- one's own recordings ------------------------------------------------------------------------------
-
-MOVES, ONE, WHOLE = 0.1, 0.02, 0.8
-"""Shares of the largest swing of a muscle's pressure: from which on a pressure moves; how far apart
-levels, or peaks, are that count as one; from which on patterns train; smaller ones are predicted."""
-
-TURNS: tuple[Role, ...] = ("test", "validation", "train")
-"""Roles, in turns, of recordings in which muscles move differently, or the extensor's pressure does."""
-
-
-def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
-    """Sort by the moving pressures, their peaks, and the extensor's pressure."""
-    muscles = numbered(recordings[0], "pressure") or ["pressure_1", "pressure_2"]
-    needed = [*muscles, *(m.replace("pressure", "displacement") for m in muscles), EXTENSOR]
-    for one, name in product(recordings, needed):
-        if name not in one:
-            remedy = f"`columns[{name}]=COLUMN`; what was held: `constants[{name}]=0 bar`"
-            raise DataError("it is missing", file=one.source, channel=name, remedy=remedy)
-    swings = np.array([[_swing(one[name]) for name in muscles] for one in recordings])
-    least, gap = MOVES * swings.max(), ONE * swings.max()
-    moving = [[name for name, s in zip(muscles, row, strict=True) if s > least] for row in swings]
-    driven = ["".join(name.rpartition("_")[2] for name in own) for own in moving]
-    means = np.array([float(one[EXTENSOR].mean()) for one in recordings])
-    still = np.array([_swing(one[EXTENSOR]) <= least for one in recordings])
-    means[still] = _clustered(means[still].tolist(), gap)
-    levels, peaks = means.tolist(), _clustered(swings.max(axis=1).tolist(), gap)
-    patterns = {
-        i
-        for i, (one, own) in enumerate(zip(recordings, moving, strict=True))
-        if own and still[i] and all(np.std(one[name] - one[own[0]]) < least for name in own)
-    }
-    whole = {i for i in patterns if peaks[i] > WHOLE * max(peaks)}
-    stages = dict.fromkeys(whole, "network")
-    for muscle in muscles:
-        alone = [i for i in whole if moving[i] == [muscle]]
-        if not alone:
-            remedy = "record a cycle of it, to the highest, while the others have no pressure"
-            raise DataError("no recording moves it alone", channel=muscle, remedy=remedy)
-        softest = [i for i in alone if levels[i] == min(levels[j] for j in alone)]
-        stages[max(softest, key=lambda i: recordings[i].duration or 0.0)] = "hysteresis"
-    for i in patterns - whole:
-        same = [j for j in patterns - whole if peaks[j] == peaks[i]]
-        n_levels, n_driven = (len({key[j] for j in same}) for key in (levels, driven))
-        stages[i] = "coupling" if n_levels == 1 else "stiffness" if n_driven == 1 else "prediction"
-    trained = sorted({levels[i] for i in whole})
-    roles: dict[float, Role] = dict.fromkeys(trained, "train")
-    roles |= dict.fromkeys(trained[1:-1:3], "test")
-    roles |= dict.fromkeys(trained[2:-1:3] if len(trained) > 5 else (), "validation")
-    turns = {True: cycle(TURNS), False: cycle(TURNS)}
-    found: list[Labels | None] = []
-    for i, which in enumerate(driven):
-        labels: dict[str, Any] = {"stage": stages.get(i, "joint"), "p0": levels[i], "driven": which}
-        role: Role = "train" if labels["stage"] == "hysteresis" else "test"
-        if labels["stage"] == "network":
-            role = roles[levels[i]]
-        elif which and i not in patterns:
-            labels["extensor"] = "constant" if still[i] else "moving"
-            role = next(turns[still[i]])
-        found.append(Labels(role, labels) if which else None)
-    return found
-
-
-def _swing(x: Array) -> float:
-    """Return a range without rare values, such as spikes."""
-    return float(np.ptp(np.quantile(x, (0.01, 0.99))))
-
-
-def _clustered(values: Sequence[float], gap: float) -> list[float]:
-    """Return for each value the mean of its cluster, separated by gaps."""
-    ordered = np.sort(values)
-    ends = np.flatnonzero(np.diff(ordered) > gap)
-    means = [round(float(part.mean()), 2) for part in np.split(ordered, ends + 1)]
-    return [means[int(np.searchsorted(ordered[ends], value))] for value in values]
-
-
-RERUN = Rerun(run, sort)

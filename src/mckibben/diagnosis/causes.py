@@ -1,0 +1,363 @@
+"""Causes of a residual: regressors of effects that a model may lack, tested by cross-validation.
+
+Regressors are computed at every sample and averaged over blocks that are short against a branch of the
+loop. All are made of inputs, loads, the modelled output and time, none of the measured output, whose
+noise is the residual's. A cause counts if its regressors reduce the squared residual of segments that
+they were not fitted to. ``benchmarks/validation.py`` measures how often a correct model is rejected, and
+how often the right cause is found first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.hysteresis.pi import PI
+from mckibben.diagnosis.free_runs import Run
+from mckibben.signals.holds import holds
+from mckibben.signals.reversals import reversals
+from mckibben.statistics import correlation_length, hats
+
+PER_BRANCH, FEWEST, MOST = 24, 400, 6000
+"""Smallest number of blocks per typical branch of the input; smallest and largest number of blocks, if
+there are as many samples.
+"""
+
+PER_COLUMN = 6
+"""Smallest number of blocks per regressor."""
+
+KNOTS = 8
+"""Total number of knots of curves over the inputs."""
+
+WAYS = (0.05, 0.2, 0.6)
+"""Distances of reversal, in shares of half the range, after which the input is on the other branch.
+"""
+
+HELD = 0.15
+"""Share of samples in holds above which creep is distinguished from the loop."""
+
+MOST_DELAY, LONGER = 50, 8
+"""Largest shift of outputs [samples], and the shortest recording as its multiple."""
+
+CAUSES = ("pressure", "voltage", "force", "torque")
+"""Channels that may explain a residual although the model does not use them."""
+
+SEGMENTS, FEWEST_SEGMENTS, MEMORIES = 40, 8, 4.0
+"""Largest and smallest number of segments of cross-validation; their length in correlation lengths of
+what no regressor explains.
+"""
+
+FOLDS = 4
+"""Number of cross-validation folds; segments belong to them in turn."""
+
+LEAST_SHARE, LEVEL = 0.02, 0.01
+"""Smallest share of the residual's variance of a cause, and significance level of its mean reduction of
+the squared residual over segments (one-sided t-test).
+"""
+
+RIDGE = 1e-6
+"""Regularisation, relative to a regressor's energy."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A cause of a residual.
+
+    Parameters
+    ----------
+    kind : str
+        ``offset``, ``curve`` over an input, ``load``, ``hysteresis`` (branch of an input), ``lag``,
+        ``drift``, ``speed``, ``creep`` or ``output`` (curve of the modelled output).
+    channel : str
+        The channel of its regressors; empty for the output and time.
+    share : float
+        Share of the residual's variance that it explains on segments not fitted, given the causes
+        before; 0 to 1.
+    size : float
+        The same as a root mean square, in the unit of the output.
+    coefficient : float or None
+        The offset [unit of the output], or the delay of measured after modelled motion [samples].
+    """
+
+    kind: str
+    channel: str
+    share: float
+    size: float
+    coefficient: float | None = None
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Regressors of a cause: their columns, and those of effects that are no fault of its own."""
+
+    kind: str
+    channel: str
+    columns: tuple[int, ...]
+    given: tuple[int, ...] = ()
+    delay: int = 0
+
+
+def causes(
+    block: Block, runs: Sequence[Run], output: int, residuals: Sequence[Array], every: int
+) -> tuple[tuple[Cause, ...], tuple[Cause, ...]]:
+    """Return the significant causes of a residual, largest first, and every cause by itself.
+
+    Drift counts only as the first, an offset only alone: any misfit has a trend and a mean.
+
+    Parameters
+    ----------
+    residuals : sequence of array, shape (n,)
+        Of every run, as means over blocks of ``every`` samples.
+    """
+    groups, tables = _groups(block, runs, output, every)
+    slow = [place for one in groups if one.kind in ("offset", "drift") for place in one.columns]
+    test = _Test(residuals, tables, slow)
+    found: list[Cause] = []
+    known: tuple[int, ...] = (0,)
+    left = [group for group in groups if group.kind != "offset"]
+    while significant := [group for group in left if test.significant(group, known)]:
+        best = max(significant, key=lambda group: test.total_gain(group, known))
+        found.append(test.cause(best, known))
+        known = (*known, *best.given, *best.columns)
+        left = [group for group in left if group is not best and group.kind != "drift"]
+    offset = groups[0]
+    if not found and test.significant(offset, ()):
+        found.append(test.cause(offset, ()))
+    every_cause = [test.cause(one, (0,) if one.columns != (0,) else ()) for one in groups]
+    return tuple(found), tuple(every_cause)
+
+
+class _Test:
+    """Cross-validated least squares of a residual on columns."""
+
+    def __init__(
+        self, residuals: Sequence[Array], tables: Sequence[Array], slow: Sequence[int]
+    ) -> None:
+        x, e = np.concatenate(tables), np.concatenate(residuals)
+        self.mean, self.n = float(e.mean()), e.size
+        ends = np.cumsum([len(one) for one in residuals])[:-1]
+
+        def memory(columns: Array) -> float:
+            rest = e - columns @ np.linalg.lstsq(columns, e, rcond=None)[0]
+            return correlation_length(np.split(rest, ends))
+
+        self.long_enough = e.size >= FEWEST_SEGMENTS * memory(x[:, slow])
+        wanted = min(int(e.size / (MEMORIES * memory(x))), SEGMENTS)
+        segments = [
+            part
+            for run in np.split(np.arange(e.size), ends)
+            for part in np.array_split(run, max(round(wanted * run.size / e.size), 1))
+            if part.size
+        ]
+        self.grams = np.array([x[part].T @ x[part] for part in segments])
+        self.products = np.array([x[part].T @ e[part] for part in segments])
+        self.energies = np.array([e[part] @ e[part] for part in segments])
+        self.folds = np.arange(len(segments)) % min(FOLDS, len(segments))
+
+    def errors(self, columns: tuple[int, ...]) -> Array:
+        """Return the squared error of every segment, with columns fitted to the other folds."""
+        places = list(dict.fromkeys(columns))
+        if not places:
+            return self.energies
+        grams, products = self.grams[:, places][:, :, places], self.products[:, places]
+        found = np.empty(len(self.energies))
+        for fold in np.unique(self.folds):
+            out = self.folds == fold
+            gram = grams[~out].sum(axis=0)
+            gram += np.diag(RIDGE * np.maximum(np.diag(gram), np.finfo(float).tiny))
+            weights = np.linalg.lstsq(gram, products[~out].sum(axis=0), rcond=1e-12)[0]
+            found[out] = self.energies[out] - 2 * products[out] @ weights
+            found[out] += np.einsum("i,sij,j->s", weights, grams[out], weights)
+        return found
+
+    def gains(self, group: _Group, known: tuple[int, ...]) -> Array:
+        """Return the reduction of every segment's squared error by a cause."""
+        before = (*known, *group.given)
+        return self.errors(before) - self.errors((*before, *group.columns))
+
+    def total_gain(self, group: _Group, known: tuple[int, ...]) -> float:
+        """Return the reduction of the squared error by a cause and what it is given."""
+        every = (*known, *group.given, *group.columns)
+        return float((self.errors(known) - self.errors(every)).sum())
+
+    def significant(self, group: _Group, known: tuple[int, ...]) -> bool:
+        """Return whether a cause reduces the error, beyond chance and by a share that matters."""
+        from scipy.special import stdtrit
+
+        gains, total = self.gains(group, known), float(self.errors(known).sum())
+        if gains.size < 2 or not self.long_enough or not gains.sum() > LEAST_SHARE * total:
+            return False
+        spread = float(gains.std(ddof=1)) / np.sqrt(gains.size)
+        return bool(gains.mean() > stdtrit(gains.size - 1, 1 - LEVEL) * spread)
+
+    def cause(self, group: _Group, known: tuple[int, ...]) -> Cause:
+        """Return what a group explains in addition to known columns."""
+        gain = max(float(self.gains(group, known).sum()), 0.0)
+        total = float(self.errors((0,) if group.kind != "offset" else ()).sum())
+        coefficient = {"lag": float(group.delay), "offset": self.mean}.get(group.kind)
+        share = min(gain / total, 1.0) if total > 0 else 0.0
+        return Cause(group.kind, group.channel, share, float(np.sqrt(gain / self.n)), coefficient)
+
+
+def averaged(samples: Array, every: int) -> Array:
+    """Return the means over blocks of so many samples, shape (n // every, ...)."""
+    n = len(samples) // every
+    return np.asarray(samples[: n * every].reshape(n, every, *samples.shape[1:]).mean(axis=1))
+
+
+def _groups(
+    block: Block, runs: Sequence[Run], output: int, every: int
+) -> tuple[list[_Group], list[Array]]:
+    """Return the groups of regressors, and their columns (blocks, k) of every run; the first is 1."""
+    room = max(sum(len(run.inputs) // every for run in runs) // PER_COLUMN, 1)
+    tables = [np.ones((len(run.inputs) // every, 1)) for run in runs]
+    groups = [_Group("offset", "", (0,))]
+    modelled = _scaled([run.modelled[:, output] for run in runs])
+    for kind, channel, delay, columns in _regressors(block, runs, output, modelled):
+        first, more = tables[0].shape[1], columns[0].shape[1]
+        if 0 < more <= room - first:
+            curve = groups[-1].columns if groups[-1].kind == "curve" else ()
+            given = curve if kind == "hysteresis" else ()
+            places = tuple(range(first, first + more))
+            groups.append(_Group(kind, channel, places, given, delay))
+            for i, part in enumerate(columns):
+                tables[i] = np.column_stack([tables[i], averaged(part, every)])
+    return groups, tables
+
+
+def _regressors(
+    block: Block, runs: Sequence[Run], output: int, modelled: Sequence[Array]
+) -> Iterator[tuple[str, str, int, list[Array]]]:
+    """Yield kind, channel, delay and columns of causes; short recordings have room for the first."""
+    delay = _best_delay(runs, output)
+    yield "lag", "", delay, [_lagging(y, delay) for y in modelled]
+    names = _moving(block, runs)
+    driven = [name for name in names if name in _driven(block)]
+    for name in names:
+        x = _scaled(_samples(runs, name))
+        if name in driven:
+            yield "curve", name, 0, _hats(x, max(KNOTS // len(driven), 4))
+            yield "hysteresis", name, 0, [_branches(part) for part in x]
+        else:
+            acting = zip(x, modelled, strict=True)
+            yield "load", name, 0, [np.column_stack([load, load * y]) for load, y in acting]
+    yield "drift", "", 0, _trends(modelled)
+    yield "speed", "", 0, [_speeds(y) for y in modelled]
+    if longest := _longest_hold(block, runs, names):
+        yield "creep", "", 0, [_creeping(y, longest) for y in modelled]
+    yield "output", "", 0, _hats(modelled, KNOTS)
+
+
+def block_length(block: Block, runs: Sequence[Run]) -> int:
+    """Return the number of samples per block: short compared with a branch, with a limited total."""
+    sizes = [len(run.inputs) for run in runs]
+    branches = _branch_lengths(block, runs)
+    usual = int(np.median(branches)) // PER_BRANCH if branches else 1
+    most = max(int(np.median(sizes)) // (2 * PER_COLUMN), 1)
+    return min(max(1, min(usual, sum(sizes) // FEWEST), -(-sum(sizes) // MOST)), most)
+
+
+def _branch_lengths(block: Block, runs: Sequence[Run]) -> list[int]:
+    """Return the samples between turning points of driven inputs."""
+    driven = [x for name in _driven(block) for x in _samples(runs, name) if np.ptp(x) > 0]
+    return [int(length) for x in driven for length in np.diff(reversals(x))]
+
+
+def _driven(block: Block) -> list[str]:
+    return [c.name for c in block.inputs if c.name not in block.scheduling]
+
+
+def _moving(block: Block, runs: Sequence[Run]) -> list[str]:
+    """Return the inputs, and recorded causes that the model does not use, that vary."""
+    inputs, outputs = ([c.name for c in channels] for channels in (block.inputs, block.outputs))
+    others = [
+        name
+        for name in runs[0].recording.channels
+        if name.split("_")[0] in CAUSES and name not in (*inputs, *outputs)
+    ]
+    recorded = [n for n in (*inputs, *others) if all(n in run.recording for run in runs)]
+    return [name for name in recorded if np.ptp(np.concatenate(_samples(runs, name))) > 0]
+
+
+def _samples(runs: Sequence[Run], name: str) -> list[Array]:
+    return [run.recording[name] for run in runs]
+
+
+def _scaled(parts: Sequence[Array]) -> list[Array]:
+    """Return samples scaled to a range from -1 to 1."""
+    low, high = min(part.min() for part in parts), max(part.max() for part in parts)
+    return [2 * (part - low) / ((high - low) or 1.0) - 1 for part in parts]
+
+
+def _hats(parts: Sequence[Array], knots: int) -> list[Array]:
+    """Return piecewise-linear basis functions, without the first, which the mean replaces."""
+    found = hats(np.concatenate(parts), knots)[:, 1:]
+    return np.split(found, np.cumsum([len(part) for part in parts])[:-1])
+
+
+def _branches(x: Array) -> Array:
+    """Return the branch of an input, from -1 to 1 after a distance, and its product with the input."""
+    ways = [(x - PI(thresholds=(way,), weights=(1.0,)).simulate(x)) / way for way in WAYS]
+    return np.column_stack([part for way in ways for part in (way, way * x)])
+
+
+def _lagging(modelled: Array, delay: int) -> Array:
+    """Return the speed of the modelled output, and its change under a delay."""
+    slope = np.gradient(modelled)
+    places = np.clip(np.arange(modelled.size) - delay, 0, modelled.size - 1)
+    return np.column_stack([slope, modelled[places] - modelled])
+
+
+def _best_delay(runs: Sequence[Run], output: int) -> int:
+    """Return the best shift of the modelled output in samples."""
+    most = min(MOST_DELAY, min(len(run.inputs) for run in runs) // LONGER)
+
+    def left(delay: int) -> float:
+        total = 0.0
+        for run in runs:
+            n = len(run.inputs)  # the same samples at every delay
+            y = run.measured[most : n - most, output]
+            total += float(np.sum((y - run.modelled[most - delay : n - most - delay, output]) ** 2))
+        return total
+
+    return min(range(-most, most + 1), key=lambda delay: (left(delay), abs(delay)))
+
+
+def _trends(modelled: Sequence[Array]) -> list[Array]:
+    """Return linear and quadratic trends, and a change of gain over time, for every recording."""
+    longest = max(map(len, modelled))
+    times = [np.arange(len(y)) / longest for y in modelled]
+    return [np.column_stack([t, t**2, t * y]) for t, y in zip(times, modelled, strict=True)]
+
+
+def _speeds(modelled: Array) -> Array:
+    """Return functions of the modelled output's speed; a linear one is a lag."""
+    rate = np.gradient(modelled)
+    rate = rate / (np.sqrt(np.mean(rate**2)) or 1.0)
+    root = np.sign(rate) * np.sqrt(np.abs(rate))
+    return np.column_stack([np.abs(rate), root, rate * modelled])
+
+
+def _longest_hold(block: Block, runs: Sequence[Run], names: Sequence[str]) -> int:
+    """Return the samples of the longest hold of all inputs and loads; 0 if holds are rare."""
+    shortest = max(int(np.median(_branch_lengths(block, runs))) // 2, 10)
+    tables = [run.recording.matrix(names) for run in runs]
+    spans = np.ptp(np.concatenate(tables), axis=0).tolist()
+    found = [hold.stop - hold.start for table in tables for hold in holds(table, spans, shortest)]
+    return max(found, default=0) if sum(found) >= HELD * sum(map(len, tables)) else 0
+
+
+def _creeping(modelled: Array, longest: int) -> Array:
+    """Return the difference of the modelled output from its own slow lags."""
+    from scipy.signal import lfilter
+
+    found = []
+    for time in (longest / 3, longest):
+        share = 1 - np.exp(-1 / time)
+        start = [(1 - share) * modelled[0]]
+        found.append(modelled - lfilter([share], [1.0, share - 1.0], modelled, zi=start)[0])
+    return np.column_stack(found)

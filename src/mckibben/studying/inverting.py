@@ -25,6 +25,9 @@ MOST_RISE = 20_000
 FOLLOWED = 1e-6
 """Largest error of a valid inverse, relative to the reachable range."""
 
+REACH = 0.01
+"""Smallest reachable range of an inverse, relative to the recorded range of the output."""
+
 NEARLY = 0.01
 """The same for a model's output on a recording, whose start may be out of reach."""
 
@@ -135,7 +138,7 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
         if own:
             given = recording.select([channel.name for channel in block.inputs])
             desired = given.with_channels(**{output.name: block.simulate(given)[output.name]})
-        elif np.isfinite([low, high]).all() and low < high:
+        elif high - low > REACH * np.ptp(recording[output.name]) and np.isfinite(high - low):
             reachable, most = (low, high), FOLLOWED
             desired = Recording(
                 {output.name: minor_loops(low, high)}, step, units={output.name: output.unit}

@@ -117,17 +117,6 @@ def _chosen(
     }
 
 
-def damper(folder: Path) -> Tree:
-    """Force that follows the sign of the velocity passes half of its range at every displacement."""
-    t = np.arange(0, 15, 0.01)
-    sizes = np.interp(t, np.arange(0, 16), np.random.default_rng(1).uniform(3, 9, 16))
-    x = 8 + sizes * np.sin(2 * np.pi * 0.9 * t)
-    force = 800 * np.tanh(np.gradient(x, t) / 15) + 95
-    mckibben.write(Recording({"displacement": x, "force": force}, 0.01), folder / "damper.csv")
-    words = ("characterize", "damper.csv", "--input", "displacement", "--output", "force")
-    return {"onset": answered(*words, folder=folder)["onset"]}
-
-
 def seal(folder: Path) -> Tree:
     """Friction of a seal has two levels by direction, and no inverse by displacement."""
     (folder / "seal.csv").write_bytes(
@@ -282,7 +271,6 @@ CASES: Mapping[str, tuple[str, Callable[[Path], Tree], Mapping[str, Any]]] = {
         black_box,
         {"needs": ("bouc_wen_benchmark",), "slow": True},
     ),
-    "damper": ("mckibben characterize damper.csv", damper, {}),
     "seal": ("mckibben study seal.csv", seal, {"needs": ("foreign_friction",)}),
     "contraction": ("track(compensator of contraction, rig, mm)", contraction, {}),
     "constants": ("n_free of mpi-narmax", constants, {}),

@@ -59,7 +59,7 @@ class Bench:
     directions : array, shape (n, m)
         Shortening of every muscle per unit of every coordinate.
     hull : array, shape (n, 2)
-        Lowest and highest recorded shortening of every muscle [mm].
+        Lowest and highest shortening of every muscle, recorded or in its prior [mm].
     lowest, travel : array, shape (m,)
         Lowest value and range of every coordinate.
     levels : array, shape (s, 2)
@@ -115,12 +115,12 @@ class Bench:
 
     @property
     def scale(self) -> float:
-        """Largest recorded shortening [mm]."""
+        """Largest shortening [mm]."""
         return float(np.abs(self.hull).max())
 
     @property
     def stroke(self) -> float:
-        """Largest recorded range of a shortening [mm]."""
+        """Largest range of a shortening [mm]."""
         return float(np.ptp(self.hull, axis=1).max())
 
     @property

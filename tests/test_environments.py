@@ -91,7 +91,7 @@ def test_a_twin_of_ones_own_muscle_is_an_environment() -> None:
         stream = inverse.stream()
 
         def act(seen: np.ndarray, info: dict[str, Any]) -> np.ndarray:
-            ahead = float(env._wanted[len(env._done), 0])  # what is due at the next step
+            ahead = float(env._reference[len(env._measured), 0])  # what is due at the next step
             return np.array(2.0 * stream.step(ahead) / 5.0 - 1.0)
 
         return np.array([float(info["error"][0]) for _, _, info in episode(env, act, seed)])

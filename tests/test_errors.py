@@ -14,7 +14,7 @@ import pytest
 
 import mckibben
 from mckibben import errors
-from mckibben.app.terms import said
+from mckibben.app.terms import message_of
 from mckibben.cli.main import app
 from mckibben.cli.parameters import COMMANDS, Command, as_command, as_flag
 from mckibben.errors import KernelError, MckibbenError, ModelError, rendered
@@ -128,6 +128,7 @@ def test_each_face_renders_in_its_own_terms() -> None:
     terminal = rendered(ERROR, as_flag, as_command)
     for part in ("--gaps split", "--column 'force=F 1'", "--set monotone=true", "mckibben plan"):
         assert part in terminal
-    page = said(ERROR)
+    page = message_of(ERROR)
     assert not re.search(r"`|\(\)", page)
     assert "“Plan the next recording”" in page
+    assert message_of(ModelError("it is None")) == "It is None"

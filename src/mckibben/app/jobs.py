@@ -17,7 +17,7 @@ from typing import Any
 from pydantic import Field, ValidationError
 
 from mckibben.app.steps import Plain
-from mckibben.app.terms import said
+from mckibben.app.terms import message_of
 from mckibben.app.workspace import Workspace
 from mckibben.errors import MckibbenError, MckibbenWarning, unforeseen
 from mckibben.system.threads import cores
@@ -196,7 +196,7 @@ def _run(folder: str, job: Job, work: Work, pipe: Any) -> None:
         tell(0.0)
         job.message, job.state = work(workspace, tell, **job.given), DONE
     except MckibbenError as error:
-        job.message, job.state = said(error), FAILED
+        job.message, job.state = message_of(error), FAILED
     except Exception as error:
         job.message, job.state = str(unforeseen(error)), FAILED
     workspace.write("jobs", job.name, job.model_dump())

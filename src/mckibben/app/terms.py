@@ -9,7 +9,7 @@ GAPS = {
     "split": "Split there",
     "interpolate": "Bridge by straight lines",
 }
-"""What can be done about gaps."""
+"""Labels of the ways to treat gaps."""
 
 CONTROLS = {
     "controller": "the field Controllers",
@@ -33,7 +33,7 @@ CONTROLS = {
 """Parameters of operations, and the controls that set them."""
 
 FIELDS = ("approach", "encoding", "gaps", "load", "preview", "rest_length", "sample_time", "slew")
-"""Those whose control is a field of the same name."""
+"""Parameters whose control is a field of the same name."""
 
 PLACES = {
     "check": "the tab Check under Models",
@@ -45,11 +45,11 @@ PLACES = {
     "study": "“Report” under Take away",
     "track": "“Run” under Compensate",
 }
-"""Operations, and where they are."""
+"""Operations, and where they are in the workbench."""
 
 
 def place(name: str) -> str:
-    """Return an operation as a place of the workbench.
+    """Return where an operation is in the workbench.
 
     >>> place("invert"), place("open_it")
     ('Compensate', 'open it')
@@ -58,34 +58,35 @@ def place(name: str) -> str:
 
 
 def control(name: str, key: str | None = None, value: str | None = None) -> str:
-    """Return a parameter as a control of a page.
+    """Return the control that sets a parameter.
 
     >>> control("gaps", None, "split"), control("units", "force", "N")
     ('“Split there”', 'the field Unit of force (N)')
     """
     if name == "gaps" and value in GAPS:
         return f"“{GAPS[value]}”"
-    of = f" of {key}" if key and not _placeholder(key) else ""
-    given = f" ({value})" if value and not _placeholder(value) else ""
     words = name.replace("_", " ")
-    field = f"the field {words.capitalize()}" if name in FIELDS else words
-    return f"{CONTROLS.get(name, field)}{of}{given}"
+    default = f"the field {words.capitalize()}" if name in FIELDS else words
+    of_key = f" of {key}" if key and not _is_placeholder(key) else ""
+    example = f" ({value})" if value and not _is_placeholder(value) else ""
+    return f"{CONTROLS.get(name, default)}{of_key}{example}"
 
 
-def _placeholder(word: str) -> bool:
+def _is_placeholder(word: str) -> bool:
     """Return whether a word is to be replaced, such as UNIT; N is a unit."""
     return word.isupper() and len(word) > 1
 
 
-def said(error: Exception | str) -> str:
+def message_of(error: Exception | str) -> str:
     """Return an error or a note in the terms of the workbench, without the folder of its file.
 
-    >>> said("it is too short")
+    >>> message_of("it is too short")
     'It is too short'
     """
     if isinstance(error, MckibbenError):
         text = rendered(error, control, place)
-        text = text.replace(f"{error.file}", error.file.name if error.file else "")
+        if error.file is not None:
+            text = text.replace(str(error.file), error.file.name)
     else:
         text = in_terms_of(str(error), control, place)
     if text.partition(" ")[0].isalpha():  # a word, not the name of a file or channel

@@ -19,7 +19,7 @@ from typing import Any
 from nicegui import binding, context, events, run, ui
 
 from mckibben.app.steps import LARGEST
-from mckibben.app.terms import said
+from mckibben.app.terms import message_of
 from mckibben.errors import MckibbenError, unforeseen
 from mckibben.numerals import typeset, typeset_within
 from mckibben.report import interactive
@@ -210,14 +210,14 @@ def icon_button(icon: str, label: str, action: Callable[..., Any]) -> Any:
 def error_toast(error: Exception | str) -> None:
     """Show an error, with its remedy in terms of controls, until it is read or closed."""
     more: Any = {"multi_line": True, "timeout": 20_000, "close_button": "Close", "color": "warning"}
-    ui.notify(said(error), type="negative", **more)
+    ui.notify(message_of(error), type="negative", **more)
 
 
 def error_box(error: Exception | str) -> None:
     """Show an error in its place in a page."""
     with ui.element("div").classes("error").props("role=alert"):
         ui.icon("error_outline")
-        ui.label(said(error))
+        ui.label(message_of(error))
 
 
 def upload(text: str, action: Callable[[events.UploadEventArguments], Any], endings: str) -> Any:
@@ -331,7 +331,8 @@ def items(found: Sequence[Item]) -> None:
     for item in filter(None, found):
         if isinstance(item, Text):
             for sentence in item.sentences:
-                ui.label(typeset_within(said(sentence))).classes("muted" if item.style else "")
+                label = ui.label(typeset_within(message_of(sentence)))
+                label.classes("muted" if item.style else "")
         elif isinstance(item, Table):
             with details(item.summary) if item.summary else nullcontext():
                 titles = item.titles or [""] * len(item.rows)

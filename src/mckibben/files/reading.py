@@ -208,7 +208,7 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
     start = table.start_time if clock is None else clock.seconds(clock.values[0])
     times = clock if step is None else None
     if times is not None:
-        times = replace(times, values=timebase.checked(times.values, source))
+        times = replace(times, values=timebase.increasing(times.values, source))
     elif step is None and (columns := matrix_hint(table, time=True)):
         source.warn(f"no column of times is named; use `columns[time]=COLUMN`{columns}")
     pieces = gaps_in.pieces(channels, times, step, start, source)

@@ -224,7 +224,7 @@ def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Re
         if timed:
             source = Source(table, request, path)
             clock = times_of(clocks[at], source)
-            seconds.append(convert(timebase.checked(clock.values, source), clock.unit, "s"))
+            seconds.append(convert(timebase.increasing(clock.values, source), clock.unit, "s"))
         else:
             samples = np.arange(table.n_samples, dtype=np.float64)
             seconds.append(table.start_time + (table.sample_time or 0.0) * samples)

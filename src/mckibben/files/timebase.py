@@ -16,40 +16,39 @@ from mckibben.files.quality import wraps
 from mckibben.files.request import Source
 
 Spans = NDArray[np.intp]
-"""First samples, and those after the last, shape (m, 2)."""
+"""Start and stop of each span of samples, stop excluded, shape (m, 2)."""
 
 GAP = 3.0
 """Steps longer than this many median steps are gaps; shorter ones are jitter."""
 
 RATES = ("fs", "Fs", "sample_rate", "sampling_frequency")
-"""Names of samples per second [Hz]."""
+"""Names of scalars that are sampling rates [Hz]."""
 
 STEPS = ("Ts", "dt", "sample_time")
-"""Names of seconds per sample."""
-
+"""Names of scalars that are sample times [s]."""
 
 _SINCE_1970 = {"ms": (1e12, 4.2e12), "us": (1e15, 4.2e15), "ns": (1e18, 4.2e18)}
-"""Unit -> counts of it since 1970 in the years 2001 to 2103."""
+"""Unit -> range of times since 1970 in that unit, for the years 2001 to 2103."""
 
 
 class Step(NamedTuple):
-    """A time step, and the deviation of recorded steps from it, in the unit of the times.
+    """A time step, and the deviations of recorded steps from it, in the unit of the times.
 
-    ``jitter`` is the root mean square and the largest deviation of a step; None where every time is on
-    the grid within the digits that were recorded, and none is lost.
+    ``jitter`` is the root mean square and the maximum of the deviations; None if all times are on the
+    grid within their recorded digits and no sample is lost.
     """
 
     size: float
     jitter: tuple[float, float] | None
 
 
-def checked(time: Array, source: Source) -> Array:
-    """Return increasing times: wrapping counters are unwrapped; raise an error for others.
+def increasing(time: Array, source: Source) -> Array:
+    """Return strictly increasing times; counters that wrap are unwrapped, with a note.
 
     Raises
     ------
     DataError
-        If a time is missing, repeated or goes back, with the row.
+        If a time is missing, is repeated or decreases; names the row.
     """
     missing = np.flatnonzero(~np.isfinite(time))
     if missing.size:
@@ -66,13 +65,13 @@ def checked(time: Array, source: Source) -> Array:
     wrong = np.flatnonzero(steps <= 0)
     if not wrong.size:
         return time
-    at = int(wrong[0])
-    problem = f"the time goes back from {time[at]:.10g} to {time[at + 1]:.10g}"
+    first = int(wrong[0])
+    problem = f"the time goes back from {time[first]:.10g} to {time[first + 1]:.10g}"
     remedy = "split the file there, or sort its rows by time"
-    if steps[at] == 0:
-        problem = f"the time {time[at]:.10g} is repeated"
-        remedy = "delete the repeated row; or, where times were rounded when saved, give `rate`"
-    raise source.error(problem, remedy, "time", at + 1)
+    if steps[first] == 0:
+        problem = f"the time {time[first]:.10g} is repeated"
+        remedy = "delete the repeated row; or, if times were rounded when saved, give `rate`"
+    raise source.error(problem, remedy, "time", first + 1)
 
 
 def stated_step(source: Source) -> float | None:
@@ -81,7 +80,7 @@ def stated_step(source: Source) -> float | None:
     Raises
     ------
     DataError
-        If one is no positive finite number, or two contradict each other.
+        If one is not a positive finite number, or two contradict each other.
     """
     rates = source.table.rates
     if not rates:
@@ -116,12 +115,12 @@ def _last(place: str) -> str:
 
 
 def unit_by_size(time: Array, source: Source) -> str | None:
-    """Return the unit of times without one if their size determines it, with a note, or None.
+    """Return the unit of times without one if their size determines it, with a note; else None.
 
     Raises
     ------
     DataError
-        If they may be days or counts as well as seconds.
+        If they may be days or counts instead of seconds.
     """
     time = time[np.isfinite(time)]
     if time.size < 2:
@@ -130,9 +129,8 @@ def unit_by_size(time: Array, source: Source) -> str | None:
     steps = np.diff(time)
     # days since 1900, of spreadsheets, and since year 0, of MATLAB, in the years 1941 to 2119 or so
     days = ((15_000.0, 80_000.0), (693_000.0, 800_000.0))
-    short = (
-        0 < np.median(np.abs(steps)) < 0.999e-3
-    )  # a minute of a day; seconds are rarely so short
+    # steps below 1.4 minutes as days, or below 1 ms as seconds, which are rare
+    short = 0 < np.median(np.abs(steps)) < 0.999e-3
     if short and any(first <= low and high <= last for first, last in days):
         problem = (
             f"the times have no unit; {time[0]:.12g} and the short steps may be days, as "
@@ -153,16 +151,16 @@ def unit_by_size(time: Array, source: Source) -> str | None:
 
 
 def doubtful_unit(problem: str, step: float, source: Source) -> DataError:
-    """Return the error for times of uncertain unit, with units that make steps of 0.1 ms to 5 s."""
-    shares = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-    fitting = [unit for unit, share in shares.items() if 1e-4 <= share * step <= 5.0] or ["ms"]
-    options = " or ".join(f"`units[time]={unit}`" for unit in fitting)
-    remedy = f"name its unit, as in {options}, or `units[time]=s` where that is right"
-    return source.error(f"{problem}: is it in {' or '.join(fitting)}?", remedy, "time", 0)
+    """Return the error for times of uncertain unit; suggest units with steps of 0.1 ms to 5 s."""
+    seconds = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+    plausible = [unit for unit, scale in seconds.items() if 1e-4 <= scale * step <= 5.0] or ["ms"]
+    options = " or ".join(f"`units[time]={unit}`" for unit in plausible)
+    remedy = f"name its unit, as in {options}, or `units[time]=s` if that is right"
+    return source.error(f"{problem}: is it in {' or '.join(plausible)}?", remedy, "time", 0)
 
 
 def resolution(time: Array) -> float:
-    """Return the last recorded digit of the times.
+    """Return the value of the last recorded digit of the times.
 
     >>> resolution(np.array([0.0, 0.083, 0.167])), resolution(np.array([0.0, 4.0, 8.0]))
     (0.001, 1.0)
@@ -182,54 +180,54 @@ def resolution(time: Array) -> float:
 def common_step(time: Array, spans: Spans) -> Step:
     """Return the common step of all spans: the shortest decimal that fits them.
 
-    Rounding of recorded times is distinguished from jitter by the spread of the times about the grid.
+    Deviations from the grid within the recorded digits are rounding; larger ones are jitter.
     """
     spans = spans[spans[:, 1] - spans[:, 0] > 1]
     if not spans.size:
         return Step(float(f"{np.median(np.diff(time)):.6g}"), (0.0, 0.0))
     lengths = spans[:, 1] - spans[:, 0]
     starts = np.cumsum(lengths) - lengths
-    t = np.concatenate([time[first:after] - time[first] for first, after in spans])
+    t = np.concatenate([time[start:stop] - time[start] for start, stop in spans])
     digit = resolution(time)
     noise = 8 * float(np.spacing(np.max(np.abs(time))))
     within = np.delete(np.arange(1, t.size), starts[1:] - 1)
     steps = t[within] - t[within - 1]
-    size, off_grid = _fitted(t, np.arange(t.size, dtype=float), starts, digit, noise)
-    if not off_grid:
+    size, rms = _fit_step(t, np.arange(t.size, dtype=float), starts, digit, noise)
+    if rms == 0.0:
         return Step(size, None)
-    usual = np.mean(steps[steps <= 1.5 * np.median(steps) + digit])
+    typical = np.mean(steps[steps <= 1.5 * np.median(steps) + digit])
     counts = np.zeros(t.size)
-    counts[within] = np.maximum(1, np.rint(steps / usual))  # 2 where one sample is lost
-    counted, off_counted = _fitted(t, np.cumsum(counts), starts, digit, noise)
-    if off_counted < off_grid:  # else long steps are followed by short ones
-        size = counted
-    off = np.abs(steps - size)
-    return Step(size, (float(np.sqrt(np.mean(off**2))), float(off.max())))
+    counts[within] = np.maximum(1, np.rint(steps / typical))  # 2 if one sample is lost
+    size_with_lost, rms_with_lost = _fit_step(t, np.cumsum(counts), starts, digit, noise)
+    if rms_with_lost < rms:  # otherwise short steps follow the long ones
+        size = size_with_lost
+    deviations = np.abs(steps - size)
+    return Step(size, (float(np.sqrt(np.mean(deviations**2))), float(deviations.max())))
 
 
-def _fitted(
+def _fit_step(
     t: Array, count: Array, starts: NDArray[np.intp], digit: float, noise: float
 ) -> tuple[float, float]:
-    """Return the step for samples of these counts, and the rms deviation of times from its grid."""
+    """Return the step of numbered samples, and the RMS deviation from its grid; 0 if rounding."""
     lengths = np.diff(starts, append=t.size)
     k = count - np.repeat(count[starts], lengths)
     t_mid, k_mid = (
         each - np.repeat(np.add.reduceat(each, starts) / lengths, lengths) for each in (t, k)
     )
     slope = float(np.sum(k_mid * t_mid) / np.sum(k_mid**2))
-    # Times printed more coarsely than half a step could hide a lost sample: they count as jitter.
+    # digits coarser than half a step could hide a lost sample: their rounding counts as jitter
     rounding = 0.75 * digit if digit <= 0.5 * slope else 0.0
     tolerance = rounding + noise + 1e-6 * slope
     for size in _shortest_first(slope):
-        off = t - size * k
-        spread = np.maximum.reduceat(off, starts) - np.minimum.reduceat(off, starts)
+        deviation = t - size * k
+        spread = np.maximum.reduceat(deviation, starts) - np.minimum.reduceat(deviation, starts)
         if np.all(spread <= 2 * tolerance):
             return size, 0.0
     return float(f"{slope:.6g}"), float(np.sqrt(np.mean((t_mid - slope * k_mid) ** 2)))
 
 
 def _shortest_first(step: float) -> Iterator[float]:
-    """Yield decimals of increasing accuracy for a step, and steps with such a decimal rate."""
+    """Yield approximations of a step with more and more digits, of itself or of its rate."""
     for digits in range(1, 17):
         yield float(f"{step:.{digits}g}")
         yield 1.0 / float(f"{1.0 / step:.{digits}g}")
@@ -237,6 +235,6 @@ def _shortest_first(step: float) -> Iterator[float]:
 
 
 def agrees(time: Array, step: float) -> bool:
-    """Return whether times have a stated step, within the recorded digits."""
-    off = np.abs(time - time[0] - step * np.arange(time.size))
-    return bool(np.all(off <= max(resolution(time), 1e-3 * step)))
+    """Return whether times have a given step, within the recorded digits."""
+    deviation = np.abs(time - time[0] - step * np.arange(time.size))
+    return bool(np.all(deviation <= max(resolution(time), 1e-3 * step)))

@@ -12,14 +12,15 @@ from mckibben.signals.reversals import reversals
 
 
 def split_cycles(recording: Recording, channel: str, n_blocks: int) -> list[tuple[int, int]]:
-    """Return blocks of whole cycles that cover a recording, about equally long.
+    """Return blocks of whole cycles that cover a recording, of about equal length.
 
     Parameters
     ----------
+    recording : Recording
     channel : str
-        The input, at whose minima is cut; at its maxima too where it has no minimum inside.
+        Input whose minima separate the cycles; its maxima if it has no minimum between its ends.
     n_blocks : int
-        Most blocks, at least 1. There are fewer where there are fewer cycles.
+        Largest number of blocks, at least 1. Recordings of fewer cycles have fewer blocks.
 
     Returns
     -------
@@ -29,7 +30,7 @@ def split_cycles(recording: Recording, channel: str, n_blocks: int) -> list[tupl
     Raises
     ------
     DataError
-        On fewer than one block, or on more than one where the channel never turns.
+        If ``n_blocks`` is below 1, or above 1 for a channel that never turns.
     """
     require(n_blocks >= 1, "n_blocks", n_blocks, "1 or more", DataError)
     n = len(recording)
@@ -39,15 +40,14 @@ def split_cycles(recording: Recording, channel: str, n_blocks: int) -> list[tupl
     turns = reversals(x)
     inside = turns[1:-1]
     minima = inside[x[inside] < x[turns[:-2]]]
-    allowed = minima if minima.size else inside
-    if not allowed.size:
+    boundaries = minima if minima.size else inside
+    if not boundaries.size:
         raise DataError(
             "it never turns, so there is no cycle to split at",
             file=recording.source,
             channel=channel,
             remedy="record at least one rising and one falling branch",
         )
-    wanted = n * np.arange(1, n_blocks) / n_blocks
-    nearest = allowed[np.abs(allowed[:, np.newaxis] - wanted).argmin(axis=0)]
-    cuts = [0, *np.unique(nearest).tolist(), n]
-    return list(pairwise(cuts))
+    equal = n * np.arange(1, n_blocks) / n_blocks
+    nearest = boundaries[np.abs(boundaries[:, np.newaxis] - equal).argmin(axis=0)]
+    return list(pairwise([0, *np.unique(nearest).tolist(), n]))

@@ -11,7 +11,7 @@ from mckibben.app import modelling, widgets
 from mckibben.app.later import later
 from mckibben.app.modelling import Offered
 from mckibben.app.state import State
-from mckibben.app.terms import said
+from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
 from mckibben.comparison.channels import Channels
 from mckibben.estimators.catalogue import Need, ability, declared, full_name
@@ -70,7 +70,7 @@ class _Choice:
                     for title, why in offered.others.items():
                         with ui.element("div"):
                             ui.label(title)
-                            ui.label(said(why)).classes("muted")
+                            ui.label(message_of(why)).classes("muted")
         with widgets.row(classes="spread foot"):  # stays in sight
             self.count = ui.label().classes("muted")
             self.button = mark(widgets.primary("Fit", self._fit), "fit")

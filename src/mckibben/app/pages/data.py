@@ -15,7 +15,7 @@ from mckibben.app import together, widgets
 from mckibben.app.pages import importing
 from mckibben.app.state import State, view
 from mckibben.app.steps import Entry, Reading, Step
-from mckibben.app.terms import said
+from mckibben.app.terms import message_of
 from mckibben.app.virtual import FIRST, TITLES, record
 from mckibben.app.widgets import mark
 from mckibben.errors import DataError, MckibbenError
@@ -328,7 +328,7 @@ def _recording(state: State, entry: Entry) -> None:
     if notes := dict.fromkeys(recording.notes):
         with widgets.details("Import notes"):
             for note in notes:
-                ui.label(said(note)).classes("muted")
+                ui.label(message_of(note)).classes("muted")
 
 
 def _actions(state: State, entry: Entry) -> None:

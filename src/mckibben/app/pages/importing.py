@@ -14,7 +14,7 @@ from nicegui import ui
 
 from mckibben.app import widgets
 from mckibben.app.steps import Reading, understand
-from mckibben.app.terms import GAPS, said
+from mckibben.app.terms import GAPS, message_of
 from mckibben.app.widgets import mark
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files.choosing import Seen
@@ -218,7 +218,7 @@ def _understood(form: Form) -> None:
     found = form.recordings
     more = [f"and {len(found) - 3} more recordings"] * (len(found) > 3)
     with ui.element("div"):
-        for text in [*map(summary, found[:3]), *more, *map(said, found[0].notes)]:
+        for text in [*map(summary, found[:3]), *more, *map(message_of, found[0].notes)]:
             ui.label(text).classes("muted")
 
 

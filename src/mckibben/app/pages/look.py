@@ -13,7 +13,7 @@ from mckibben.app.later import later
 from mckibben.app.modelling import last_plan, plan, restored
 from mckibben.app.pages import parts
 from mckibben.app.state import State, view
-from mckibben.app.terms import said
+from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
 from mckibben.comparison.channels import Channels
 from mckibben.diagnosis.characterization import characterize
@@ -159,7 +159,7 @@ def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) ->
     for plot in widgets.plot(drawing, height=360 if kind == "loop" else 130 + 90 * len(channels)):
         mark(plot, f"look-{kind}")
     if drawing.note:
-        ui.label(said(drawing.note)).classes("muted")
+        ui.label(message_of(drawing.note)).classes("muted")
 
 
 def _words(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:

@@ -14,7 +14,7 @@ from mckibben.app import modelling, widgets
 from mckibben.app.later import later
 from mckibben.app.pages import choosing, parts
 from mckibben.app.state import State
-from mckibben.app.terms import said
+from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
 from mckibben.arrays import Array
 from mckibben.blocks.free_run import run_free
@@ -190,14 +190,14 @@ def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:
     if why := modelling.against(rows):
         with mark(ui.element("div").classes("error"), "not-recommended"):
             ui.icon("info_outline")
-            ui.label(typeset_within(said(why)))
+            ui.label(typeset_within(message_of(why)))
     by = CHOICES[first["chosen_by"]]
     notes = [f"Ordered by {by[0]} ({by[1]}), as the test is to judge, not to choose."]
     notes += [f"{first['split'][:1].upper()}{first['split'][1:]}."]
     notes += dict.fromkeys(why for row in rows for why in row.get("shared", ()))
     notes += [f"* {CAREFUL}."] * any(caution(row["model"]) for row in rows)
     notes += [OTHER_DATA] * (not all(row["current"] for row in rows))
-    ui.label(typeset_within(said(" ".join(notes)))).classes("muted")
+    ui.label(typeset_within(message_of(" ".join(notes)))).classes("muted")
 
 
 # -- the model that is chosen ----------------------------------------------------------------------

@@ -11,7 +11,7 @@ from nicegui import events, ui
 from mckibben.app import widgets
 from mckibben.app.jobs import Job, Work
 from mckibben.app.state import State, view
-from mckibben.app.terms import said
+from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
 from mckibben.app.workspace import Workspace
 
@@ -132,7 +132,7 @@ def show_job(state: State, job: Job, title: str = "") -> None:
         with ui.element("div").classes("grow"):
             ui.label(title or job.title)
             if not job.active:
-                ui.label(said(job.message or job.state)).classes("muted")
+                ui.label(message_of(job.message or job.state)).classes("muted")
         if job.active:
             bar = ui.linear_progress(show_value=False, color="primary").classes("meter")
             widgets.labelled(bar, "Progress")

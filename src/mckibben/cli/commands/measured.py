@@ -1,10 +1,10 @@
-"""Compare all models on all sets of recordings in a folder, by fixed splits, on one page.
+"""Compare all models on all sets of recordings in a folder, with fixed splits, in one report.
 
-The table [split] in a set's channels.toml states what is fitted and what is tested; without it the
-last quarter is tested. Ctrl-C stops at once, and the same command goes on from there.
+The table [split] in a set's channels.toml defines the training and test data; without it the last
+quarter is tested. After Ctrl-C, the same command resumes.
 
-Models of any other software enter by their predictions: --splits writes what each task trains and tests
-on, --score prints both metrics of predictions, in lines for docs/measured/leaderboard.csv.
+Models of other software are scored by their predictions: --splits writes the training and test data of
+each task, and --score prints the metrics of predictions, as lines of docs/measured/leaderboard.csv.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ if TYPE_CHECKING:
 def measured(
     folder: Annotated[
         Path,
-        Argument("FOLDER", "A folder for every set of recordings, each with its channels.toml."),
+        Argument("FOLDER", "Folder of sets of recordings, each a folder with its channels.toml."),
     ],
-    out: Annotated[Path, Option("Folder for the page and measured.csv.", "DIR", "-o")] = Path(
+    out: Annotated[Path, Option("Folder for the report and measured.csv.", "DIR", "-o")] = Path(
         "measured"
     ),
-    only: Annotated[tuple[str, ...], Option("A set's folder; repeatable.", "SET")] = (),
+    only: Annotated[tuple[str, ...], Option("Name of a set's folder; repeatable.", "SET")] = (),
     models: Annotated[
         str | tuple[str, ...], Option("Models by short name.", "all|quick|NAME,...", parse=names)
     ] = "all",
     quick: Quick = False,
     splits: Annotated[
-        Path | None, Option("Only write what each task trains and tests on, to DIR.", "DIR")
+        Path | None, Option("Only write the training and test data of each task, to DIR.", "DIR")
     ] = None,
     score: Annotated[
-        tuple[Path, ...], Option("Only score a CSV of predictions; repeatable.", "FILE")
+        tuple[Path, ...], Option("Only score predictions in a CSV file; repeatable.", "FILE")
     ] = (),
     seed: Seed = 0,
     jobs: Jobs = None,
@@ -58,17 +58,18 @@ def measured(
         sets = chosen_in(folder, only)
         if splits is not None:
             write_splits(sets, splits)
-        scored = [one for file in score for one in entries(file, sets)]
-        lines = [HEAD] * bool(scored) + [one.line() for one in scored]
-        show([asdict(one) for one in scored], lambda: lines, as_json, written=[splits])
+        scores = [entry for file in score for entry in entries(file, sets)]
+        lines = [HEAD, *(entry.line() for entry in scores)] if scores else []
+        show([asdict(entry) for entry in scores], lambda: lines, as_json, written=[splits])
         return
 
-    def done(one: Outcome) -> None:
+    def report(outcome: Outcome) -> None:
         if not as_json:
-            say(f"{one.label}: {one.failed or (words.chosen(one.board) if one.board else '')}")
+            chosen = words.chosen(outcome.board) if outcome.board else ""
+            say(f"{outcome.label}: {outcome.failed or chosen}")
 
-    with stoppable(out), telling(True, "measured", lines=True) as tell:
-        found = measure(
+    with stoppable(out), telling(True, "measured", lines=True) as progress:
+        outcomes = measure(
             folder,
             out,
             only=only,
@@ -77,12 +78,13 @@ def measured(
             jobs=jobs,
             force=force,
             command=repeated(),
-            progress=tell,
-            found=done,
+            progress=progress,
+            found=report,
         )
     written = [out / name for name in FILES]
-    show({one.label: one.to_dict() for one in found}, list, as_json, written=written)
-    if all(one.failed for one in found):
+    results = {outcome.label: outcome.to_dict() for outcome in outcomes}
+    show(results, list, as_json, written=written)
+    if all(outcome.failed for outcome in outcomes):
         raise DataError(
             "nothing could be compared", file=folder, remedy=f"see the reasons in {written[0]}"
         )

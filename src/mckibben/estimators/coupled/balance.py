@@ -41,7 +41,7 @@ from mckibben.estimators.coupled.balance_prior import (
     PriorErrors,
     PriorLike,
     as_prior,
-    check_alone,
+    check_single_muscle,
     with_prior,
 )
 from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
@@ -251,7 +251,7 @@ class BalanceEstimator(CoupledEstimator):
         ]
         check_numbers(data)
         if self.prior is not None:
-            check_alone(data)
+            check_single_muscle(data)
         of_force = self.of_force or only_forces(data)
         data, behind, ways = from_zero(data, np.eye(1) if of_force else directions(data))
         bench = replace(bench_of(data, ways, tare=self.tare), of_force=of_force)
@@ -338,12 +338,12 @@ class BalanceEstimator(CoupledEstimator):
             if kind == "springs":
                 return which == 0 or (which - 1) % structure.degree == 0
             if kind in ("relaxation", "lags"):
-                few = structure.n_lags < 3 or self.lags is not None
-                return few or which in (structure.n_lags // 3, 2 * structure.n_lags // 3)
+                few = len(structure.lags) < 3 or self.lags is not None
+                return few or which in (len(structure.lags) // 3, 2 * len(structure.lags) // 3)
             if kind in ("elasticity", "areas"):
                 return which < 2
             return kind in ("loads", "damping", "bladder", "friction") or (
-                kind == "grip" and structure.n_stops > 0 and self.friction == "pressure"
+                kind == "grip" and bool(structure.limits) and self.friction == "pressure"
             )
 
         return np.array([term.muscle is None and there(term) for term in structure.terms])
@@ -410,10 +410,10 @@ class BalanceEstimator(CoupledEstimator):
     def _balanced(self, search: Search, tracker: Tracker) -> Array:
         """Return the best linear force balance at measured positions, over several friction offsets."""
         structure, problem, starts = search.structure, search.problem, []
-        grips = GRIPS[: None if structure.n_stops else 1]
+        grips = GRIPS[: None if structure.limits else 1]
         for grip in grips if self.friction == "pressure" else (CONSTANT,):
             z = np.zeros(problem.size(structure))
-            z[: len(structure.terms)] = structure.begin(grip * structure.bench.highest)
+            z[: len(structure.terms)] = structure.initial(grip * structure.bench.highest)
             z = problem.balanced(structure, z, search.active)
             starts.append((search.cost(z), z))
             tracker.saw(z, starts[-1][0])
@@ -424,7 +424,7 @@ class BalanceEstimator(CoupledEstimator):
         structure, prior_errors, problem = search.structure, search.prior_errors, search.problem
         assert prior_errors is not None
         z = np.zeros(problem.size(structure))
-        z[: len(structure.terms)] = structure.begin(FIRST_GRIP * structure.bench.highest)
+        z[: len(structure.terms)] = structure.initial(FIRST_GRIP * structure.bench.highest)
         for place, term in enumerate(structure.terms):
             if term.kind == "loads":
                 z[place] = 1.0 / prior_errors.prior.sheet.area

@@ -1,4 +1,4 @@
-"""Prior of a muscle, combined with its recordings."""
+"""Prior of a muscle as additional residuals of a fit."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import TIMES, traits
 
 STEP = 1e-5
-"""Relative step of a number for finite differences of traits."""
+"""Step of finite differences, relative to the scale of the parameter."""
 
 LEAST_NOISE = 0.01
-"""Smallest model error of a muscle, relative to the range, for independent samples."""
+"""Smallest standard deviation of the model error, relative to the range, for independent samples."""
 
-ZERO_STEPS = 6
-"""Steps towards the probable origin of displacements."""
+ORIGIN_STEPS = 6
+"""Number of Gauss-Newton steps for the origin of displacements."""
 
 SHORTEST_LAG = 1.0
-"""Smallest first time constant [s]."""
+"""Largest lower bound of the time constants [s]."""
 
 PriorLike = str | Path | Sheet | InstanceOf[Prior] | None
-"""Forms of a prior: a muscle's name, a file, a data sheet (also as a mapping), or a prior."""
+"""A muscle's name, a file, a data sheet (also as a mapping), or a prior."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class PriorErrors:
     ----------
     prior : Prior
     noise : float
-        Of the recordings' errors, relative to the range, were there as many independent ones: by it a
-        deviation of one from the prior is as bad as one from the recordings.
+        Standard deviation of the recordings' errors, relative to the range, as if they were
+        independent: a deviation of one standard deviation from the prior costs as much.
     """
 
     prior: Prior
@@ -53,69 +53,72 @@ class PriorErrors:
 
     @cached_property
     def weights(self) -> Array:
-        """Rows that decorrelate the numbers of traits."""
+        """Matrix that whitens the deviations of traits."""
         return self.prior.weights()
 
     def errors(
         self, structure: Structure, z: Array, wanted: Mask | None = None
     ) -> tuple[Array, Array]:
-        """Return prior residuals, and derivatives by the requested terms, others 0.
+        """Return prior residuals, and their derivatives by the requested terms; others are 0.
 
-        Where displacements count from is as likely makes them most so (variable projection). Traits are
-        values at a few places; between them areas are smooth, no coefficient beyond that at rest.
+        The origin of displacements is solved for (variable projection). Traits are values at a few
+        places, so coefficients of the area above the first are penalised to keep it smooth in between.
         """
-        sheet, weights, unsure = self.prior.sheet, self.noise * self.weights, self.prior.zero
+        sheet, weights, origin_std = self.prior.sheet, self.noise * self.weights, self.prior.zero
         terms, scales = z[: len(structure.terms)], structure.scales()
-        narrowing = np.array([kind == "areas" and which > 0 for kind, which, _ in structure.terms])
-        curved = np.where(narrowing, self.noise / scales, 0.0)
 
-        def away(free: Array, zero: float) -> Array:
-            block = structure.block(structure.expanded(free))
-            found = np.nan_to_num(traits(block, sheet, zero) - self.prior.mean)
-            return np.append(weights @ found, self.noise * zero / unsure)
+        def residuals(terms: Array, origin: float) -> Array:
+            block = structure.block(structure.expanded(terms))
+            deviations = np.nan_to_num(traits(block, sheet, origin) - self.prior.mean)
+            return np.append(weights @ deviations, self.noise * origin / origin_std)
 
-        zero, by_zero = 0.0, np.zeros(1)
-        for _ in range(ZERO_STEPS):
-            now = away(terms, zero)
-            by_zero = (away(terms, zero + STEP * unsure) - now) / (STEP * unsure)
-            step = -float(by_zero @ now) / float(by_zero @ by_zero)
-            zero += min(max(step, -unsure), unsure)
-        now = away(terms, zero)
-        far = np.append(now, curved * terms)
+        origin, by_origin = 0.0, np.zeros(1)
+        for _ in range(ORIGIN_STEPS):
+            here = residuals(terms, origin)
+            by_origin = (residuals(terms, origin + STEP * origin_std) - here) / (STEP * origin_std)
+            step = -float(by_origin @ here) / float(by_origin @ by_origin)
+            origin += min(max(step, -origin_std), origin_std)
+
+        here = residuals(terms, origin)
+        of_area = np.array([kind == "areas" and which > 0 for kind, which, _ in structure.terms])
+        smoothing = np.where(of_area, self.noise / scales, 0.0)
+        errors = np.append(here, smoothing * terms)
         if wanted is None:
-            return far, np.zeros((0, terms.size))
-        slopes = np.zeros((now.size, terms.size))
-        for place in np.flatnonzero(wanted).tolist():
+            return errors, np.zeros((0, terms.size))
+
+        jacobian = np.zeros((here.size, terms.size))
+        for index in np.flatnonzero(wanted).tolist():
             moved = terms.copy()
-            moved[place] += (step := STEP * scales[place])
-            slopes[:, place] = (away(moved, zero) - now) / step
-        slopes -= np.outer(by_zero, by_zero @ slopes) / float(by_zero @ by_zero)
-        return far, np.concatenate([slopes, np.diag(curved)])
+            moved[index] += (step := STEP * scales[index])
+            jacobian[:, index] = (residuals(moved, origin) - here) / step
+        jacobian -= np.outer(by_origin, by_origin @ jacobian) / float(by_origin @ by_origin)
+        return errors, np.concatenate([jacobian, np.diag(smoothing)])
 
 
 def as_prior(given: Any) -> Prior:
-    """Return a prior, or the one of a muscle's name, a file or a data sheet."""
+    """Return a prior as given, or that of a muscle's name, a file or a data sheet."""
     if isinstance(given, Prior):
         return given
     return prior_of(Sheet(**given) if isinstance(given, Mapping) else given)
 
 
-def check_alone(data: TrainingData) -> None:
-    """Raise an error for a prior of several muscles, or with scheduling inputs other than a load.
+def check_single_muscle(data: TrainingData) -> None:
+    """Check that the data of a prior are of one muscle, scheduled by its load only.
 
     Raises
     ------
     ModelError
+        If there are several muscles, or scheduling inputs other than loads.
     """
     if len(data.inputs) != 1 or any(channel.unit not in LOADS for channel in data.scheduled):
         raise ModelError(
-            "a prior is of one muscle under its load alone",
-            remedy="leave prior out for several muscles, or where something schedules them",
+            "a prior is for one muscle with no scheduling input but its load",
+            remedy="leave prior out",
         )
 
 
 def with_prior(bench: Bench, given: Any) -> tuple[Bench, PriorErrors]:
-    """Return the set-up over the muscle's full range, recorded or not, and its prior."""
+    """Return the set-up extended to the muscle's full range, and its prior."""
     prior = as_prior(given)
     shortest, longest = bench.lag_range
     return replace(

@@ -77,7 +77,7 @@ def at_rest(data: TrainingData, run: Run) -> bool:
 def front(structure: Structure, values: Array, channel: Channel) -> list[Block]:
     """Return the front between measured pressure and muscle: air lag, then dead zone."""
     filling, ratio, dead, contact = (
-        float(structure.shaped(values, name)[0])
+        float(structure.nonlinear_values(values, name)[0])
         for name in ("filling", "venting", "dead", "contact")
     )
     blocks: list[Block] = []
@@ -145,7 +145,7 @@ class Problem:
 
     def acting(self, run: Run, structure: Structure, values: Array) -> Array:
         """Return the pressures acting on muscles, shape (n, muscles)."""
-        shape = tuple(values[structure.shape["filling"].start :].tolist())
+        shape = tuple(values[structure.nonlinear["filling"].start :].tolist())
         if not (shape[0] or shape[2] or shape[3]):
             return run.driven
         key = (run.place, *shape)
@@ -281,7 +281,7 @@ class Problem:
     def _step(self, structure: Structure, z: Array, place: int, share: float) -> float:
         """Return the finite-difference step of a parameter, away from its bounds."""
         n = structure.mix.shape[1]
-        _, high, much = (end[place - n] for end in structure.ends())
+        _, high, much = (end[place - n] for end in structure.nonlinear_bounds())
         step = share * float(much)
         return step if z[place] + step <= high else -step
 
@@ -386,7 +386,7 @@ class Problem:
             [triangle[:, :-1], np.sqrt(RIDGE) * np.diag(np.where(size > 0.0, size, 1.0))]
         )
         right = np.append(triangle[:, -1], np.zeros(size.size))
-        sides, bounds = structure.conditions(structure.expanded(start[: len(terms)]))
+        sides, bounds = structure.constraints(structure.expanded(start[: len(terms)]))
         mix = structure.mix[:, chosen] + np.outer(structure.base, scaling)
 
         def asked(side: Array, bound: Array) -> tuple[Array, Array]:
@@ -416,17 +416,19 @@ class Problem:
             powers = structure.powers(x[:, : len(structure.bench.scheduled)].T)
             own = np.empty_like(q)
             for j in range(structure.m):
-                springs = values[structure.on("springs", j)].reshape(-1, 1 + structure.m)
+                springs = values[structure.of_coordinate("springs", j)].reshape(-1, 1 + structure.m)
                 own[:, j] = springs[:, 1 + j] @ powers
             scale = structure.bench.scale
             for k, way in enumerate(structure.bench.directions):
                 u = q @ way / scale
-                elastic = polynomial.polyder([0.0, 0.0, *values[structure.of("elasticity", k)]])
-                narrowing = polynomial.polyder(values[structure.of("areas", k)])
+                elastic = polynomial.polyder(
+                    [0.0, 0.0, *values[structure.of_muscle("elasticity", k)]]
+                )
+                narrowing = polynomial.polyder(values[structure.of_muscle("areas", k)])
                 stiff = polynomial.polyval(u, elastic) / scale
                 stiff -= p[:, k] * polynomial.polyval(u, narrowing) / scale
-                stiff += float(values[structure.of("bladder", k)].sum())
-                stiff += 0.3 * float(values[structure.of("friction", k)].sum())
+                stiff += float(values[structure.of_muscle("bladder", k)].sum())
+                stiff += 0.3 * float(values[structure.of_muscle("friction", k)].sum())
                 own += np.outer(stiff, way**2)
             found.append(own)
         whole = np.concatenate(found)

@@ -21,7 +21,7 @@ from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask
 from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, PriorErrors
 from mckibben.estimators.coupled.balance_problem import MOST_CUTS, Problem, bounded_least_squares
-from mckibben.estimators.coupled.balance_structure import Places, Structure, Term
+from mckibben.estimators.coupled.balance_structure import Indices, Structure, Term
 from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.statistics import autoregression
@@ -120,16 +120,16 @@ class Search:
         """Return the search restricted to free terms, and the unknowns."""
         structure, n = self.structure, len(self.structure.terms)
         free = set(compress(structure.keys, self.active))
-        needed = structure.needed(list(compress(structure.terms, self.active)))
+        needed = structure.reduced(list(compress(structure.terms, self.active)))
         active = np.array([key in free for key in needed.keys])
-        moved = np.append(structure.moved_to(needed, z[:n]), z[n:])
+        moved = np.append(structure.transferred(needed, z[:n]), z[n:])
         return replace(self, structure=needed, active=active), moved
 
     def descended(self, z: Array, steps: int, tracker: Tracker) -> Array:
         """Return the unknowns after a descent in the free terms."""
         few, narrow = self.narrowed(z)
         found, n = few.descend(narrow, steps, tracker), len(few.structure.terms)
-        return np.append(few.structure.moved_to(self.structure, found[:n], z), found[n:])
+        return np.append(few.structure.transferred(self.structure, found[:n], z), found[n:])
 
     def descend(self, z: Array, steps: int, tracker: Tracker) -> Array:
         """Descend, report improvements to a tracker, and return the best unknowns."""
@@ -202,10 +202,10 @@ class Search:
         """Return linear constraints of all unknowns: sides @ z >= least."""
         structure = self.structure
         n, n_terms = structure.mix.shape[1], len(structure.terms)
-        sides, least = structure.conditions(structure.expanded(z[:n_terms]))
+        sides, least = structure.constraints(structure.expanded(z[:n_terms]))
         on_all = np.zeros((len(sides), z.size))
         on_all[:, :n] = sides @ structure.mix
-        low, high, much = structure.ends()
+        low, high, much = structure.nonlinear_bounds()
         shape, far = z[n:n_terms], FAR * much
         bounds = np.append(np.maximum(low, shape - far), -np.minimum(high, shape + far))
         lags = [i for i in np.flatnonzero(self.active) if structure.terms[i].kind == "lags"]
@@ -254,7 +254,7 @@ class Search:
         whole = _reduced((grams.sum(axis=0) + likely)[np.newaxis], free, z)[0]
         solution, found = z.copy(), z.copy()
         solution[free] = bounded_least_squares(whole, bounded[free], z[free], DAMPED)
-        low, high, much = structure.ends()
+        low, high, much = structure.nonlinear_bounds()
         shape = slice(structure.mix.shape[1], n)
         near = np.clip(
             solution[shape], np.maximum(low, z[shape] - much), np.minimum(high, z[shape] + much)
@@ -274,7 +274,7 @@ class Search:
         parts = self.problem.errors(self.structure, z)[0]
         return np.array([float(block @ block) for part in _blocks(parts) for block in part])
 
-    def _grams(self, z: Array, wanted: Mask, new: Mask | None = None) -> tuple[Array, Places]:
+    def _grams(self, z: Array, wanted: Mask, new: Mask | None = None) -> tuple[Array, Indices]:
         """Return the products of derivatives and target, per block of time, and the folds of blocks.
 
         Each fold has a part of every run, so that it is not all that was measured under one condition;
@@ -386,7 +386,7 @@ def _blocks(parts: list[Array]) -> list[list[Array]]:
 
 
 def _left_out(
-    grams: Array, folds: Places, free: Mask, z: Array, bounded: Mask, likely: Array
+    grams: Array, folds: Indices, free: Mask, z: Array, bounded: Mask, likely: Array
 ) -> Array:
     """Return the squared errors of every block under the least squares of the others.
 

@@ -1,10 +1,15 @@
 """Structure of a force balance: candidate terms, their parameters, and physical constraints.
 
-Values are the linear coefficients of the block, in the order of `mckibben.blocks.coupled.balance_law`
-from those of the first coordinate on, then its shape: what is not linear. What is free is fewer numbers,
-of which the linear ones are an affine function: springs between two coordinates are one number, and
-muscles share theirs, from which each may differ. One number sets the unit of force: the area of muscle 1
-at rest is 1.
+Two vectors describe a balance:
+
+values
+    All parameters: the linear coefficients, in the order of `mckibben.blocks.coupled.balance_law` from
+    those of the first coordinate on, then the nonlinear parameters.
+free parameters
+    One for every `Term`. Linear coefficients are ``base + mix @ free``: the springs between two
+    coordinates are equal, and a coefficient of a muscle is the common one plus a difference.
+
+The unit of force is such that the area of muscle 1 at rest is 1.
 """
 
 from __future__ import annotations
@@ -24,7 +29,7 @@ from mckibben.blocks.coupled.balance_adaptive import GRID, LEAST_LEFT
 from mckibben.blocks.coupled.balance_law import NEVER, OWN
 from mckibben.blocks.fields import Channel, rows, vector
 
-Places = NDArray[np.intp]
+Indices = NDArray[np.intp]
 Item = TypeVar("Item")
 
 LEAST_AREA = 1e-9
@@ -33,47 +38,49 @@ LEAST_AREA = 1e-9
 LEAST_STIFF = 1e-3
 """Smallest stiffness, relative to the force at the highest pressure over the stroke."""
 
-MOST_ASYMMETRIC, MOST_GRIP, MOST_WALL = 5.0, 4.0, 0.1
-"""Bounds of the ratio of friction limits; of the friction offset, over the highest pressure; of the
-wall's stretch at that pressure, over the stroke.
-"""
+LOGARITHMIC = ("lags", "asymmetry", "venting")
+"""Nonlinear parameters that are stored as logarithms."""
 
-LONGEST_AIR = 2.0
-"""Largest time constant of the air in front [s]."""
+OF_MUSCLES = ("damping", "line", "mass", "bladder", "elasticity", "areas", "friction", "relaxation")
+"""Kinds of linear coefficients of muscles."""
+
+NOT_NEGATIVE = ("damping", "line", "mass", "bladder", "friction", "relaxation")
+"""Kinds of linear coefficients of muscles that are non-negative."""
 
 
 @dataclass(frozen=True)
 class Bench:
-    """Set-up from the recordings.
+    """Channels, ranges and geometry of the recordings.
 
     Parameters
     ----------
     driven, scheduled, loaded, given : tuple of Channel
-        Coordinates, what schedules, loads, and pressures.
+        Coordinates, scheduling inputs, loads, and pressures.
     directions : array, shape (n, m)
-        Shortening of every muscle by coordinates.
+        Shortening of every muscle per unit of every coordinate.
     hull : array, shape (n, 2)
-        Shortenings known [mm].
+        Lowest and highest shortening of every muscle, recorded or in its prior [mm].
     lowest, travel : array, shape (m,)
         Lowest value and range of every coordinate.
     levels : array, shape (s, 2)
-        What schedules, lowest and highest.
+        Lowest and highest value of every scheduling input.
     highest, heaviest : float
-        Pressure [bar]; load, 1 without one.
+        Highest pressure [bar]; largest load, 1 without one.
     preload : float
         Mean pressure [bar].
     tare : bool
-        Whether coordinates count from rest at the start.
+        Whether coordinates are relative to the start of each recording, at rest.
     lag_range : (float, float)
         Shortest and longest time constant identifiable from the recordings [s].
     step : float
         Shortest sample time [s]; 0 without time.
     of_force : bool
-        Whether errors of the one load count, not those of coordinates: then it sets the unit of force.
+        Whether errors are those of the one load, not of coordinates; its coefficient is then 1, instead
+        of the area.
     curved : bool
-        Whether all that schedules has been at three levels or more.
+        Whether every scheduling input has three levels or more.
     unmeasured : tuple of int
-        Recordings under constant loads of their own, which are found too.
+        Recordings whose unmeasured constant loads are estimated.
     """
 
     driven: tuple[Channel, ...]
@@ -97,7 +104,7 @@ class Bench:
 
     @property
     def directed(self) -> bool:
-        """Whether muscles act along directions, not each on a separate coordinate."""
+        """Whether muscles act along directions, instead of each on a coordinate of its own."""
         n, m = self.directions.shape
         return n != m or not bool((self.directions == np.eye(n)).all())
 
@@ -108,12 +115,12 @@ class Bench:
 
     @property
     def scale(self) -> float:
-        """Largest known shortening [mm]."""
+        """Largest shortening [mm]."""
         return float(np.abs(self.hull).max())
 
     @property
     def stroke(self) -> float:
-        """Largest known range of a shortening [mm]."""
+        """Largest range of a shortening [mm]."""
         return float(np.ptp(self.hull, axis=1).max())
 
     @property
@@ -123,13 +130,13 @@ class Bench:
         return np.where(most > 0, most, 1.0)
 
     def corners(self) -> list[Array]:
-        """Return the scheduling inputs at all combinations of their ends."""
+        """Return all combinations of the ends and middles of the scheduling inputs."""
         low, high = self.levels.T
         return [low + np.array(s) * (high - low) for s in product((0.0, 0.5, 1.0), repeat=len(low))]
 
 
 class Term(NamedTuple):
-    """A free parameter: its kind, its index, and its muscle, if of one."""
+    """A free parameter: its kind, its index, and its muscle if it is the difference of one."""
 
     kind: str
     which: int = 0
@@ -138,21 +145,21 @@ class Term(NamedTuple):
 
 @dataclass(frozen=True)
 class Structure:
-    """Sizes of a balance, and its free terms.
+    """Sizes of a balance, its terms, and the positions of their parameters.
 
     Parameters
     ----------
     bench : Bench
     n_elastic, n_area : int
-        Elastic terms from the square on; terms of the area, the constant one included.
+        Number of elastic terms, from the square on; of area terms, with the constant.
     limits, lags : tuple of float
-        Travels at which stops break away [mm/bar]; time constants to begin with [s].
+        Break-away travels of the stops [mm/bar]; initial time constants [s].
     obstacles : tuple of (int, float)
-        Side, 1 or -1, and place along the range of every coordinate, from 0 to 1, to begin with.
+        Side, 1 or -1, and initial position in the range of every coordinate, 0 to 1.
     degree : int
-        Highest power of what schedules.
+        Highest power of the scheduling inputs.
     settled : bool
-        Whether muscles had long been where every recording begins.
+        Whether muscles have settled at the start of every recording.
     """
 
     bench: Bench
@@ -164,7 +171,7 @@ class Structure:
     degree: int = 1
     settled: bool = False
 
-    # -- where things are ------------------------------------------------------------------------
+    # -- positions of parameters -----------------------------------------------------------------
 
     @property
     def n(self) -> int:
@@ -177,21 +184,18 @@ class Structure:
         return len(self.bench.driven)
 
     @property
-    def n_stops(self) -> int:
-        """Number of stops per muscle."""
-        return len(self.limits)
-
-    @property
-    def n_lags(self) -> int:
-        """Number of time constants."""
-        return len(self.lags)
+    def n_x(self) -> int:
+        """Number of scheduling inputs, without loads."""
+        return len(self.bench.scheduled)
 
     @cached_property
     def _coordinate(self) -> dict[str, slice]:
-        n_x = len(self.bench.scheduled)
-        springs = (1 + n_x * self.degree) * (1 + self.m)
-        loads = len(self.bench.loaded)
-        return _slices({"springs": springs, "loads": loads, "met": len(self.obstacles) * (3 + n_x)})
+        widths = {"springs": (1 + self.n_x * self.degree) * (1 + self.m)}
+        widths |= {
+            "loads": len(self.bench.loaded),
+            "obstacles": len(self.obstacles) * (3 + self.n_x),
+        }
+        return _slices(widths)
 
     @cached_property
     def _muscle(self) -> dict[str, slice]:
@@ -199,36 +203,39 @@ class Structure:
         widths |= {"elasticity": self.n_elastic, "areas": self.n_area}
         return _slices(widths | {"friction": len(self.limits), "relaxation": len(self.lags)})
 
-    def on(self, name: str, j: int) -> Places:
-        """Return the indices of a coordinate's coefficients."""
-        part, width = self._coordinate[name], self._coordinate["met"].stop
+    def of_coordinate(self, name: str, j: int) -> Indices:
+        """Return the indices of a coordinate's coefficients of a kind."""
+        part, width = self._coordinate[name], self._coordinate["obstacles"].stop
         return np.arange(part.start, part.stop) + j * width
 
-    def of(self, name: str, k: int) -> Places:
-        """Return the indices of a muscle's coefficients."""
+    def of_muscle(self, name: str, k: int) -> Indices:
+        """Return the indices of a muscle's coefficients of a kind."""
         part, width = self._muscle[name], self._muscle["relaxation"].stop
-        return np.arange(part.start, part.stop) + k * width + self.m * self._coordinate["met"].stop
+        first = self.m * self._coordinate["obstacles"].stop + k * width
+        return np.arange(part.start, part.stop) + first
 
     @cached_property
     def n_linear(self) -> int:
-        """Number of linear coefficients, including unused ones between."""
-        return self.n * self._muscle["relaxation"].stop + self.m * self._coordinate["met"].stop
+        """Number of linear coefficients, including unused ones."""
+        return (
+            self.m * self._coordinate["obstacles"].stop + self.n * self._muscle["relaxation"].stop
+        )
 
     def spring(self, q: int, j: int, i: int) -> int:
         """Return the index of the spring from coordinate j to i, or of its constant for i = -1."""
-        return int(self.on("springs", j)[q * (1 + self.m) + 1 + i])
+        return int(self.of_coordinate("springs", j)[q * (1 + self.m) + 1 + i])
 
     @cached_property
-    def shape(self) -> dict[str, slice]:
-        """Index of the nonlinear parameters, after the linear coefficients.
+    def nonlinear(self) -> dict[str, slice]:
+        """Positions of the nonlinear parameters in the values.
 
-        The grip [bar]; what friction grows with by schedules; the logarithms of the ratio of limits and
-        of the lags; stretch of walls [mm/bar], forces at which muscles go slack, places of obstacles;
-        time constants of air in front, while filling [s], the logarithm of the ratio of venting, the
-        dead zone [bar], and the pressure over which one fades [bar].
+        Friction pressure offset (grip) [bar], and its change with scheduling inputs (grips); logarithms
+        of the ratio of friction limits and of the lags; stretch of walls [mm/bar]; forces at which
+        muscles go slack (pushes); positions of obstacles (places); time constant of filling [s],
+        logarithm of the ratio of venting to filling, dead zone [bar], and the pressure over which
+        contact builds up [bar].
         """
-        n_x = len(self.bench.scheduled)
-        widths = {"grip": 1, "grips": n_x, "asymmetry": 1, "lags": self.n_lags}
+        widths = {"grip": 1, "grips": self.n_x, "asymmetry": 1, "lags": len(self.lags)}
         widths |= {"walls": 1, "pushes": self.n, "places": self.m * len(self.obstacles)}
         widths |= {"filling": 1, "venting": 1, "dead": 1, "contact": 1}
         return _slices(widths, self.n_linear)
@@ -236,110 +243,113 @@ class Structure:
     @property
     def size(self) -> int:
         """Number of values."""
-        return self.shape["contact"].stop
+        return self.nonlinear["contact"].stop
 
-    def shaped(self, values: Array, name: str) -> Array:
+    def nonlinear_values(self, values: Array, name: str) -> Array:
         """Return the nonlinear parameters of a kind."""
-        found = values[self.shape[name]]
-        return np.exp(found) if name in LOGARITHMIC else found
+        part = values[self.nonlinear[name]]
+        return np.exp(part) if name in LOGARITHMIC else part
 
-    # -- what is free ----------------------------------------------------------------------------
+    # -- free parameters -------------------------------------------------------------------------
 
     @cached_property
     def _columns(self) -> list[tuple[Term, list[int]]]:
-        """All linear parameters that may be free, and the indices of their coefficients."""
-        found: list[tuple[Term, list[int]]] = []
-        for q, j in product(range(1 + len(self.bench.scheduled) * self.degree), range(self.m)):
-            if q or not self.bench.tare:  # coordinates from rest make a constant of their own
-                found.append((Term("springs", q), [self.spring(q, j, -1)]))
+        """All linear terms, and the indices of their coefficients."""
+        columns: list[tuple[Term, list[int]]] = []
+        for q, j in product(range(1 + self.n_x * self.degree), range(self.m)):
+            if q or not self.bench.tare:  # relative coordinates have no constant force
+                columns.append((Term("springs", q), [self.spring(q, j, -1)]))
             for i in range(j, self.m):
-                found.append(
-                    (Term("springs", q), sorted({self.spring(q, j, i), self.spring(q, i, j)}))
-                )
+                both = {self.spring(q, j, i), self.spring(q, i, j)}
+                columns.append((Term("springs", q), sorted(both)))
         for j in range(self.m):
             if not self.bench.of_force:
-                found += [(Term("loads", j), [place]) for place in self.on("loads", j).tolist()]
-            table = self.on("met", j).reshape(len(self.obstacles), 3 + len(self.bench.scheduled))
+                loads = self.of_coordinate("loads", j).tolist()
+                columns += [(Term("loads", j), [index]) for index in loads]
+            table = self.of_coordinate("obstacles", j).reshape(-1, 3 + self.n_x)
             for number, stiffnesses in enumerate(table[:, 2:].tolist()):
-                found += [(Term("obstacle", number), [place]) for place in stiffnesses]
+                columns += [(Term("obstacle", number), [index]) for index in stiffnesses]
         for kind in OF_MUSCLES:
-            places = [self.of(kind, k).tolist() for k in range(self.n)]
-            for which, same in enumerate(zip(*places, strict=True)):
+            indices = [self.of_muscle(kind, k).tolist() for k in range(self.n)]
+            for which, shared in enumerate(zip(*indices, strict=True)):
                 if kind != "areas" or which or self.bench.of_force:
-                    found.append((Term(kind, which), list(same)))
-                found += [(Term(kind, which, k), [same[k]]) for k in range(1, self.n)]
-        return found
+                    columns.append((Term(kind, which), list(shared)))
+                columns += [(Term(kind, which, k), [shared[k]]) for k in range(1, self.n)]
+        return columns
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
         """Candidate terms, linear first, then nonlinear."""
-        shape = [
-            Term(name, which) for name, p in self.shape.items() for which in range(p.stop - p.start)
+        nonlinear = [
+            Term(name, which)
+            for name, part in self.nonlinear.items()
+            for which in range(part.stop - part.start)
         ]
-        return (*(term for term, _ in self._columns), *shape)
+        return (*(term for term, _ in self._columns), *nonlinear)
 
     @cached_property
     def mix(self) -> Array:
         """Matrix from free parameters to linear coefficients, shape (linear, free)."""
         mix = np.zeros((self.n_linear, len(self._columns)))
-        for number, (_, places) in enumerate(self._columns):
-            mix[places, number] = 1.0
+        for column, (_, indices) in enumerate(self._columns):
+            mix[indices, column] = 1.0
         return mix
 
     @cached_property
     def base(self) -> Array:
-        """Linear coefficients with nothing free: areas at rest or the load 1, all others 0."""
+        """Linear coefficients if all free ones are 0: areas at rest, or that of the load, are 1."""
         values = np.zeros(self.n_linear)
         if self.bench.of_force:
-            values[self.on("loads", 0)] = 1.0
+            values[self.of_coordinate("loads", 0)] = 1.0
         for k in range(0 if self.bench.of_force else self.n):
-            values[self.of("areas", k)[0]] = 1.0
+            values[self.of_muscle("areas", k)[0]] = 1.0
         return values
 
     def free(self, name: str) -> slice:
-        """Return the indices of a kind of nonlinear parameter among the free ones."""
-        part, shift = self.shape[name], self.mix.shape[1] - self.n_linear
+        """Return the positions of a kind of nonlinear parameter among the free ones."""
+        part, shift = self.nonlinear[name], self.mix.shape[1] - self.n_linear
         return slice(part.start + shift, part.stop + shift)
 
     @cached_property
     def not_negative(self) -> NDArray[np.bool_]:
-        """Which linear coefficients are non-negative."""
-        found = np.zeros(self.n_linear, dtype=bool)
+        """Mask of the non-negative linear coefficients."""
+        mask = np.zeros(self.n_linear, dtype=bool)
         for kind, k in product(NOT_NEGATIVE, range(self.n)):
-            found[self.of(kind, k)] = True
+            mask[self.of_muscle(kind, k)] = True
         for j in range(self.m):
-            found[self.on("met", j)] = True
-        return found
+            mask[self.of_coordinate("obstacles", j)] = True
+        return mask
 
     def expanded(self, free: Array) -> Array:
         """Return all values from the free ones."""
         n = self.mix.shape[1]
         return np.concatenate([self.base + self.mix @ free[:n], free[n:]])
 
-    def begin(self, grip: float) -> Array:
-        """Return initial free parameters: without effect, except the friction offset."""
-        free = np.zeros(len(self.terms))
-        put: dict[str, ArrayLike] = {"grip": grip, "lags": np.log(self.lags), "pushes": NEVER}
+    def initial(self, grip: float) -> Array:
+        """Return initial free parameters: all terms without effect, except the friction offset."""
         low = self.bench.lowest[:, np.newaxis]
-        put["places"] = (low + np.outer(self.bench.travel, [p for _, p in self.obstacles])).ravel()
-        for name, numbers in put.items():
-            free[self.free(name)] = np.asarray(numbers)
+        positions = low + np.outer(self.bench.travel, [position for _, position in self.obstacles])
+        free = np.zeros(len(self.terms))
+        free[self.free("grip")] = grip
+        free[self.free("lags")] = np.log(self.lags)
+        free[self.free("pushes")] = NEVER
+        free[self.free("places")] = positions.ravel()
         return free
 
-    def moved_to(self, other: Structure, free: Array, behind: Array | None = None) -> Array:
-        """Return the free parameters in another structure, with ``behind`` where it has others."""
-        found = other.begin(0.0) if behind is None else behind[: len(other.terms)].copy()
-        named: dict[tuple[object, ...], list[float]] = {}
-        for key, number in zip(self.keys, free.tolist(), strict=True):
-            named.setdefault(key, []).append(number)
-        for place, key in enumerate(other.keys):
-            if named.get(key):
-                found[place] = named[key].pop(0)
-        return found
+    def transferred(self, other: Structure, free: Array, default: Array | None = None) -> Array:
+        """Return free parameters as those of another structure, ``default`` for its further ones."""
+        result = other.initial(0.0) if default is None else default[: len(other.terms)].copy()
+        by_key: dict[tuple[object, ...], list[float]] = {}
+        for key, value in zip(self.keys, free.tolist(), strict=True):
+            by_key.setdefault(key, []).append(value)
+        for index, key in enumerate(other.keys):
+            if by_key.get(key):
+                result[index] = by_key[key].pop(0)
+        return result
 
     @cached_property
     def keys(self) -> list[tuple[object, ...]]:
-        """Names by which structures share parameters: limits, lags and obstacles by their own."""
+        """Keys of the terms across structures: limits, lags and obstacles by their initial values."""
         by: dict[str, Sequence[object]] = {"friction": self.limits, "relaxation": self.lags}
         by |= {"lags": self.lags, "obstacle": self.obstacles, "places": self.m * self.obstacles}
         return [
@@ -355,78 +365,86 @@ class Structure:
         linear = np.full(self.n_linear, stiff)
         powers = 1.0 / self.powers(bench.largest)
         for j in range(self.m):
-            linear[self.on("springs", j)] = np.outer(powers, [force, *self.m * [stiff]]).ravel()
-            linear[self.on("loads", j)] = force / bench.heaviest
+            springs = np.outer(powers, [force, *self.m * [stiff]])
+            linear[self.of_coordinate("springs", j)] = springs.ravel()
+            linear[self.of_coordinate("loads", j)] = force / bench.heaviest
         for k in range(self.n):
-            linear[self.of("elasticity", k)] = force
-            linear[self.of("areas", k)] = bench.unit
-        return np.append(self.mix.T @ linear / self.mix.sum(axis=0), self.ends()[2])
+            linear[self.of_muscle("elasticity", k)] = force
+            linear[self.of_muscle("areas", k)] = bench.unit
+        return np.append(self.mix.T @ linear / self.mix.sum(axis=0), self.nonlinear_bounds()[2])
 
-    def ends(self) -> tuple[Array, Array, Array]:
-        """Return bounds of the nonlinear parameters, and their scales."""
+    def nonlinear_bounds(self) -> tuple[Array, Array, Array]:
+        """Return lower and upper bounds of the nonlinear parameters, and their scales."""
         bench = self.bench
-        much = bench.scale / bench.highest
+        per_bar = bench.scale / bench.highest
         per_x = bench.highest / bench.largest
-        ratio, (shortest, longest) = np.log(MOST_ASYMMETRIC), np.log(bench.lag_range)
-        ends: dict[str, tuple[ArrayLike, ArrayLike, ArrayLike]] = {
-            "grip": (0.0, MOST_GRIP * bench.highest, bench.highest),
-            "grips": (0.0, MOST_GRIP * per_x, per_x),
-            "asymmetry": (-ratio, ratio, 1.0),
+        (shortest, longest), log_ratio = np.log(bench.lag_range), np.log(5.0)
+        bounds: dict[str, tuple[ArrayLike, ArrayLike, ArrayLike]] = {
+            "grip": (0.0, 4.0 * bench.highest, bench.highest),
+            "grips": (0.0, 4.0 * per_x, per_x),
+            "asymmetry": (-log_ratio, log_ratio, 1.0),
             "lags": (shortest, longest, 1.0),
-            "walls": (0.0, MOST_WALL * much, 0.2 * MOST_WALL * much),
+            "walls": (0.0, 0.1 * per_bar, 0.2 * 0.1 * per_bar),
             "pushes": (0.0, 1.1 * NEVER, bench.highest * bench.unit),
             "places": (-np.inf, np.inf, 0.2 * bench.travel.repeat(len(self.obstacles))),
-            "filling": (0.0, LONGEST_AIR, max(4.0 * bench.step, 1e-9)),
-            "venting": (-ratio, ratio, 1.0),
+            "filling": (0.0, 2.0, max(4.0 * bench.step, 1e-9)),
+            "venting": (-log_ratio, log_ratio, 1.0),
             "dead": (0.0, 0.5 * bench.highest, 0.1 * bench.highest),
             "contact": (0.0, 0.5 * bench.highest, 0.1 * bench.highest),
         }
-        low, high, size = np.zeros((3, self.size - self.n_linear))
-        for name, place in self.shape.items():
-            own = slice(place.start - self.n_linear, place.stop - self.n_linear)
-            low[own], high[own], size[own] = map(np.asarray, ends[name])
-        return low, high, size
+        lower, upper, scales = np.zeros((3, self.size - self.n_linear))
+        for name, part in self.nonlinear.items():
+            here = slice(part.start - self.n_linear, part.stop - self.n_linear)
+            lower[here], upper[here], scales[here] = map(np.asarray, bounds[name])
+        return lower, upper, scales
 
     # -- block -----------------------------------------------------------------------------------
 
     def block(self, values: Array, *, final: bool = False) -> Balance:
-        """Return the balance of given values, without its front.
+        """Return the balance with these values, without the air and dead zone in front of it.
 
-        In the ``final`` one springs of muscles' own are among those of coordinates, unless they can go
-        slack with them, and what does nothing is left out.
+        The ``final`` one has no terms without effect, and the springs of muscles that cannot go slack
+        are added to those of their coordinates.
         """
         bench, m, n = self.bench, self.m, self.n
-        of = {name: np.array([values[self.of(name, k)] for k in range(n)]) for name in self._muscle}
-        of |= {name: np.maximum(of[name], 0.0) for name in NOT_NEGATIVE}
-        of["areas"][:, 0] = np.maximum(of["areas"][:, 0], LEAST_AREA * bench.unit)
-        springs = np.array([values[self.on("springs", j)] for j in range(m)])
-        bladders, pushes = of["bladder"][:, 0], self.shaped(values, "pushes")
+        muscles = {
+            name: np.array([values[self.of_muscle(name, k)] for k in range(n)])
+            for name in self._muscle
+        }
+        muscles |= {name: np.maximum(muscles[name], 0.0) for name in NOT_NEGATIVE}
+        muscles["areas"][:, 0] = np.maximum(muscles["areas"][:, 0], LEAST_AREA * bench.unit)
+        springs = np.array([values[self.of_coordinate("springs", j)] for j in range(m)])
+        bladders, pushes = muscles["bladder"][:, 0], self.nonlinear_values(values, "pushes")
         taut = bool((pushes >= NEVER).all())
         merged = final and taut and not bench.directed
         if merged:
             springs[np.arange(m), 1 + np.arange(m)] += bladders
-        grips, ratio = self.shaped(values, "grips"), float(self.shaped(values, "asymmetry")[0])
+        grips = self.nonlinear_values(values, "grips")
+        ratio = float(self.nonlinear_values(values, "asymmetry")[0])
         sides = [[side] for side, _ in self.obstacles]
-        met = [np.hstack([sides, self.met(values, j)]).ravel() for j in range(m if sides else 0)]
-        heavy = not final or of["mass"].any()
+        obstacles = [
+            np.hstack([sides, self.obstacle_values(values, j)]).ravel()
+            for j in range(m if sides else 0)
+        ]
+        heavy = not final or muscles["mass"].any()
         return Balance(
             springs=rows(springs),
-            elasticity=rows(of["elasticity"]),
-            areas=rows(of["areas"]),
-            friction=rows(of["friction"]),
-            relaxation=rows(of["relaxation"]),
-            loads=rows(np.array([values[self.on("loads", j)] for j in range(m)])),
-            damping=vector(of["damping"][:, 0]),
-            lines=vector(of["line"][:, 0]) if not final or of["line"].any() else (),
-            walls=vector(np.full(n, self.shaped(values, "walls")[0])),
+            elasticity=rows(muscles["elasticity"]),
+            areas=rows(muscles["areas"]),
+            friction=rows(muscles["friction"]),
+            relaxation=rows(muscles["relaxation"]),
+            loads=rows(np.array([values[self.of_coordinate("loads", j)] for j in range(m)])),
+            damping=vector(muscles["damping"][:, 0]),
+            lines=vector(muscles["line"][:, 0]) if not final or muscles["line"].any() else (),
+            walls=vector(np.full(n, self.nonlinear_values(values, "walls")[0])),
             bladders=() if merged else vector(bladders),
             pushes=() if taut else vector(pushes),
             limits=self.limits,
-            grip=float(self.shaped(values, "grip")[0]),
+            grip=float(self.nonlinear_values(values, "grip")[0]),
             grips=vector(grips) if not final or grips.any() else (),
             asymmetry=None if final and ratio == 1.0 else ratio,
-            obstacles=rows(np.array(met)),
-            lags=vector(self.shaped(values, "lags")),
+            obstacles=rows(np.array(obstacles)),
+            lags=vector(self.nonlinear_values(values, "lags")),
             hull=rows(bench.hull),
             scale=bench.scale,
             degree=self.degree,
@@ -435,37 +453,38 @@ class Structure:
             given=bench.given,
             tare=bench.tare,
             settled=self.settled,
-            mass=vector(of["mass"][:, 0]) if heavy and bench.step and taut else (),
+            mass=vector(muscles["mass"][:, 0]) if heavy and bench.step and taut else (),
             directions=rows(bench.directions) if bench.directed else (),
             preload=bench.preload if bench.directed else 0.0,
         )
 
-    def met(self, values: Array, j: int) -> Array:
-        """Return position and stiffnesses of obstacles, shape (obstacles, 2 + schedules)."""
-        table = values[self.on("met", j)].reshape(-1, 3 + len(self.bench.scheduled))
-        places = self.shaped(values, "places").reshape(self.m, len(table))[j]
-        return np.column_stack([places, np.maximum(table[:, 2:], 0.0)])
+    def obstacle_values(self, values: Array, j: int) -> Array:
+        """Return the position and stiffnesses of each obstacle of a coordinate, shape (k, 2 + s)."""
+        table = values[self.of_coordinate("obstacles", j)].reshape(-1, 3 + self.n_x)
+        positions = self.nonlinear_values(values, "places").reshape(self.m, len(table))[j]
+        return np.column_stack([positions, np.maximum(table[:, 2:], 0.0)])
 
     def coefficients(self, values: Array, sample_time: float) -> Array:
-        """Return the coefficients of the block, including zero terms."""
+        """Return the coefficients of the block, those of inactive terms included."""
         c = self.block(values).coefficients(sample_time)
         linear = c[c.size - self.n_linear :]
         least = 1e-12 * self.bench.unit * self.bench.highest / self.bench.scale
         for k in range(self.n):
-            linear[self.of("line", k)] = np.maximum(values[self.of("line", k)], least)
+            line = self.of_muscle("line", k)
+            linear[line] = np.maximum(values[line], least)
         return c
 
-    def needed(self, active: Collection[Term]) -> Structure:
+    def reduced(self, active: Collection[Term]) -> Structure:
         """Return the structure without inactive stops, lags, obstacles and powers."""
-        kept = {(term.kind, term.which) for term in active}
+        used = {(term.kind, term.which) for term in active}
 
         def chosen(kind: str, items: tuple[Item, ...]) -> tuple[Item, ...]:
-            return tuple(item for i, item in enumerate(items) if (kind, i) in kept)
+            return tuple(item for i, item in enumerate(items) if (kind, i) in used)
 
         def highest(kind: str, least: int) -> int:
-            return 1 + max((which for name, which in kept if name == kind), default=least - 1)
+            return 1 + max((which for name, which in used if name == kind), default=least - 1)
 
-        squares = any(kind == "springs" and q > 0 and q % 2 == 0 for kind, q in kept)
+        squares = any(kind == "springs" and q > 0 and q % 2 == 0 for kind, q in used)
         return replace(
             self,
             n_elastic=highest("elasticity", 0),
@@ -483,51 +502,55 @@ class Structure:
         """Smallest admissible stiffness."""
         return LEAST_STIFF * self.bench.unit * self.bench.highest / self.bench.scale
 
-    def conditions(self, values: Array) -> tuple[Array, Array]:
-        """Return the physical constraints of linear coefficients: sides @ coefficients >= least.
+    def constraints(self, values: Array) -> tuple[Array, Array]:
+        """Return physical constraints of linear coefficients, ``matrix @ coefficients >= lower``.
 
-        Shapes (c, linear) and (c,). What friction takes of an area is taken with the shape as it is.
+        Shapes (c, linear) and (c,). They depend on the nonlinear parameters, which are fixed at their
+        present values: friction reduces the effective area.
         """
-        sides: list[Array] = []
-        least: list[float] = []
+        matrix: list[Array] = []
+        lower: list[float] = []
 
-        def ask(entries: dict[int, float], bound: float) -> None:
-            sides.append(np.zeros(self.n_linear))
-            sides[-1][list(entries)] = list(entries.values())
-            least.append(bound)
+        def add(entries: dict[int, float], bound: float) -> None:
+            matrix.append(np.zeros(self.n_linear))
+            matrix[-1][list(entries)] = list(entries.values())
+            lower.append(bound)
 
-        for place in np.flatnonzero(self.not_negative).tolist():
-            ask({place: 1.0}, 0.0)
-        ratio, wall = (float(self.shaped(values, name)[0]) for name in ("asymmetry", "walls"))
-        taken = -(np.array(self.limits) * max(1.0, ratio) + wall)
+        for index in np.flatnonzero(self.not_negative).tolist():
+            add({index: 1.0}, 0.0)
+        ratio = float(self.nonlinear_values(values, "asymmetry")[0])
+        wall = float(self.nonlinear_values(values, "walls")[0])
+        reduction = -(np.array(self.limits) * max(1.0, ratio) + wall)
         for k in range(self.n):
-            areas, friction = self.of("areas", k).tolist(), self.of("friction", k).tolist()
-            elastic, bladder = self.of("elasticity", k).tolist(), int(self.of("bladder", k)[0])
-            ask({areas[0]: 1.0}, 0.1 * self.bench.unit)
+            areas, friction, elastic = (
+                self.of_muscle(kind, k).tolist() for kind in ("areas", "friction", "elasticity")
+            )
+            bladder = int(self.of_muscle("bladder", k)[0])
+            add({areas[0]: 1.0}, 0.1 * self.bench.unit)
             order, power = np.arange(1, self.n_area), np.arange(2, 2 + self.n_elastic)
             low, high = self.bench.hull[k].tolist()
             for u in np.linspace(low, high, GRID) / self.bench.scale:
-                left = dict(zip(areas, (u ** np.arange(self.n_area)).tolist(), strict=True))
-                left[areas[0]] -= LEAST_LEFT
-                ask(left | dict(zip(friction, taken.tolist(), strict=True)), 0.0)
+                effective = dict(zip(areas, (u ** np.arange(self.n_area)).tolist(), strict=True))
+                effective[areas[0]] -= LEAST_LEFT
+                add(effective | dict(zip(friction, reduction.tolist(), strict=True)), 0.0)
                 stiff = power * u ** (power - 1) / self.bench.scale
-                narrows = order * u ** (order - 1) / self.bench.scale
+                narrowing = order * u ** (order - 1) / self.bench.scale
                 for p in (0.0, self.bench.highest):
-                    row = dict(zip(elastic, stiff.tolist(), strict=True)) | {bladder: 1.0}
-                    row |= dict(zip(areas[1:], (-p * narrows).tolist(), strict=True))
-                    ask(row, self.least_stiffness)
+                    entries = dict(zip(elastic, stiff.tolist(), strict=True)) | {bladder: 1.0}
+                    entries |= dict(zip(areas[1:], (-p * narrowing).tolist(), strict=True))
+                    add(entries, self.least_stiffness)
         for x, direction in product(self.bench.corners(), np.eye(self.m)):
-            sides.append(self.spring_side(x, direction))
-            least.append(self.least_stiffness)
-        return np.array(sides), np.array(least)
+            matrix.append(self.stiffness_row(x, direction))
+            lower.append(self.least_stiffness)
+        return np.array(matrix), np.array(lower)
 
     def powers(self, x: Array) -> Array:
         """Return the powers of scheduling inputs, shape (1 + powers, ...), that multiply springs."""
         powers = [v**d for v in x for d in range(1, self.degree + 1)]
         return np.array([np.ones(x.shape[1:]), *powers])
 
-    def spring_side(self, x: Array, direction: Array) -> Array:
-        """Return the constraint that springs are stiff along a direction."""
+    def stiffness_row(self, x: Array, direction: Array) -> Array:
+        """Return the constraint row of the stiffness of springs along a direction."""
         row = np.zeros(self.n_linear)
         for q, power in enumerate(self.powers(x)):
             for j, i in product(range(self.m), repeat=2):
@@ -535,28 +558,19 @@ class Structure:
         return row
 
     def softest(self, values: Array) -> tuple[Array, float]:
-        """Return where springs are softest: the constraint there, and the stiffness."""
-        found: list[tuple[float, Array, Array]] = []
-        springs = np.array([values[self.on("springs", j)] for j in range(self.m)])
+        """Return the constraint row where springs are softest, and the stiffness there."""
+        softest: list[tuple[float, Array, Array]] = []
+        springs = np.array([values[self.of_coordinate("springs", j)] for j in range(self.m)])
         springs = springs.reshape(self.m, -1, 1 + self.m)[:, :, 1:]
         for x in self.bench.corners():
             matrix = np.tensordot(self.powers(x), springs, (0, 1))
-            sizes, directions = np.linalg.eigh(0.5 * (matrix + matrix.T))
-            found.append((float(sizes[0]), x, directions[:, 0]))
-        stiffness, x, direction = min(found, key=lambda one: one[0])
-        return self.spring_side(x, direction), stiffness
-
-
-LOGARITHMIC = ("lags", "asymmetry", "venting")
-"""Nonlinear parameters searched by their logarithm."""
-
-OF_MUSCLES = ("damping", "line", "mass", "bladder", "elasticity", "areas", "friction", "relaxation")
-"""Kinds of linear parameters of muscles."""
-
-NOT_NEGATIVE = ("damping", "line", "mass", "bladder", "friction", "relaxation")
-"""Those that are non-negative."""
+            stiffnesses, directions = np.linalg.eigh(0.5 * (matrix + matrix.T))
+            softest.append((float(stiffnesses[0]), x, directions[:, 0]))
+        stiffness, x, direction = min(softest, key=lambda candidate: candidate[0])
+        return self.stiffness_row(x, direction), stiffness
 
 
 def _slices(widths: dict[str, int], first: int = 0) -> dict[str, slice]:
+    """Return consecutive slices of these widths."""
     ends = np.cumsum([first, *widths.values()]).tolist()
     return {name: slice(a, b) for name, a, b in zip(widths, ends[:-1], ends[1:], strict=True)}

@@ -22,14 +22,11 @@ from mckibben.estimators.optimisers.multi_start import multi_start
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
-MOVED = ("contraction", "displacement", "force", "length")
-"""Channels of muscles, which are not commands."""
+NO_COMMANDS = ("contraction", "displacement", "force", "length")
+"""Channels that cannot be commands of a valve."""
 
-WIDEST = 0.2
+MOST_HYSTERESIS = 0.2
 """Largest hysteresis, relative to the range of the command."""
-
-GUESSES = 8
-"""Lags for the initial search of the dead time."""
 
 LIMIT_GAIN = 0.02
 """Smallest relative reduction of the error for a pressure limit to be added."""
@@ -37,26 +34,24 @@ LIMIT_GAIN = 0.02
 NO_WORSE = 1e-6
 """Relative increase of the error up to which hysteresis is left out."""
 
-POLISHED = 40
-"""Maximum number of evaluations of the joint refinement."""
-
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class AirEstimator(SeparableEstimator):
     """Valve or regulator with air: gain and offset solved for, lags and dead time searched.
 
-    Dead times are tried sample by sample from where the correlation of command and pressure is best, as
-    long as the error falls; with each, gain and offset are solved for while lags and hysteresis are
-    searched, and then all are refined together within the limits of the pressure. Recordings should
-    begin at rest.
+    The dead time is searched sample by sample from the one with the highest correlation of command and
+    pressure, as long as the error falls. For each dead time, gain and offset are solved for while lags
+    and hysteresis are searched; then all are refined together with the pressure limits. Recordings
+    should begin at rest.
 
     Parameters
     ----------
     longest_dead_time : float
-        Dead times up to this are looked for [s].
+        Longest dead time [s].
     ambient, supply : float, optional
-        Lowest and highest pressure that the valve can aim for. Default: found where it shows, else
-        0 below, if nothing recorded is, and no limit above.
+        Lowest and highest pressure that the valve can aim for [bar]. Default: identified if limiting
+        reduces the error; otherwise ambient is 0, unless lower pressures were commanded, and supply is
+        unlimited.
     """
 
     title = "Valve and air"
@@ -94,11 +89,13 @@ class AirEstimator(SeparableEstimator):
         outputs: Sequence[str],
         scheduling: Sequence[str] | None = None,
     ) -> str | None:
-        found = super().objection(recordings, inputs, outputs, scheduling)
-        if found is not None:
-            return found
-        given, wanted = inputs[0].partition("_")[0], outputs[0].partition("_")[0]
-        return "it maps a command to a pressure" if given in MOVED or wanted != "pressure" else None
+        objection = super().objection(recordings, inputs, outputs, scheduling)
+        if objection is not None:
+            return objection
+        command, pressure = inputs[0].partition("_")[0], outputs[0].partition("_")[0]
+        if command in NO_COMMANDS or pressure != "pressure":
+            return "it maps a command to a pressure"
+        return None
 
     @property
     def n_further(self) -> int:
@@ -106,51 +103,54 @@ class AirEstimator(SeparableEstimator):
         return 1
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        step = data.timed()
+        sample_time = data.timed()
         shortest = min(run.u.size for run in data.runs)
-        most = min(int(self.longest_dead_time / step + 1e-9), LONGEST_DELAY, shortest // 4)
-        tried: dict[int, tuple[float, Air]] = {}
-        best = self._correlated(data, most)
-        asked = [best]
-        while asked:
-            for late in asked:
-                own = tracker.part(1 - 0.7 ** len(tried), 1 - 0.7 ** (len(tried) + 1))
-                tried[late] = self._at(late, data, own)
-                tracker.saw_all(own)
-            best = min(tried, key=lambda late: tried[late][0])
-            near = (best - 1, best + 1, best - 2, best + 2)
-            asked = [late for late in near if 0 <= late <= most and late not in tried][:2]
-        tracker.best_cost, block = tried[best]
+        longest = int(self.longest_dead_time / sample_time + 1e-9)
+        longest = min(longest, LONGEST_DELAY, shortest // 4)
+        fits: dict[int, tuple[float, Air]] = {}  # dead time in samples -> error and block
+        best = self._most_correlated(data, longest)
+        candidates = [best]
+        while candidates:
+            for delay in candidates:
+                # the number of fits is unknown: each is 30 % of the work that is left
+                part = tracker.part(1 - 0.7 ** len(fits), 1 - 0.7 ** (len(fits) + 1))
+                fits[delay] = self._fit_delay(delay, data, part)
+                tracker.saw_all(part)
+            best = min(fits, key=lambda delay: fits[delay][0])
+            nearest = (best - 1, best + 1, best - 2, best + 2)
+            candidates = [d for d in nearest if 0 <= d <= longest and d not in fits][:2]
+        tracker.best_cost, block = fits[best]
         tracker.best = block.pack()
-        others = [
-            f"{100 * (tried[late][0] / max(tried[best][0], 1e-300) - 1):.1f} % at {late * step:g} s"
-            for late in (best - 1, best + 1)
-            if late in tried
+        lowest = max(tracker.best_cost, 1e-300)
+        neighbours = [
+            f"{100 * (fits[delay][0] / lowest - 1):.1f} % at {delay * sample_time:g} s"
+            for delay in (best - 1, best + 1)
+            if delay in fits
         ]
-        if others:
+        if neighbours:
             tracker.notes.append(
                 f"dead time {block.dead_time:g} s, in whole samples; the error is higher by "
-                f"{' and '.join(others)}"
+                f"{' and '.join(neighbours)}"
             )
         return block
 
-    def _correlated(self, data: TrainingData, most: int) -> int:
-        """Return the dead time with the best correlation of pressure and lagged command."""
+    def _most_correlated(self, data: TrainingData, longest: int) -> int:
+        """Return the dead time with the highest correlation of pressure and lagged command."""
         thin = data.thinned(SEARCH_SAMPLES)
-        wanted = thin.target - thin.target.mean()
+        pressure = thin.target - thin.target.mean()
         lower, upper = self.bounds(data)
-        likeness: dict[int, float] = {}
-        for late in range(most + 1):
-            moved = delayed(thin, late)
-            for share in np.linspace(0.0, 0.8, GUESSES):
+        correlations = np.zeros(longest + 1)
+        for delay in range(longest + 1):
+            late = delayed(thin, delay)
+            for share in np.linspace(0.0, 0.8, 8):
                 theta = np.array([*(lower + share * (upper - lower))[:2], 0.0])
-                given = self.matrix(theta, moved)[:, 0]
-                given = given - given.mean()
-                size = float(np.linalg.norm(given))
-                found = float(given @ wanted) / size if size > 0 else 0.0
-                likeness[late] = max(found, likeness.get(late, 0.0))
-        best = max(likeness, key=lambda late: likeness[late])
-        if not likeness[best] > 0:
+                command = self.matrix(theta, late)[:, 0]
+                command = command - command.mean()
+                size = float(np.linalg.norm(command))
+                if size > 0:
+                    correlations[delay] = max(command @ pressure / size, correlations[delay])
+        best = int(correlations.argmax())
+        if not correlations[best] > 0:
             raise DataError(
                 "the pressure does not rise with the command",
                 channel=data.input,
@@ -158,63 +158,66 @@ class AirEstimator(SeparableEstimator):
             )
         return best
 
-    def _at(self, late: int, data: TrainingData, tracker: Tracker) -> tuple[float, Air]:
-        """Return the error and the block for a dead time in samples."""
-        moved = delayed(data, late)
-        found = super().identify(moved, tracker)
+    def _fit_delay(self, delay: int, data: TrainingData, tracker: Tracker) -> tuple[float, Air]:
+        """Return the RMSE and the block for a dead time in samples."""
+        late = delayed(data, delay)
+        unlimited = super().identify(late, tracker)
         limits: tuple[str, ...] = ()
-        block, cost = self._refined(cast(Air, found), moved, tracker, limits)
-        shares = {"ambient": 0.005, "supply": 0.995}
-        for limit in ("ambient", "supply", "ambient"):  # which one alone may not have shown
+        block, error = self._refined(cast(Air, unlimited), late, tracker, limits)
+        quantiles = {"ambient": 0.005, "supply": 0.995}
+        for limit in ("ambient", "supply", "ambient"):  # the first may help only with the second
             if getattr(self, limit) is None and limit not in limits:
-                tight: dict[str, Any] = {limit: float(np.quantile(data.target, shares[limit]))}
-                limited = replace(block, **tight)
-                limited, least = self._refined(limited, moved, tracker, (*limits, limit))
-                if least < (1 - LIMIT_GAIN) * cost:
-                    block, cost, limits = limited, least, (*limits, limit)
+                start: dict[str, Any] = {limit: float(np.quantile(data.target, quantiles[limit]))}
+                limited, limited_error = self._refined(
+                    replace(block, **start), late, tracker, (*limits, limit)
+                )
+                if limited_error < (1 - LIMIT_GAIN) * error:
+                    block, error, limits = limited, limited_error, (*limits, limit)
         if block.ambient is None and self.ambient is None:
-            low = block.goal(data.input_range[0], -1)
-            block = replace(block, ambient=0.0 if low >= 0 else None)
-        return cost, replace(block, dead_time=late * (data.sample_time or 1.0))
+            lowest = block.goal(data.input_range[0], -1)
+            block = replace(block, ambient=0.0 if lowest >= 0 else None)
+        return error, replace(block, dead_time=delay * (data.sample_time or 1.0))
 
     def _refined(
         self, block: Air, data: TrainingData, tracker: Tracker, limits: Sequence[str]
     ) -> tuple[Air, float]:
-        """Return the block with all parameters, and some limits, refined together; and its error."""
-        span, wide = np.ptp(data.input_range), np.ptp(data.output_range)
-        (quick, _, _), (slow, _, most) = self.bounds(data)
-        times = np.log([block.filling_time, block.venting_time])
-        limit = [getattr(block, name) for name in limits]
-        start = np.array([block.gain, block.offset, block.hysteresis, *times, *limit])
-        reach = np.array(
-            [0.5 * block.gain, 0.5 * span, 0.0, 0.0, 0.0, *[0.25 * wide] * len(limits)]
-        )
-        lower, upper = start - reach, start + reach
-        lower[2:5], upper[2:5] = (0.0, quick, quick), (most, slow, slow)
+        """Return the block with all parameters and these limits refined together, and its RMSE.
 
-        def made(point: Array) -> Air:
+        Points are [gain, offset, hysteresis, log filling time, log venting time, limits].
+        """
+        (shortest, _, _), (longest, _, widest) = self.bounds(data)
+        times = np.log([block.filling_time, block.venting_time])
+        pressures = [getattr(block, name) for name in limits]
+        start = np.array([block.gain, block.offset, block.hysteresis, *times, *pressures])
+        half = np.full(start.size, 0.25 * np.ptp(data.output_range))
+        half[:2] = 0.5 * block.gain, 0.5 * np.ptp(data.input_range)
+        lower, upper = start - half, start + half
+        lower[2:5], upper[2:5] = (0.0, shortest, shortest), (widest, longest, longest)
+
+        def block_at(point: Array) -> Air:
             changed: dict[str, Any] = dict(zip(limits, point[5:].tolist(), strict=True))
             return replace(block.unpack([*point[:3], *np.exp(point[3:5])]), **changed)
 
         def residuals(point: Array) -> Array:
-            return simulate_all([made(point)], data)[0] - data.target
+            return simulate_all([block_at(point)], data)[0] - data.target
 
-        own = tracker.part(0.9, 1.0)
-        best = multi_start(
-            residuals, [start], lower, upper, own, n_refined=1, max_evaluations=POLISHED
-        )
-        tracker.saw_all(own)
+        part = tracker.part(0.9, 1.0)
+        best = multi_start(residuals, [start], lower, upper, part, n_refined=1, max_evaluations=40)
+        tracker.saw_all(part)
         without = best.copy()
         without[2] = 0.0
-        cost, least = (float(np.sqrt(np.mean(residuals(p) ** 2))) for p in (best, without))
-        return (made(without), least) if least <= (1 + NO_WORSE) * cost else (made(best), cost)
+        error, error_without = (np.sqrt(np.mean(residuals(p) ** 2)) for p in (best, without))
+        if error_without <= (1 + NO_WORSE) * error:
+            return block_at(without), float(error_without)
+        return block_at(best), float(error)
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [log filling time, log venting time, hysteresis]."""
-        step = data.sample_time or 1.0
-        quick, slow = np.log(0.1 * step), np.log(max(run.u.size for run in data.runs) * step)
-        widest = WIDEST * float(np.ptp(data.input_range))
-        return np.array([quick, quick, 0.0]), np.array([slow, slow, widest])
+        sample_time = data.sample_time or 1.0
+        shortest = np.log(0.1 * sample_time)
+        longest = np.log(max(run.u.size for run in data.runs) * sample_time)
+        widest = MOST_HYSTERESIS * float(np.ptp(data.input_range))
+        return np.array([shortest, shortest, 0.0]), np.array([longest, longest, widest])
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return initial lags, with and without hysteresis."""
@@ -241,10 +244,10 @@ class AirEstimator(SeparableEstimator):
         return replace(block, gain=float(linear[0]), offset=-offset / float(linear[0]))
 
 
-def delayed(data: TrainingData, late: int) -> TrainingData:
-    """Return the same data with delayed inputs, the first value extended."""
+def delayed(data: TrainingData, delay: int) -> TrainingData:
+    """Return the same data with inputs delayed by some samples, the first value extended."""
     runs = []
     for run in data.runs:
-        places = np.maximum(np.arange(len(run.driven)) - late, 0)
-        runs.append(replace(run, driven=run.driven[places]))
+        samples = np.maximum(np.arange(len(run.driven)) - delay, 0)
+        runs.append(replace(run, driven=run.driven[samples]))
     return replace(data, runs=tuple(runs))

@@ -31,12 +31,15 @@ from mckibben.recording import Recording, listed
 
 Structure = Literal["eleven", "each-way", "eighteen"]
 STRUCTURES = {"eleven": ELEVEN, "each-way": EACH_WAY, "eighteen": EIGHTEEN}
+
 LEAST_SHARE = 1e-5
 """Smallest force of an element, relative to the range of the output."""
 
 LENGTHS = np.geomspace(0.02, 1.0, 8)
+"""Break-away lengths tried for each element, relative to the range of the length."""
+
 TIMES = (0.1, 10.0)
-"""Initial break-away lengths of elements, relative to the range, and times [samples]."""
+"""Relaxation times tried for each element [samples]."""
 
 
 def extract_hysteresis(
@@ -55,30 +58,30 @@ def extract_hysteresis(
     recordings : Recording or sequence of Recording
         Isobaric runs with length, pressure and force.
     law : Block
-        Of one output, as a static force law identified from isometric runs.
+        Static force law with one output, such as one identified from isometric runs.
     output : str
-        Name of the new channel, in the unit of the output.
+        Name of the new channel, which has the unit of the law's output.
 
     Raises
     ------
     DataError
-        Where a channel that the law needs is absent.
+        If a channel that the law needs is absent.
     """
     (force,) = law.outputs
-    found = []
+    extracted = []
     for recording in listed(recordings):
-        left = recording[force.name] - law.simulate(recording)[force.name]
-        found.append(recording.with_channels({output: force.unit}, **{output: left}))
-    return found
+        residual = recording[force.name] - law.simulate(recording)[force.name]
+        extracted.append(recording.with_channels({output: force.unit}, **{output: residual}))
+    return extracted
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class MultistateEstimator(SeparableEstimator):
     """Multistate friction by bounded least squares from many starts, with exchange of elements.
 
-    Break-away lengths and relaxation times are searched; stiffnesses, and a static law, are solved
-    for. With ``static=None`` the output is taken to be the hysteresis alone, as the paper does
-    after `extract_hysteresis`.
+    Break-away lengths and relaxation times are searched; stiffnesses and the static law are linear and
+    are solved for. With ``static=None`` the output is the hysteresis alone, as in the paper; see
+    `extract_hysteresis`.
 
     Parameters
     ----------
@@ -87,9 +90,9 @@ class MultistateEstimator(SeparableEstimator):
     static : {"bilinear", "petrovic", "minh", "schindele"}, optional
         Law identified with the friction, or None.
     elements : {"eleven", "each-way", "eighteen"} or sequence of directions
-        The paper's two structures; ours, of eleven parameters too, with one element shared, one for
-        lengthening and one for shortening; or one direction an element ("shared", "both",
-        "lengthening", "shortening").
+        The paper's two structures, "eleven" and "eighteen"; "each-way", also of eleven parameters,
+        with one shared element, one for lengthening and one for shortening; or the direction of every
+        element: "shared", "both", "lengthening" or "shortening".
     """
 
     purpose = "force"
@@ -125,88 +128,92 @@ class MultistateEstimator(SeparableEstimator):
         data.timed("friction depends on rate")
         return super().identify(data, tracker)
 
-    # An element's deflection follows from how far it goes before it slips, F_c / k, and from the time
-    # sigma / k in which it relaxes; its force is k times that. So theta is the logarithms of these
-    # lengths and times, element by element, lengthening first; the stiffnesses are
-    # linear.
-
-    def _pairs(self) -> list[int]:
-        """Return the number of length and time pairs of each element."""
-        return [2 if element in ("shared", "both") else 1 for element in self.directions]
+    @property
+    def _n_pairs(self) -> list[int]:
+        """Number of break-away length and relaxation time pairs of each element."""
+        return [2 if direction in ("shared", "both") else 1 for direction in self.directions]
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of the logarithms."""
+        """Return bounds of the nonlinear parameters, theta.
+
+        The break-away length F_c / k and the relaxation time sigma / k determine the deflection of an
+        element; its force is k times that. So theta is the logarithms of these lengths and times,
+        element by element, lengthening first.
+        """
         low, high = data.input_range
         lengths = np.log((high - low) * np.array([0.005, 2.0]))
         times = np.log((data.sample_time or 1.0) * np.array([1e-2, 20.0]))
-        pairs = np.tile([lengths, times], (sum(self._pairs()), 1))
+        pairs = np.tile([lengths, times], (sum(self._n_pairs), 1))
         return pairs[:, 0], pairs[:, 1]
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return initial elements that slip early and late, without delay."""
+        """Return initial elements that slip early and late, with short relaxation times."""
         low, high = data.input_range
         time = np.log(0.1 * (data.sample_time or 1.0))
         guesses = []
         for first in (0.5, 0.25, 0.1):
             for ratio in (0.7, 0.4, 0.2):
                 theta: list[float] = []
-                for place, pairs in enumerate(self._pairs()):
-                    length = np.log((high - low) * first * ratio**place)
-                    theta += [length, time] * pairs
+                for index, n_pairs in enumerate(self._n_pairs):
+                    length = np.log((high - low) * first * ratio**index)
+                    theta += [length, time] * n_pairs
                 guesses.append(np.array(theta))
         return guesses
 
     def choices(self, data: TrainingData) -> list[Choice]:
-        """Return candidate lengths and times for every element, others fixed.
+        """Return candidate lengths and times of one element at a time.
 
-        The cost has many local minima, in which one element does another's work: which of them the
-        best of many starts ends in is left to rounding.
+        The cost has many local minima, in which elements have changed roles, and rounding decides in
+        which of them a search ends.
         """
         low, high = data.input_range
         lengths = np.log((high - low) * LENGTHS)
         times = np.log((data.sample_time or 1.0) * np.array(TIMES))
-        found, first = [], 0
-        for pairs in self._pairs():
-            values = [
-                np.ravel([(length, time) for length in tried])
-                for time, tried in product(times, product(lengths, repeat=pairs))
+        choices, first = [], 0
+        for n_pairs in self._n_pairs:
+            candidates = [
+                np.ravel([(length, time) for length in element])
+                for time, element in product(times, product(lengths, repeat=n_pairs))
             ]
-            found.append(Choice(np.arange(first, first + 2 * pairs), np.array(values)))
-            first += 2 * pairs
-        return found
+            choices.append(Choice(np.arange(first, first + 2 * n_pairs), np.array(candidates)))
+            first += 2 * n_pairs
+        return choices
 
-    def _unit(self, place: int, theta: Array) -> MultistateFriction:
+    def _unit_element(self, index: int, theta: Array) -> MultistateFriction:
         """Return one element with stiffnesses of 1."""
-        pairs = self._pairs()
-        first, element = 2 * sum(pairs[:place]), self.directions[place]
-        ways = np.exp(theta[first : first + 2 * pairs[place]]).reshape(-1, 2).tolist()
-        (length, time), (other, later) = ways[0], ways[-1]
-        six = (1.0, time, length, 1.0, later, other)
-        values = tuple(six[value] for value in PLACES[element])
-        return MultistateFriction((element,), values, initial=self.starting_rule)
+        n_pairs, direction = self._n_pairs, self.directions[index]
+        first = 2 * sum(n_pairs[:index])
+        pairs = np.exp(theta[first : first + 2 * n_pairs[index]]).reshape(-1, 2).tolist()
+        # k, sigma and F_c lengthening, then shortening: with k = 1, sigma is the time, F_c the length
+        six = [value for length, time in (pairs[0], pairs[-1]) for value in (1.0, time, length)]
+        values = tuple(six[position] for position in PLACES[direction])
+        return MultistateFriction((direction,), values, initial=self.starting_rule)
 
     def _forces(self, theta: Array, run: Run) -> Array:
-        """Return the force of every element per unit of its stiffnesses, over the run."""
-        length = run.u
-        rising = np.diff(length, prepend=length[0]) >= 0
+        """Return the forces per unit of stiffness over the run, shape (n, n_stiffnesses)."""
+        lengthening = np.diff(run.u, prepend=run.u[0]) >= 0
         columns = []
-        for place, element in enumerate(self.directions):
-            force = self._unit(place, theta).simulate(run.inputs, sample_time=run.sample_time)[:, 0]
-            columns += [force * rising, force * ~rising] if element == "both" else [force]
+        for index, direction in enumerate(self.directions):
+            element = self._unit_element(index, theta)
+            force = element.simulate(run.inputs, sample_time=run.sample_time)[:, 0]
+            both = direction == "both"
+            columns += [force * lengthening, force * ~lengthening] if both else [force]
         return np.column_stack(columns)
 
     @property
     def n_stiffnesses(self) -> int:
-        """Number of linear parameters of the friction."""
-        return sum(2 if element == "both" else 1 for element in self.directions)
+        """Number of linear parameters of the friction: two for elements in both directions."""
+        return len(self.directions) + self.directions.count("both")
 
     def friction(self, theta: Array, stiffnesses: Array, data: TrainingData) -> MultistateFriction:
-        """Return the friction."""
-        values, given = [], iter(stiffnesses.tolist())
-        for place, element in enumerate(self.directions):
-            ways = [next(given) for _ in range(2 if element == "both" else 1)] * 2
-            unit = zip(PLACES[element], self._unit(place, theta).values, strict=True)
-            values += [ways[slot // 3] * value for slot, value in unit]
+        """Return the friction model; each parameter of a unit element times its stiffness."""
+        values, remaining = [], iter(stiffnesses.tolist())
+        for index, direction in enumerate(self.directions):
+            lengthening = next(remaining)
+            shortening = next(remaining) if direction == "both" else lengthening
+            unit = self._unit_element(index, theta).values
+            for position, value in zip(PLACES[direction], unit, strict=True):
+                values.append(value * (lengthening if position < 3 else shortening))
         return MultistateFriction(
             self.directions,
             tuple(values),
@@ -218,16 +225,16 @@ class MultistateEstimator(SeparableEstimator):
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the forces of the elements, then the regressors of the static law."""
-        friction = self._forces(theta, run)
+        forces = self._forces(theta, run)
         if self.static is None:
-            return friction
+            return forces
         length, pressure = run.inputs.T
-        columns = force_columns(length, pressure, ORDERS[self.static], data.input_range)
-        return np.column_stack([friction, columns])
+        law = force_columns(length, pressure, ORDERS[self.static], data.input_range)
+        return np.column_stack([forces, law])
 
     @property
     def solves_nonnegative(self) -> bool:
-        """Whether linear parameters have lower bounds: those of the friction do."""
+        """Whether linear parameters have lower bounds: the stiffnesses do."""
         return True
 
     @property
@@ -236,7 +243,7 @@ class MultistateEstimator(SeparableEstimator):
         return self.static is not None
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
-        """Return the smallest stiffnesses, with which every element has some force."""
+        """Return the smallest stiffnesses, for which every element has some force."""
         largest = np.maximum(np.abs(matrix).max(axis=0), 1e-300)
         floor = np.asarray(LEAST_SHARE * np.ptp(data.target) / largest)
         floor[self.n_stiffnesses :] = -np.inf
@@ -271,7 +278,7 @@ MULTISTATE_11 = preset(
     "Multistate friction by bounded least squares from many starts, and exchange of elements.",
     title="Multistate friction with eleven parameters",
     can="The paper's friction model of eleven parameters.",
-    cannot="Structure of the paper's muscle; multistate selects one for yours.",
+    cannot="Its structure is that of the paper's muscle; try multistate for others.",
     elements="eleven",
 )
 
@@ -280,6 +287,6 @@ MULTISTATE_18 = preset(
     "Multistate friction with three elements in both directions: eighteen parameters.",
     title="Multistate friction with eighteen parameters",
     can="The paper's friction model of eighteen parameters.",
-    cannot="Structure of the paper's muscle; many parameters are hardly determined.",
+    cannot="Its structure is that of the paper's muscle; many parameters are poorly determined.",
     elements="eighteen",
 )

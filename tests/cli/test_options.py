@@ -11,6 +11,7 @@ import click
 import pytest
 
 import mckibben
+from mckibben.cli.parameters import chosen_models
 from tests.cli.calls import CALLS, commands, files
 from tests.cli.conftest import Cli
 from tests.golden.commands import answered
@@ -153,3 +154,9 @@ def test_the_package_runs_as_a_module() -> None:
     command = [sys.executable, "-m", "mckibben", "--version"]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stdout.strip()) == (0, mckibben.__version__)
+
+
+def test_models_that_are_named_are_not_replaced_by_the_quick_choice() -> None:
+    assert chosen_models(("pi", "gpi"), quick=True) == ("pi", "gpi")
+    assert chosen_models("all", quick=True) == "quick"
+    assert chosen_models("all", quick=False) == "all"

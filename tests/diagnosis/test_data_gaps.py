@@ -52,6 +52,12 @@ def test_tests_beyond_the_loads_recorded_are_named(lifted: Recorder) -> None:
     assert [(gap.what, gap.channels) for gap in gaps] == [("range", ("force",))]
 
 
+def test_levels_at_random_are_motion_not_noise() -> None:
+    levels = np.random.default_rng(0).uniform(0.3, 4.0, 200)
+    run = Recording({"pressure": levels, "displacement": 7.5 * levels}, 4.0)
+    assert "creep" in named([run])
+
+
 @pytest.mark.parametrize("name", ["pressure", "displacement"])
 def test_what_does_not_move_identifies_nothing(lifted: Recorder, name: str) -> None:
     runs = [one.with_channels(**{name: np.ones(len(one))}) for one in lifted.complete()]

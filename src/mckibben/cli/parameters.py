@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from inspect import Parameter, cleandoc, signature
 from pathlib import Path
@@ -84,6 +84,11 @@ ModelFile = Annotated[Path, Argument("MODEL", "Saved model (JSON).")]
 Quick = Annotated[bool, Option("Models that take seconds; same as --models quick.")]
 Force = Annotated[bool, Option("Replace files that mckibben did not write, except inputs.")]
 Json = Annotated[bool, Option("Print the result as JSON on standard output.", flag="--json")]
+
+
+def chosen_models(models: str | Sequence[str], quick: bool) -> str | Sequence[str]:
+    """Return the named models, or the quick choice where none are named."""
+    return "quick" if quick and models == "all" else models
 
 
 def repeated() -> str:

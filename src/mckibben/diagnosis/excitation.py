@@ -15,6 +15,7 @@ from mckibben.signals.holds import holds
 from mckibben.signals.reversals import (
     FEWEST,
     GROWS,
+    NOISE_SHARE,
     OF_NORMAL,
     branches_between,
     reversals,
@@ -92,7 +93,14 @@ class Excitation:
         """Standard deviation of the white noise of every channel, 0 if motion hides it."""
         every = self.recordings[:: -(-len(self.recordings) // NOISY_RECORDINGS)]
         found = {name: [_white(one[name]) for one in every] for name in self.ranges}
-        return {name: float(np.median(values)) for name, values in found.items()}
+        noise = {name: float(np.median(values)) for name, values in found.items()}
+        for name in self.inputs:
+            # levels at random, of which each was recorded once, scatter as noise does
+            unit, units = self.recordings[0].units[name], self.recordings[0].units
+            widest = max(self.span(other) for other in self.inputs if units[other] == unit)
+            if noise[name] > NOISE_SHARE * widest:
+                noise[name] = 0.0
+        return noise
 
     @cached_property
     def moving(self) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ HYSTERESIS = {
     "stop operator": "spring in series with Coulomb friction: elastic up to a limit, then slips",
     "threshold": "half the dead zone of an operator, in the unit of the input",
     "weight": "factor of an operator in a sum",
-    "envelope": "curve that a generalised operator follows while its input rises, or falls",
+    "envelope": "curve that a generalized operator follows while its input rises, or falls",
     "minor loop": "loop between turning points inside the largest ones",
     "wiping-out": "property of models whose memory is erased by a larger loop",
     "congruency": "property of models whose loops between the same inputs have the same shape",
@@ -51,7 +51,7 @@ MODELS = {
     "balance": "model of a muscle as an equilibrium of pressure force, load, elasticity, friction and "
     "relaxation",
     "SDCHM, SDIHC": "stiffness-dependent coupled hysteresis model, and its inverse compensator",
-    "GPI, MPI, RDPI, EUPI": "generalised, modified, rate-dependent, and extended unparallel "
+    "GPI, MPI, RDPI, EUPI": "generalized, modified, rate-dependent, and extended unparallel "
     "Prandtl–Ishlinskii model",
     "MPI–NARMAX": "modified Prandtl–Ishlinskii model in a recurrent fuzzy network with a force input",
     "FMU": "functional mock-up unit: a model in a standard format that simulators import",

@@ -352,7 +352,10 @@ def tiles(study: Study) -> tuple[Tile, ...]:
         width = f"{numeral(found.mid_width, 2)} {found.output_unit} at mid {found.input}"
         loop = Tile("Loop width", f"{numeral(found.loop_width, 2)} %", width, "recordings")
     elif found is not None:
-        loop = Tile("Loop width", "–", "no loop is shown", "recordings")
+        loop = Tile("Loop width", "–", "no loop detected", "recordings")
+        if found.has_loop and found.branch_gap is not None:
+            gap = words.size(found.output_unit, found.branch_gap)
+            loop = Tile("Loop width", gap, "mean gap between branches", "recordings")
     model = Tile(
         "Best model", "–", "fitting" if board.pending else "none recommended", "leaderboard"
     )
@@ -425,7 +428,7 @@ def check(found: Validation) -> list[Item]:
 
 def checked(one: OutputCheck) -> list[Item]:
     """Return what a residual depends on, with its means over each variable, and all tests."""
-    headings = ["Cause", "Share of the variance [%]", f"RMS [{one.unit}]"]
+    headings = ["Share of the variance [%]", f"RMS [{one.unit}]"]
     missing, tests = (
         [[words.missed(one, each), 100 * each.share, each.size] for each in some]
         for some in (one.missing, one.suspects)
@@ -434,9 +437,11 @@ def checked(one: OutputCheck) -> list[Item]:
     caption = f"Mean residual of {one.output}, with 95 % intervals that allow for autocorrelation."
     return [
         Text(words.check_notes(one)),
-        Table(headings, missing) if missing else None,
+        Table(["Cause, after those above", *headings], missing) if missing else None,
         Figure(f"patterns {one.output}", [panels], caption, caption, columns=2) if panels else None,
-        Table(headings, tests, summary="All causes tested") if tests else None,
+        Table(["Cause, by itself", *headings], tests, summary="All causes tested")
+        if tests
+        else None,
     ]
 
 

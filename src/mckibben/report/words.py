@@ -91,7 +91,7 @@ def not_recommended(
     on = "the test data" if on_test else "what was left out to validate"
     return (
         f"No model is recommended: on {on}, {row['model']} has an RMSE of {own}, and the mean of the "
-        f"training output by {mean}."
+        f"training output has {mean}."
     )
 
 

@@ -55,7 +55,7 @@ class _Choice:
         sets = {"Quick choice": offered.quick, "All": offered.models, "None": []}
         with ui.element("div").classes("stack scroll"):
             with ui.element("div"):
-                ui.label(f"{', '.join(sides.outputs)} of {', '.join(sides.inputs)}{told}")
+                ui.label(f"{', '.join(sides.outputs)} over {', '.join(sides.inputs)}{told}")
                 ui.label(f"{offered.split[:1].upper()}{offered.split[1:]}.").classes("muted")
             shared = ui.checkbox("Allow the same data in training and test").props("dense")
             shared.bind_value(state.chosen, "models.shared")

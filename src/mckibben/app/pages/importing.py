@@ -84,7 +84,7 @@ class Form:
         columns: list[Seen] = []
         self.error, self.recordings = None, []
         try:
-            self.reading = self.said()
+            self.reading = self.message_of()
             self.recordings, columns = understand(self.path, self.reading)
         except MckibbenError as error:
             self.error = error
@@ -99,7 +99,7 @@ class Form:
         ]
         return True
 
-    def said(self) -> Reading:
+    def message_of(self) -> Reading:
         """Return the reading that the controls say; `DataError` if they contradict each other."""
         general = {name: self.values[name] for name in ("rate", "rest_length", "gaps", "raw")}
         general |= {name: int(self.values[name] or 0) for name in ("header", "skip")}

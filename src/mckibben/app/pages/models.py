@@ -13,7 +13,7 @@ from nicegui import ui
 from mckibben.app import modelling, widgets
 from mckibben.app.later import later
 from mckibben.app.pages import choosing, parts
-from mckibben.app.state import State
+from mckibben.app.state import State, view
 from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
 from mckibben.arrays import Array
@@ -62,6 +62,7 @@ def build(state: State) -> None:
             )
             fit = widgets.primary("Fit models", partial(choosing.choose, state), "add")
             mark(fit, "fit-models")
+        preselect(state)
         fits(state)
         with ui.element("div").classes("columns"):
             with ui.element("div").classes("stack"):
@@ -73,13 +74,12 @@ def build(state: State) -> None:
         )
 
 
-def _compared(state: State) -> tuple[Channels, list[Json]]:
-    """Return what is modelled, and what came of its models; the first is chosen until one is picked."""
-    sides = state.sides
-    rows = modelling.comparable(state.workspace, sides)
+@view
+def preselect(state: State) -> None:
+    """Choose the first model until one is picked, before the parts that show it are built."""
+    rows = modelling.comparable(state.workspace, state.sides)
     if rows and not (state.chosen.get("models.picked") and state.model in state.workspace.models()):
         state.model = rows[0]["name"]
-    return sides, rows
 
 
 # -- fits that run, or did not work ----------------------------------------------------------------
@@ -138,7 +138,7 @@ def _empty(state: State) -> None:
 @parts.steady("models", "results")
 def board(state: State) -> None:
     """Show the models that compare, best first, and behind a fold-out those of other channels."""
-    _, rows = _compared(state)
+    rows = modelling.comparable(state.workspace, state.sides)
     compared = [row["name"] for row in rows]
     others = [name for name in state.workspace.models() if name not in compared]
     if not rows and not others:
@@ -206,8 +206,7 @@ def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:
 @parts.steady("models", "results", jobs=["check"], own=True)
 def closer(state: State) -> None:
     """Show the model that is chosen, in tabs."""
-    sides, _ = _compared(state)
-    workspace, name = state.workspace, state.model
+    sides, workspace, name = state.sides, state.workspace, state.model
     if name not in workspace.models():
         return
     row = workspace.read("results", name) or {}

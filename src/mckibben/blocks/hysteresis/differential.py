@@ -1,4 +1,4 @@
-"""Models with one hysteretic state z driven by the input: Bouc-Wen, generalised, and Duhem.
+"""Models with one hysteretic state z driven by the input: Bouc-Wen, generalized, and Duhem.
 
 All are rate-independent and integrated in closed form, and their inverses are solved for.
 
@@ -9,7 +9,7 @@ D^(1-n), gamma = (1 - sigma) rate D^(1-n) with z scaled by D, a number that data
 Sources: Bouc 1967; Wen, "Method of random vibration of hysteretic systems", 1976; the normalised form is
 that of Ikhouane and Rodellar, "Systems with Hysteresis", 2007.
 
-Generalised, for asymmetric loops: dz/du = rate (1 - |z|^n psi),
+Generalized, for asymmetric loops: dz/du = rate (1 - |z|^n psi),
 psi = sgn(z du) + b2 sgn(x du) + b3 sgn(x z) + b4 sgn(du) + b5 sgn(z) + b6 sgn(x). The first of the six
 shape numbers is 1, as the weight sets the size of z. Sources: Song and Der Kiureghian, "Generalized
 Bouc-Wen model for highly asymmetric hysteresis", 2006; of pneumatic muscles: Schindele and Aschemann
@@ -250,7 +250,7 @@ def _generalized_output(u: float, z: float, c: Array) -> float:
 
 @dataclass(frozen=True, config=fields.STRICT)
 class GeneralizedBoucWen(Invertible):
-    """Generalised Bouc-Wen model with a reversible polynomial.
+    """Generalized Bouc-Wen model with a reversible polynomial.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Envelopes of generalised play operators: strictly increasing functions.
+"""Envelopes of generalized play operators: strictly increasing functions.
 
 Each has two kernels, ``value`` and ``inverse``, and the frozen class that names their parameters.
 

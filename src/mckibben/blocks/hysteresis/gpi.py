@@ -1,4 +1,4 @@
-"""The generalised Prandtl-Ishlinskii (GPI) model, for asymmetric and saturating loops, and its inverse.
+"""The generalized Prandtl-Ishlinskii (GPI) model, for asymmetric and saturating loops, and its inverse.
 
 Operators play between two envelopes, gamma_R on rising and gamma_L on falling input:
 w_t = max(gamma_R(u_t) - r, w_{t-1}) when u rises, min(gamma_L(u_t) + r, w_{t-1}) when it falls, and
@@ -159,7 +159,7 @@ def smallest_gap(
 
 @dataclass(frozen=True, config=fields.STRICT)
 class GPI(Invertible):
-    """Generalised Prandtl-Ishlinskii model.
+    """Generalized Prandtl-Ishlinskii model.
 
     Parameters
     ----------

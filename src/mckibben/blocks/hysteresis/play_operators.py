@@ -69,7 +69,7 @@ def start_operators(r: Array, rising: float, falling: float, virgin: bool, s: Ar
     """Start play operators as if the input had only risen, or from a virgin state.
 
     ``rising`` and ``falling`` are the first input as the two edges see it: the same for classical
-    operators, the two envelopes' values for generalised ones.
+    operators, the two envelopes' values for generalized ones.
     """
     for i in range(r.size):
         s[i] = rising - r[i]

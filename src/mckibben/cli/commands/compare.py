@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated
 
 from mckibben.cli.output import show
-from mckibben.cli.parameters import Files, Force, Json, Quick, Test, command
+from mckibben.cli.parameters import Files, Force, Json, Quick, Test, chosen_models, command
 from mckibben.cli.stopping import stop_short, stoppable
 from mckibben.options import CompareOptions, Option, ReadOptions
 
@@ -36,7 +36,7 @@ def compare(
     from mckibben import workflow
     from mckibben.report import results, text
 
-    chosen = replace(options, models="quick") if quick else options
+    chosen = replace(options, models=chosen_models(options.models, quick))
     with stoppable(out):
         board = workflow.compare(
             files, test, chosen, reading=reading, out=out, force=force, progress=True

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from mckibben.cli.output import say, show
-from mckibben.cli.parameters import Argument, Force, Json, Quick, command, repeated
+from mckibben.cli.parameters import Argument, Force, Json, Quick, chosen_models, command, repeated
 from mckibben.cli.stopping import stoppable
 from mckibben.options import Jobs, Option, Seed, names
 from mckibben.system.progress import telling
@@ -73,7 +73,7 @@ def measured(
             folder,
             out,
             only=only,
-            models="quick" if quick else models,
+            models=chosen_models(models, quick),
             seed=seed,
             jobs=jobs,
             force=force,

@@ -18,7 +18,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from mckibben.cli.output import say, show
-from mckibben.cli.parameters import Files, Force, Json, Quick, Test, command, repeated
+from mckibben.cli.parameters import (
+    Files,
+    Force,
+    Json,
+    Quick,
+    Test,
+    chosen_models,
+    command,
+    repeated,
+)
 from mckibben.cli.stopping import stop_short, stoppable
 from mckibben.options import Option, ReadOptions, StudyOptions
 
@@ -53,7 +62,7 @@ def study(
         found = workflow.study(
             files,
             test,
-            replace(options, models="quick") if quick else options,
+            replace(options, models=chosen_models(options.models, quick)),
             reading=reading,
             out=out,
             force=force,

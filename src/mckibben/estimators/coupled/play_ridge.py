@@ -3,7 +3,7 @@
 Linear in the readout: least squares on what a block with a unit readout gives, with a penalty that is
 chosen for every output by leaving out blocks of time. A fit to all but one block is a fit to the sum of
 the others' normal equations, so no block is simulated twice. Samples that follow one another are alike,
-which generalised cross-validation, of one sample left out at a time, takes for evidence; where whole
+which generalized cross-validation, of one sample left out at a time, takes for evidence; where whole
 blocks are left out they are none.
 
 Source: Hoerl and Kennard, "Ridge regression", Technometrics, 1970; Burman, Chow and Nolan, "A

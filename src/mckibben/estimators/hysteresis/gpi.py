@@ -1,4 +1,4 @@
-"""Identification of the generalised Prandtl-Ishlinskii model."""
+"""Identification of the generalized Prandtl-Ishlinskii model."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ HEIGHTS = np.array([[-0.5], [0.0], [0.5]])
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class GPIEstimator(SeparableEstimator):
-    """Generalised Prandtl-Ishlinskii model by variable projection from many starts.
+    """Generalized Prandtl-Ishlinskii model by variable projection from many starts.
 
     Weights, and the common height of the envelopes, are solved for; the shapes of the envelopes and the
     gap between them are searched. Both envelopes increase and the falling one is never the lower, so
@@ -85,7 +85,7 @@ class GPIEstimator(SeparableEstimator):
         beyond half the envelopes' range never move.
     """
 
-    title = "Generalised Prandtl–Ishlinskii model (GPI)"
+    title = "Generalized Prandtl–Ishlinskii model (GPI)"
     purpose = "memory"
     can = "Asymmetric, saturating loops between two envelopes, minor loops with few weights."
     cannot = (
@@ -149,7 +149,7 @@ class GPIEstimator(SeparableEstimator):
         return spread(self.n_operators + 1, (float(rising(low)), float(falling(high))))
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the generalised play operators over the run, shape (n, N + 1)."""
+        """Return the generalized play operators over the run, shape (n, N + 1)."""
         rising, falling = self.envelopes(theta, data)
         u, radii = np.ascontiguousarray(run.u), self.radii(rising, falling, data)
         up, down, operators = rising(u), falling(u), np.empty((u.size, radii.size))

@@ -108,7 +108,7 @@ class BoucWenEstimator(SeparableEstimator):
     exponent : {1, 2}, optional
         n. Default: the better of both on the training data.
     asymmetric : bool
-        Whether loops have the five shape numbers of the generalised model, instead of sigma.
+        Whether loops have the five shape numbers of the generalized model, instead of sigma.
     """
 
     title = "Bouc–Wen model"
@@ -184,8 +184,8 @@ class BoucWenEstimator(SeparableEstimator):
 
 GBW = preset(
     BoucWenEstimator,
-    "Generalised Bouc-Wen model: rate and shape are searched, the rest is solved for.",
-    title="Generalised Bouc–Wen model (GBW)",
+    "Generalized Bouc-Wen model: rate and shape are searched, the rest is solved for.",
+    title="Generalized Bouc–Wen model (GBW)",
     can="Asymmetric saturating loops, with five shape parameters.",
     cannot="Minor loops need not close; many starts are needed to identify it.",
     quick=False,

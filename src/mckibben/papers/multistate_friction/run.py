@@ -47,7 +47,7 @@ MODELS: Mapping[str, tuple[str, dict[str, Any]]] = {
     "modified Maxwell-slip": ("mms", LINE | {"n_operators": 38}),
     "modified PI": ("mpi", {"input": ELONGATION, "n_operators": 34}),
     "PI with weights of either sign": ("pi", SIGNED),
-    "generalised Bouc-Wen": ("gbw", LINE),
+    "generalized Bouc-Wen": ("gbw", LINE),
     "Maxwell-slip": ("maxwell-slip", LINE),
     "Bouc-Wen": ("bouc-wen", LINE),
     "Duhem": ("duhem", LINE),

@@ -53,9 +53,9 @@ STEPS = (
     Step(
         "data",
         "Data",
-        "Each recording is listed with its channels and role. *How it is read* opens the import "
-        "settings: columns, units, rate, sign, calibration, lines, encoding. Drag across the plot to "
-        "trim a recording. Every step can be undone.",
+        "Each recording is listed with its channels and role. *Import settings* sets "
+        "columns, units, rate, sign, calibration, lines, encoding. Drag across the plot to trim a "
+        "recording. Every step can be undone.",
         ("example",),
         "over-time",
     ),

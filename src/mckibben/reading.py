@@ -152,16 +152,22 @@ def read_pair(
     named = [name for name in (input, output, *others) if name]
     with warnings.catch_warnings(record=True) as caught:
         recordings = read_files(data, named, reading)
-    usual = input or "pressure", output or "displacement"
+    moving = (
+        name
+        for name in ("displacement", "force")
+        if all(name in one for one in recordings) and any(np.ptp(one[name]) for one in recordings)
+    )
+    usual = input or "pressure", output or next(moving, "displacement")
     if not all(name in one for one in recordings for name in usual):
         found = channels_of(recordings, input, output, None)
-        if len(found.inputs) > 1 or len(found.outputs) > 1:
+        usual = found.inputs[0], found.outputs[0]
+        present = all(name in one for one in recordings for name in usual)
+        if present and (len(found.inputs) > 1 or len(found.outputs) > 1):
             raise DataError(
                 f"there are several: {', '.join((*found.inputs, *found.outputs))}",
                 file=recordings[0].source,
                 remedy="name one with `input=NAME` and one with `output=NAME`; balance models all",
             )
-        usual = found.inputs[0], found.outputs[0]
     if not all(name in one for one in recordings for name in usual):
         recordings = read_files(data, [*usual, *others], reading)  # raises the error
     else:

@@ -268,10 +268,11 @@ class Recording(DrawsItself):
     def with_channels(
         self, units: Mapping[str, str] | None = None, /, **samples: ArrayLike
     ) -> Recording:
-        """Return a recording with channels added or replaced."""
+        """Return a recording with channels added or replaced; these keep their units by default."""
         added = {name: np.asarray(values, dtype=float) for name, values in samples.items()}
-        kept = {name: unit for name, unit in self.units.items() if name not in added}
-        return replace(self, channels={**self.channels, **added}, units=kept | dict(units or {}))
+        return replace(
+            self, channels={**self.channels, **added}, units={**self.units, **(units or {})}
+        )
 
     @classmethod
     def from_frame(

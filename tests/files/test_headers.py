@@ -31,6 +31,7 @@ FORMS = {
     "時間[秒]": ("time", "秒"), "目標変位 (mm)": ("reference_displacement", "mm"),
     "设定压力": ("command_pressure", ""), "consigne pression (bar)": ("command_pressure", "bar"),
     "ref_mm": ("reference_displacement", "mm"), "p_cmd_kPa": ("command_pressure", "kPa"),
+    "regulator_cmd_bar": ("command_pressure", "bar"), "valve_cmd": ("valve_cmd", ""),
     "setpoint": ("reference_displacement", ""), "目標圧力": ("command_pressure", ""),
     # references of pressures
     "pressure_barg": ("pressure", "barg"), "Pressure (bar(g))": ("pressure", "bar(g)"),

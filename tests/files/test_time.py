@@ -63,6 +63,12 @@ def test_the_step_is_the_plain_number_that_was_meant(tmp_path: Path, step: float
     assert recording.sample_time == step
 
 
+def test_a_unit_of_time_names_the_time(tmp_path: Path) -> None:
+    samples = pa.table({"ms": np.arange(50) * 20.0, "pressure_bar": np.sin(np.arange(50))})
+    pq.write_table(samples, tmp_path / "a.parquet")
+    assert one(tmp_path / "a.parquet").sample_time == 0.02
+
+
 def test_a_lost_sample_is_not_taken_for_rounding(tmp_path: Path) -> None:
     times = np.delete(np.arange(1000) / 1000, 500)
     recording, samples = gridded(tmp_path, times)

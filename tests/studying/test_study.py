@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import GPI, PI, DataError, Recording, study
+from mckibben import GPI, PI, DataError, PiecewiseLinear, Recording, study
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.diagnosis.check import Validation
@@ -60,6 +60,17 @@ def test_inverse_check_covers_the_reachable_range(block: Block, train: Recording
     low, high = check.reachable
     assert np.ptp(check.reference) > 0.9 * (high - low)
     assert np.all((check.pressure >= 0) & (check.pressure <= 5))
+
+
+def test_inverse_check_keeps_the_units_of_other_channels(train: Recording) -> None:
+    block = replace(
+        PiecewiseLinear.example(), input=Channel("stroke", "mm"), output=Channel("pull", "N")
+    )
+    samples = {"stroke": train["displacement"], "pull": train["pressure"]}
+    recording = Recording(samples, 0.02, units={"stroke": "mm", "pull": "N"})
+    check = check_inverse("it", block, recording)
+    assert check.own
+    assert check.error <= 1e-12
 
 
 @pytest.mark.parametrize(("driven", "closed"), [("voltage", True), ("pressure", False)])

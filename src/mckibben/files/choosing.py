@@ -10,7 +10,7 @@ import numpy as np
 
 from mckibben.errors import DataError
 from mckibben.files.channels import NAME
-from mckibben.files.headers import by_units, channel_of, parse, snake_case, unit_of
+from mckibben.files.headers import by_units, channel_of, parse, snake_case, time_unit, unit_of
 from mckibben.files.instants import may_be_instant
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
@@ -232,7 +232,7 @@ def _only_time(named: Mapping[str, Column], source: Source) -> Column | None:
         column
         for column in named.values()
         if column.values is not None
-        and _target(column) == "s"
+        and (_target(column) == "s" or time_unit(column.label))
         and np.all(np.diff(column.values) > 0)
     ]
     dates = [

@@ -13,7 +13,7 @@ from mckibben.errors import DataError
 from mckibben.files import clocks, instants, quality, timebase
 from mckibben.files.channels import NAME, Channel, Time
 from mckibben.files.choosing import assign
-from mckibben.files.headers import is_clock, parse, snake_case, unit_of, unknown_ending
+from mckibben.files.headers import is_clock, parse, snake_case, time_unit, unit_of, unknown_ending
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.table import Column
@@ -272,6 +272,8 @@ def _stated(channel: str, column: Column, source: Source) -> str | None:
     described = source.request.described
     given = described.time if channel == "time" else described.channels.get(channel)
     in_header = None if source.table.own else parse(column.label).unit
+    if channel == "time" and in_header is None:
+        in_header = time_unit(column.label)
     stated = {"its header": in_header, "the file": column.unit}
     if given is not None and given.unit is not None and _describes(given, column):
         if isinstance(given, Channel) and given.value is not None:

@@ -127,13 +127,16 @@ def _of_loop(name: str, header: Header) -> str | None:
     if len(roles) != 1:
         return None
     role, rest = roles[0], "_".join(word for word in words if word not in _ROLES)
-    if rest and not rest.isdigit():
-        channel = channel_of(Header(rest, header.unit)) if _standard(rest) else ""
+    unit = None if header.unit is None else find(header.unit)
+    if _standard(rest):
+        channel = channel_of(Header(rest, header.unit))
+    elif unit is not None:
+        channel = QUANTITIES.get(unit.target or "", "")
+    elif not rest or rest.isdigit():
+        channel = "pressure" if role == "command" else "displacement"
     else:
-        unit = None if header.unit is None else find(header.unit)
-        usual = "pressure" if role == "command" else "displacement"
-        channel = usual if unit is None else QUANTITIES.get(unit.target or "", "")
-        channel = f"{channel}_{rest}" if channel and rest else channel
+        return None
+    channel = f"{channel}_{rest}" if channel and rest.isdigit() else channel
     if unit_of(channel) is None:
         return None
     return f"{'command' if channel.startswith(('pressure', 'voltage')) else role}_{channel}"
@@ -179,6 +182,16 @@ def is_clock(text: str) -> bool:
     unit = None if header.unit is None else find(header.unit)
     timed = header.unit is None or (unit is not None and unit.target == "s")
     return timed and _CHANNELS.get(re.sub(r"_?\d+$", "", snake_case(header.name))) == "time"
+
+
+def time_unit(text: str) -> str | None:
+    """Return the unit of time that is a whole header; None if it is none, or one letter.
+
+    >>> time_unit("sec"), time_unit("s"), time_unit("mm")
+    ('sec', None, None)
+    """
+    unit = find_listed(text)
+    return text if len(text) > 1 and unit is not None and unit.target == "s" else None
 
 
 def snake_case(name: str) -> str:

@@ -428,7 +428,7 @@ def check(found: Validation) -> list[Item]:
 
 def checked(one: OutputCheck) -> list[Item]:
     """Return what a residual depends on, with its means over each variable, and all tests."""
-    headings = ["Share of the variance [%]", f"RMS [{one.unit}]"]
+    headings = ["Share explained [%]", f"RMS [{one.unit}]"]
     missing, tests = (
         [[words.missed(one, each), 100 * each.share, each.size] for each in some]
         for some in (one.missing, one.suspects)

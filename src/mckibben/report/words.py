@@ -297,12 +297,15 @@ def _residual(one: OutputCheck, *, sized: bool = True) -> str:
             f"The model is of no use for {one.output}: its RMSE is {error}, that of the mean "
             f"{numeral(one.mean_error, 2)}."
         )
-    of_range = f", {error} RMS ({percent(one.rmse / one.span)} of its range)," if sized else ""
-    residual = f"The residual of {one.output}{of_range}"
+    mean = next(cause.coefficient for cause in one.suspects if cause.kind == "offset")
+    sizes = [f"{error} RMS ({percent(one.rmse / one.span)} of its range)"] if sized else []
+    sizes.append(f"mean {size(one.unit, mean or 0.0)}")
+    residual = f"The residual of {one.output}, {', '.join(sizes)},"
     if not one.missing:
         return f"{residual} follows none of {len(one.suspects)} causes tested."
     first = max(one.missing, key=lambda cause: cause.share)
-    return f"{residual} follows {missed(one, first)}: {percent(first.share)} of its variance."
+    of = "mean square" if first.kind == "offset" else "variance"
+    return f"{residual} follows {missed(one, first)}: {percent(first.share)} of its {of}."
 
 
 def probability(value: float) -> str:

@@ -136,8 +136,9 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
         low, high = (float(end[0]) for end in block.reachable())
         own, most = bool(np.isinf([low, high]).all()), NEARLY
         if own:
-            given = recording.select([channel.name for channel in block.inputs])
-            desired = given.with_channels(**{output.name: block.simulate(given)[output.name]})
+            desired = recording.with_channels(
+                **{output.name: block.simulate(recording)[output.name]}
+            )
         elif high - low > REACH * np.ptp(recording[output.name]) and np.isfinite(high - low):
             reachable, most = (low, high), FOLLOWED
             desired = Recording(
@@ -154,8 +155,7 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
         found = inverse.simulate(desired.select([channel.name for channel in inverse.inputs]))
-        others = {c.name: desired[c.name] for c in block.inputs if c.name not in found}
-        driven = found.with_channels(**others).select([c.name for c in block.inputs])
+        driven = desired.with_channels(found.units, **found.channels)
         output_of = block.simulate(driven).matrix(channel.name for channel in block.outputs)
     error = float((np.abs(output_of - reference) / span).max())
     if not error <= most:

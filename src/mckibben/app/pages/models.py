@@ -203,7 +203,7 @@ def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:
 # -- the model that is chosen ----------------------------------------------------------------------
 
 
-@parts.steady("models", "results", jobs=["check"], own=True)
+@parts.steady("models", "results", jobs=["check"])
 def closer(state: State) -> None:
     """Show the model that is chosen, in tabs."""
     sides, workspace, name = state.sides, state.workspace, state.model

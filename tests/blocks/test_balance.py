@@ -17,6 +17,7 @@ from mckibben import ModelWarning
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
+from tests.blocks.balance_twin import balance
 from tests.blocks.balances import (
     ALONE,
     FURTHEST,
@@ -29,7 +30,6 @@ from tests.blocks.balances import (
     undone,
 )
 from tests.blocks.strategies import numbers
-from tests.twins import TWINS
 
 Array = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ def test_pressures_that_are_clipped_move_muscles_that_need_them(block: Balance, 
 @given(ANY, SEEDS)
 def test_drawn_balances_agree_with_their_twin(block: Balance, seed: int) -> None:
     inputs = motion(block, (-5.0, FURTHEST), seed, 3)
-    expected = TWINS["balance"](block, inputs.tolist(), STEP)
+    expected = balance(block, inputs.tolist(), STEP)
     np.testing.assert_allclose(run(block, inputs), expected, atol=1e-9 * HIGHEST)
 
 

@@ -1,7 +1,4 @@
-"""Hysteresis as differential equations: bounds, energy, oscillators solved by others.
-
-Kernels agree with their twins in `tests.contracts.test_twins`.
-"""
+"""Hysteresis as differential equations: bounds, energy, oscillators solved by others."""
 
 from __future__ import annotations
 

@@ -27,6 +27,7 @@ from mckibben.blocks.fields import LONGEST_DELAY, vector
 from mckibben.blocks.hysteresis.envelopes import Exponential, Tanh
 from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
 from mckibben.blocks.laws import examples
+from mckibben.registry import load, names
 
 EXAMPLES = examples()
 
@@ -82,3 +83,11 @@ def test_unusual_blocks_obey_it(block: Block) -> None:
     assert not (block is TIMELESS and block.rate_dependent)
     for seed in range(3):
         check_block(block, seed=seed)
+
+
+@pytest.mark.parametrize("kind", names("envelopes"))
+def test_an_envelope_rises_and_its_inverse_is_exact(kind: str) -> None:
+    u = np.linspace(-1.0, 6.0, 1001)
+    for envelope in load("envelopes", kind).examples():
+        np.testing.assert_allclose(envelope.solve(envelope(u)), u, rtol=1e-11, atol=1e-11)
+        assert np.all(np.diff(envelope(u)) > 0)

@@ -32,7 +32,7 @@ from mckibben.system.compiling import Deferred
 from tests.blocks.balance_twin import balance, balance_inverse
 from tests.blocks.balances import ALONE as HARDENING
 from tests.golden.models import all_models, inputs_of
-from tests.golden.running import simulated
+from tests.golden.running import inverse_of, scheduling_of, simulated
 
 pytestmark = pytest.mark.kernel
 
@@ -246,11 +246,17 @@ def test_forces_that_a_held_balance_lacks_are_linear_in_its_coefficients(*, sett
 MODELS = all_models()
 
 
+@pytest.mark.filterwarnings("ignore::mckibben.errors.ModelWarning")
 @pytest.mark.parametrize("name", MODELS)
-def test_every_model_runs(name: str) -> None:
+def test_every_model_and_its_inverse_run(name: str) -> None:
     """Golden cases have the numbers."""
-    outputs = simulated(MODELS[name], inputs_of(name, MODELS[name], n=40))
-    assert np.isfinite(outputs[:20]).all()  # after that, sensors fail
+    model = MODELS[name]
+    inputs = inputs_of(name, model, n=40)
+    outputs = simulated(model, inputs)[:20]  # after that, sensors fail
+    assert np.isfinite(outputs).all()
+    if inverse := inverse_of(model):
+        found = simulated(inverse, np.column_stack([outputs, scheduling_of(model, inputs)[:20]]))
+        assert np.isfinite(found).all()
 
 
 def test_memberships_are_those_of_each_time_after_the_other() -> None:

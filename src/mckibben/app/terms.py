@@ -85,7 +85,8 @@ def said(error: Exception | str) -> str:
     """
     if isinstance(error, MckibbenError):
         text = rendered(error, control, place)
-        text = text.replace(f"{error.file}", error.file.name if error.file else "")
+        if error.file is not None:
+            text = text.replace(f"{error.file}", error.file.name)
     else:
         text = in_terms_of(str(error), control, place)
     if text.partition(" ")[0].isalpha():  # a word, not the name of a file or channel

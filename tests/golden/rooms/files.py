@@ -39,7 +39,6 @@ WRONG: Mapping[str, tuple[str, Options]] = {
     "wrap-of-signed-16-bits": ("wrong/wrap-signed.csv", {}),
     "sentinels-in-a-row": ("wrong/sentinels.csv", {}),
     "sentinel-in-few-samples": ("wrong/sentinel-few.csv", {}),
-    "all-missing": ("wrong/all-missing.csv", {}),
     "tables-beside-recording": ("wrong/case-01.mat", {}),
     "tables-beside-recording-named": ("wrong/case-01.mat", {
         "columns": {"angle": "thf", "force": "M1"}, "rate": 1000.0}),

@@ -159,6 +159,20 @@ def moved(run: Recording, outputs: tuple[str, ...], share: float) -> Recording:
     return run.with_channels({output: run.units[output] for output in outputs}, **bent)
 
 
+def test_an_interrupted_fit_leaves_nothing(name: str, kind: str) -> None:
+    told: list[float] = []
+
+    def impatient(share: float, best: float) -> None:
+        told.append(share)
+        if len(told) == 2 or share == 1.0:
+            raise KeyboardInterrupt
+
+    estimator = quick(name, kind)
+    with pytest.raises(KeyboardInterrupt):
+        estimator.fit(recorded(kind), progress=impatient)
+    assert vars(estimator).keys() == estimator.get_params().keys()
+
+
 def test_absent_channels_are_named(name: str, kind: str) -> None:
     made, first = KINDS[kind], recorded(kind)[0]
     model = fitted(name, kind).model_

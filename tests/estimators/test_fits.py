@@ -141,27 +141,10 @@ ONE_OF_EACH = pytest.mark.parametrize(
 
 @ONE_OF_EACH
 def test_scikit_learn_validates_and_searches(name: str, kind: str) -> None:
-    runs, first = (
-        list(example_runs(kind)),
-        np.arange(len(example_runs(kind))) < len(example_runs(kind)) // 2,
-    )
+    runs = list(example_runs(kind))
+    first = np.arange(len(runs)) < len(runs) // 2
     fold = [(np.flatnonzero(~first), np.flatnonzero(first))]
     scores = cross_val_score(quick(name, kind), runs, cv=2, error_score="raise")
     search = GridSearchCV(quick(name, kind), {"seed": [0]}, cv=fold, error_score="raise")
     search.set_params(refit=False).fit(runs)
     assert search.cv_results_["mean_test_score"] == pytest.approx([scores[0]])
-
-
-@ONE_OF_EACH
-def test_an_interrupted_fit_leaves_nothing(name: str, kind: str) -> None:
-    told: list[float] = []
-
-    def impatient(share: float, best: float) -> None:
-        told.append(share)
-        if len(told) == 2 or share == 1.0:
-            raise KeyboardInterrupt
-
-    estimator = quick(name, kind)
-    with pytest.raises(KeyboardInterrupt):
-        estimator.fit(example_runs(kind), progress=impatient)
-    assert vars(estimator).keys() == estimator.get_params().keys()

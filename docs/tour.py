@@ -46,7 +46,7 @@ STEPS = (
     Step(
         "start",
         "An empty workspace",
-        "Drop files, open the example, or record a virtual muscle.",
+        "Drop files, or open the example.",
         (),
         "example",
     ),

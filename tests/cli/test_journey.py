@@ -35,23 +35,6 @@ def model(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> Path:
     return path
 
 
-def test_simulate_writes_the_inputs_the_modelled_and_the_measured_output(
-    cli: Cli, model: Path, files: tuple[Path, Path], tmp_path: Path
-) -> None:
-    out = tmp_path / "out.csv"
-    result = cli("simulate", model, files[1], "-o", out, "--json")
-    assert result.code == 0, result.err
-    found, given = columns(out), columns(files[1])
-    assert list(found) == ["time", "pressure", "displacement_model", "displacement"]
-    np.testing.assert_array_equal(found["pressure"], given["pressure"])
-    expected = load(model).simulate(given["pressure"])
-    np.testing.assert_array_equal(found["displacement_model"], expected)
-    rmse = np.sqrt(np.mean((expected - given["displacement"]) ** 2))
-    metrics = json.loads(result.out)["metrics"]["displacement"]
-    assert metrics["rmse"] == pytest.approx(rmse, rel=1e-12)
-    assert {"mae", "r2", "max_error"} <= set(metrics)
-
-
 def test_inverse_then_forward_through_files_is_the_identity(
     cli: Cli, model: Path, tmp_path: Path
 ) -> None:
@@ -74,24 +57,6 @@ def test_inverse_then_forward_through_files_is_the_identity(
     found = columns(back)
     error = np.abs(found["displacement_model"] - found["displacement"]).max()
     assert error <= 1e-9 * (high - low)
-
-
-def test_study_writes_everything(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> None:
-    folder = tmp_path / "study"
-    options = ["--models", "pi,gpi", "--jobs", 1, "--json"]
-    result = cli("study", files[0], "--test", files[1], "-o", folder, *options)
-    assert result.code == 0, result.err
-    printed = json.loads(result.out)
-    assert printed["inverse"]["model"] == "gpi"
-    assert printed["inverse"]["error"] <= 1e-9
-    written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert written == {
-        *("report.html", "characterization.json", "inverse.json"),
-        *("validation.json", "banded.json"),
-        *("leaderboard.csv", "leaderboard.json", "run.json"),
-        *("models/pi.json", "models/gpi.json"),
-    }
-    assert load(folder / "inverse.json").inverse() == load(folder / "models" / "gpi.json")
 
 
 def _driven(folder: Path) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mckibben
-from mckibben import GPI, DataError, DataWarning, Recording
+from mckibben import GPI, DataError, Recording
 from mckibben.comparison.shared_rows import check_shared, shared_rows, without_copies
 from mckibben.signals import irregular_triangle, triangle
 
@@ -115,16 +115,3 @@ def test_a_little_in_common_is_let_and_more_is_refused() -> None:
     ):
         with pytest.raises(DataError, match="run 0"):
             check_shared(given, *CHANNELS)
-
-
-def test_runs_of_a_virtual_rig_with_one_seed_share_its_noise() -> None:
-    def virtual(turns: int, seed: int) -> Recording:
-        wave = irregular_triangle(TIME, 9, 5.0, seed=turns)
-        return recorded(wave, seed, 0.02).with_meta(rig="bench v1", seed=seed)
-
-    one, other = virtual(1, 3), virtual(2, 3)
-    with pytest.warns(DataWarning, match="same sensor noise.*seed=4"):
-        assert not check_shared({"fit": [one], "test": [other]}, *CHANNELS)
-    assert not check_shared({"fit": [one, other], "test": [virtual(2, 4)]}, *CHANNELS)
-    with pytest.raises(DataError, match="run one of them again with seed=4"):
-        check_shared({"fit": [one], "test": [one]}, *CHANNELS)

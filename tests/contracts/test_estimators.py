@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
-from sklearn.model_selection import GridSearchCV, cross_val_score
 
 from mckibben import DataError, ModelError, Recording, registry
 from mckibben import load as load_model
@@ -158,15 +157,6 @@ def moved(run: Recording, outputs: tuple[str, ...], share: float) -> Recording:
         size = np.ptp(y)
         bent[output] = y + share * (size + (y - y.min()) ** 2 / size + 0.3 * size * wave)
     return run.with_channels({output: run.units[output] for output in outputs}, **bent)
-
-
-def test_scikit_learn_validates_and_searches(name: str, kind: str) -> None:
-    runs, first = list(recorded(kind)), np.arange(len(recorded(kind))) < len(recorded(kind)) // 2
-    fold = [(np.flatnonzero(~first), np.flatnonzero(first))]
-    scores = cross_val_score(quick(name, kind), runs, cv=2, error_score="raise")
-    search = GridSearchCV(quick(name, kind), {"seed": [0]}, cv=fold, error_score="raise")
-    search.set_params(refit=False).fit(runs)
-    assert search.cv_results_["mean_test_score"] == pytest.approx([scores[0]])
 
 
 def test_an_interrupted_fit_leaves_nothing(name: str, kind: str) -> None:

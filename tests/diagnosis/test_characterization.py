@@ -80,27 +80,14 @@ def test_every_number_of_a_parallelogram(gain: float, gap: float) -> None:
         assert seen == pytest.approx((100 * gap / span, 4.0, 0.4), rel=0.01)
 
 
-@given(st.floats(0.1, 0.9), st.sampled_from([0.0, 0.002, 0.01]))
-@settings(max_examples=20)
-def test_dead_zone_of_a_play_operator_is_twice_its_radius(radius: float, noise: float) -> None:
-    u = triangle(TIME, 20.0, 4.0)
-    found = characterize(noisy(run(u, play(u, radius)), noise))
-    tolerance = 1e-9 if noise == 0 else 4 * noise
-    assert found.dead_zone_upper == pytest.approx(2 * radius, abs=tolerance * 4)
-    assert found.dead_zone_lower == pytest.approx(2 * radius, abs=tolerance * 4)
-    assert found.mid_width == pytest.approx(2 * radius, abs=1e-9 + 4 * noise)
-
-
 @pytest.mark.parametrize("noise", [0.0, 0.003, 0.01])
 @pytest.mark.parametrize("seed", range(2))
-def test_prandtl_ishlinskii_minor_loops_close(noise: float, seed: int) -> None:
+def test_prandtl_ishlinskii_loops_are_symmetric(noise: float, seed: int) -> None:
     model = PI(thresholds=(0.0, 0.2, 0.5, 1.0), weights=(3.0, 2.0, 1.0, 1.0))
     u = np.concatenate(
         [triangle(TIME[:4000], 10.0, 5.0), irregular_triangle(TIME, 60, 5.0, seed=seed)]
     )
     found = characterize(noisy(run(u, model.simulate(u)), noise, seed))
-    # Turns fall between samples, so that even clean loops close to within a step only.
-    assert found.closure_error == pytest.approx(0, abs=0.1 + 150 * noise)
     assert found.asymmetry == pytest.approx(0, abs=0.5 + 30 * noise)
 
 
@@ -158,7 +145,7 @@ def test_without_time_what_needs_time_is_none_and_the_rest_is_the_same() -> None
 def test_an_output_that_falls_with_the_input() -> None:
     u = triangle(TIME, 10.0, 5.0)
     up, down = characterize(run(u, play(u, 0.3))), characterize(run(u, -play(u, 0.3)))
-    for name in ("loop_width", "asymmetry", "dead_zone_upper", "dead_zone_lower", "branch_gap"):
+    for name in ("loop_width", "asymmetry", "branch_gap"):
         assert getattr(down, name) == pytest.approx(getattr(up, name))
     assert down.falls
     assert down.gain == pytest.approx(-1.0)
@@ -175,7 +162,6 @@ def test_noise_moves_nothing_much(seed: int) -> None:
     assert found.input_noise == pytest.approx(0.04, rel=0.15)
     assert found.loop_width == pytest.approx(clean.loop_width, abs=1.5)
     assert found.gain == pytest.approx(clean.gain, rel=0.05)
-    assert found.dead_zone_upper == pytest.approx(clean.dead_zone_upper, abs=0.1)
     assert found.loop_area_share == pytest.approx(clean.loop_area_share, abs=1.5)
 
 

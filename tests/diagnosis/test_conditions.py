@@ -25,7 +25,7 @@ def test_zeros_of_recordings_change_no_verdict(zeros: tuple[float, ...]) -> None
     same = characterize([run(0.0, seed) for seed, _ in enumerate(zeros)])
     moved = characterize([run(zero, seed) for seed, zero in enumerate(zeros)])
     assert moved.has_loop
-    for name in ("loop_width", "gain", "dead_zone_upper", "branch_gap"):
+    for name in ("loop_width", "gain", "mid_width", "branch_gap"):
         assert getattr(moved, name) == pytest.approx(getattr(same, name), rel=0.05, abs=0.02), name
 
 

@@ -20,14 +20,13 @@ from mckibben.comparison.planning import objections
 from mckibben.errors import MckibbenError
 from mckibben.estimators.catalogue import (
     declared,
-    default_model,
     full_name,
     needs,
     settings_of,
     settings_of_all,
     summary,
 )
-from mckibben.estimators.core.estimator import DefaultFor, Estimator, Purpose
+from mckibben.estimators.core.estimator import Estimator, Purpose
 from mckibben.estimators.hysteresis.pi import PIEstimator
 from mckibben.options import setting
 
@@ -52,17 +51,11 @@ def test_a_model_declares_what_it_is(model: str) -> None:
     assert estimator.param_grid.keys() <= estimator().get_params().keys()
 
 
-@pytest.mark.parametrize("use", get_args(DefaultFor))
-def test_one_model_is_the_default_of_a_use(use: DefaultFor) -> None:
-    found = [model for model in MODELS if declared(model).default_for == use]
-    assert found == [default_model(use)]
-
-
 def test_a_plug_in_that_declares_nothing_is_listed_under_its_name(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     silent = types.new_class("Silent", (PIEstimator,), {})
-    for name in ("title", "purpose", "can", "quick", "makes", "default_for"):
+    for name in ("title", "purpose", "can", "quick", "makes"):
         setattr(silent, name, getattr(Estimator, name))
     silent.__doc__ = "A model of mine."
     outside = types.ModuleType("outside")

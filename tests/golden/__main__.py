@@ -49,13 +49,7 @@ def verdict(case: Case, given: Answer, here: str) -> tuple[str, list[Moved], str
     if leaves is None:
         return "raised", [], raised
     rows = moved(case, stored, leaves, here)
-    wrong = [row for row in rows if any(fnmatchcase(row.leaf, p) for p in stored.wrong)]
-    if stored.expected_to_fail and not wrong:
-        return "mended", rows, "it has its right value now: accept it with --update"
-    others = [row for row in rows if row not in wrong]
-    if others or not rows:
-        return ("moved" if others else "same"), others, ""
-    return "expected", [], stored.expected_to_fail
+    return ("moved" if rows else "same"), rows, ""
 
 
 def chosen(patterns: list[str], slow: bool) -> list[Case]:
@@ -141,7 +135,7 @@ def main() -> int:
         rows += changed[: options.most]
         if len(changed) > options.most:
             print(f"{case.name}: {len(changed) - options.most} more values moved")
-        if word in ("new", "raised", "mended"):
+        if word in ("new", "raised"):
             print(f"{case.name}: {word}: {remark}")
     table(rows)
     if skipped:
@@ -151,11 +145,10 @@ def main() -> int:
         counts["stored without a case"] = len(left)
         print(f"stored without a case: {', '.join(sorted(left))}")
     slowest.sort(reverse=True)
-    counts = {"expected to fail" if w == "expected" else w: n for w, n in counts.items()}
     print("slowest: " + ", ".join(f"{name} {seconds:.1f} s" for seconds, name in slowest[:5]))
     said = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
     print(f"{len(cases)} golden cases in {time.perf_counter() - began:.0f} s: {said}")
-    good = counts.get("same", 0) + counts.get("expected to fail", 0)
+    good = counts.get("same", 0)
     failed = sum(counts.values()) - good - len(skipped)
     print(f"golden: {good} passed, {failed} failed, {len(skipped)} skipped")
     return int(failed > 0)
@@ -168,23 +161,18 @@ def _elsewhere(case: Case, here: str) -> bool:
 
 
 def update(cases: list[Case], because: str, processes: int = 1) -> int:
-    """Store what cases answer now, with a reason; a right value is not overwritten by a wrong one."""
+    """Store what cases answer now, with a reason."""
     if not because:
         sys.exit('say why: --because "..."')
     refused = 0
     for case, given in run([case for case in cases if case.possible], processes):
-        before, (word, rows, _) = load(case.name), verdict(case, given, machine())
-        table(rows)
+        table(verdict(case, given, machine())[1])
         if given[0] is None:
             print(f"{case.name}: {given[1]}")
-        elif before and before.expected_to_fail and (word != "mended" or rows):
-            print(f"{case.name}: its right value is stored, and this is another: edit it by hand")
+            refused += 1
         else:
-            bounds = before.leaves if before and before.expected_to_fail else given[0]
-            save(case.name, case.call, Stored(bounds, because, machine()))
+            save(case.name, case.call, Stored(given[0], because, machine()))
             print(f"{case.name}: stored")
-            continue
-        refused += 1
     for case in cases:
         if not case.possible:
             print(f"{case.name}: not stored, as what it needs is not here")

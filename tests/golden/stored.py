@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,17 +29,11 @@ class Stored:
         Why the case has the value that it has: first stored, or what changed it.
     machine : str
         On what kind of machine: the bits of computed numbers are those of its processor and libm.
-    expected_to_fail : str
-        Why today's answer is not the stored, right one, and which issue mends it; empty otherwise.
-    wrong : sequence of str
-        Patterns of the leaves that are wrong today; all others are compared as ever.
     """
 
     leaves: Mapping[str, Any]
     reason: str
     machine: str
-    expected_to_fail: str = ""
-    wrong: Sequence[str] = ()
 
 
 def machine() -> str:
@@ -68,9 +62,7 @@ def load(name: str) -> Stored | None:
         if twice := leaves.keys() & found.keys():
             raise ValueError(f"{place}: {', '.join(twice)} stand in {arrays.name} too: delete one")
         leaves |= found
-    failing = text.get("expected_to_fail", "")
-    wrong = text.get("wrong", ["*"] if failing else [])
-    return Stored(leaves, text["reason"], text["machine"], failing, wrong)
+    return Stored(leaves, text["reason"], text["machine"])
 
 
 def save(name: str, call: str, stored: Stored) -> None:
@@ -80,8 +72,6 @@ def save(name: str, call: str, stored: Stored) -> None:
     arrays = {k: v for k, v in stored.leaves.items() if isinstance(v, np.ndarray)}
     rest = {k: v for k, v in stored.leaves.items() if k not in arrays}
     text: dict[str, Any] = {"call": call, "reason": stored.reason, "machine": stored.machine}
-    if stored.expected_to_fail:
-        text |= {"expected_to_fail": stored.expected_to_fail, "wrong": list(stored.wrong)}
     text["expected"] = rest
     place.write_text(json.dumps(text, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     place.with_suffix(".npz").unlink(missing_ok=True)

@@ -98,21 +98,9 @@ def test_cases_are_stored_compared_and_accepted(
     assert verdict(CASE, answer(CASE), held.machine)[0] == "same"
     broken = Case(CASE.name, "", raising)
     assert verdict(broken, answer(broken), held.machine)[0] == "raised"
-
-    right = Stored({**held.leaves, "rmse": 0.1}, "known", held.machine, "issue 41", ["rmse"])
-    save(CASE.name, CASE.call, right)
-    assert verdict(CASE, answer(CASE), held.machine)[0] == "expected"
-    assert verdict(broken, answer(broken), held.machine)[0] == "raised"
-    assert update([CASE], "today's wrong value") == 1
-    assert (load(CASE.name) or held).leaves["rmse"] == 0.1
-    save(CASE.name, CASE.call, replace(right, leaves={**right.leaves, "best": "pi"}))
+    save(CASE.name, CASE.call, replace(held, leaves={**held.leaves, "best": "pi"}))
     word, rows, _ = verdict(CASE, answer(CASE), held.machine)
-    assert (word, [row.leaf for row in rows]) == ("moved", ["best"])  # which is not what is wrong
-    save(CASE.name, CASE.call, replace(right, leaves={**held.leaves, "rmse": {"at most": 1.0}}))
-    assert verdict(CASE, answer(CASE), held.machine)[0] == "mended"
-    assert update([CASE], "mended") == 0
-    assert verdict(CASE, answer(CASE), held.machine)[0] == "same"
-    assert (load(CASE.name) or held).leaves["rmse"] == {"at most": 1.0}
+    assert (word, [row.leaf for row in rows]) == ("moved", ["best"])
 
 
 def test_what_is_stored_twice_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -159,7 +159,6 @@ def fit(
         inputs=inputs, outputs=outputs, load=load or None, models=[model],
         seed=seed, allow_shared=allow_shared,
     )  # fmt: skip
-    plan = replace(plan, items={model: plan.items[model]})  # without those of each load alone
     *_, last = ranked(
         plan, jobs=1, kept=plan.kept(None), watch=lambda _, share, cost: tell(share, cost)
     )

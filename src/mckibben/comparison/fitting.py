@@ -77,11 +77,10 @@ class Data:
 
 @dataclass(frozen=True)
 class Item:
-    """A model to fit, and its settings; optionally for one recording only."""
+    """A model to fit, and its settings."""
 
     model: str
     settings: Mapping[str, Any]
-    only: int | None = None
 
 
 @dataclass(frozen=True)
@@ -127,13 +126,9 @@ class FitResult:
 
 
 def tasks_of(name: str, item: Item, n_folds: int, split: bool) -> list[Task]:
-    """Return the tasks of a model: one, or one per fold.
-
-    What is fitted to one recording only is not validated, since no other model is on the same samples.
-    """
-    if item.only is not None or n_folds < 2 or not split:
-        folds = () if item.only is not None else tuple(range(n_folds))
-        return [Task(name, item, folds, whole=True)]
+    """Return the tasks of a model: one, or one per fold."""
+    if n_folds < 2 or not split:
+        return [Task(name, item, tuple(range(n_folds)), whole=True)]
     return [Task(name, item, (k,), whole=k == 0) for k in range(n_folds)]
 
 
@@ -195,7 +190,7 @@ def _fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:
     if not task.whole:
         return FitResult(predictions, invalid)
     started = time.perf_counter()
-    estimator = fitted(split.train if item.only is None else (split.train[item.only],))
+    estimator = fitted(split.train)
     seconds = time.perf_counter() - started
     block = estimator.model_
     predictions |= {k: _predicted(block, folds[k], channels.outputs) for k in own}

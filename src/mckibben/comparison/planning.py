@@ -18,7 +18,7 @@ from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.comparison.splits import Split, split_of, validation_folds
 from mckibben.errors import DataError, ModelError, require
-from mckibben.estimators.catalogue import declared, default_model
+from mckibben.estimators.catalogue import declared
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.numerals import counted
 from mckibben.recording import Recording, listed, reading_notes
@@ -115,10 +115,7 @@ def plan_of(
         )
     names, left_out = _chosen(models, every, channels)
     unloaded = replace(channels, scheduling=None)
-    alone = [default_model("load")] if channels.scheduling else []
-    given = {
-        model: {"seed": seed} | dict((settings or {}).get(model, {})) for model in (*names, *alone)
-    }
+    given = {model: {"seed": seed} | dict((settings or {}).get(model, {})) for model in names}
     named = {*given, *(registry.names("estimators") if models in ("all", "quick") else ())}
     if lost := sorted({*(settings or {})} - named):
         raise ModelError(
@@ -130,8 +127,6 @@ def plan_of(
     refused = objections(objections(names, split.train, channels), split.train, unloaded)
     efforts = {model: registry.load("estimators", model).effort for model in names}
     items = {model: Item(model, given[model]) for model in sorted(names, key=efforts.__getitem__)}
-    for model in () if objections(alone, every, unloaded) else alone:
-        items |= _at_each_load(split.train, channels.scheduled(every)[0], Item(model, given[model]))
     empty = Leaderboard(
         inputs=channels.inputs,
         outputs=channels.outputs,
@@ -179,15 +174,6 @@ def _outside(split: Split, names: Sequence[str]) -> dict[str, float]:
             values = np.concatenate(tested)
             found[name] = float(np.mean((values < low) | (values > high)))
     return {name: share for name, share in found.items() if share > 0}
-
-
-def _at_each_load(train: Sequence[Recording], load: str, item: Item) -> dict[str, Item]:
-    """Return a model without load input, fitted to each recording separately."""
-    items: dict[str, Item] = {}
-    for place, run in enumerate(train):
-        name = f"{item.model} at {run[load].mean():.3g} {run.units[load]} ({run.name})"
-        items[name + f", {place + 1}" * (name in items)] = replace(item, only=place)
-    return items
 
 
 def _chosen(

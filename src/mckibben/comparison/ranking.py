@@ -120,7 +120,7 @@ def compare(
         Channels, by default by their names: ``pressure`` and ``displacement``, for several muscles
         ``pressure_1`` and so on. For several outputs, models are chosen by the mean error.
     load : str, optional
-        Channel of a varying load, an input of the models; `mpi` per load is compared, too.
+        Channel of a varying load, an input of the models.
     validation : sequence of Recording
         To choose on; nothing is fitted to them.
     models : "all", "quick", str or sequence of str

@@ -6,9 +6,7 @@ length counts. Copies that were resampled, filtered or zeroed hold other numbers
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError, DataWarning
+from mckibben.errors import DataError
 from mckibben.recording import Recording
 
 WINDOW = 64
@@ -103,8 +101,6 @@ def check_shared(
 ) -> tuple[str, ...]:
     """Raise an error if recordings share data, or return statements about it.
 
-    Warns of runs of a virtual rig with the same seed, and so the same sensor noise, in two roles.
-
     Parameters
     ----------
     roles : mapping of str to sequence of Recording
@@ -122,32 +118,13 @@ def check_shared(
     sentences = tuple(_sentence(shared, listed) for shared in found)
     if found and not allow:
         remedy = "drop the copy, or cut the stretch out of one of them"
-        if again := _seeded(*(listed[place][1] for place in found[0][:2])):
-            remedy = f"{again}, or {remedy}"
         if allow is not None:
             remedy += (
                 "; or, if the runs are distinct (a coarse sensor may read the same in both), give "
                 "`allow_shared`: every result states it"
             )
         raise DataError(sentences[0], file=listed[found[0].second][1].source, remedy=remedy)
-    for (role, one), (other_role, other) in combinations(listed, 2):
-        if not found and role != other_role and (again := _seeded(one, other)):
-            warnings.warn(
-                f"{one.name} and {other.name} have the same sensor noise, as both were run with seed "
-                f"{one.meta['seed']}: {again}",
-                DataWarning,
-                stacklevel=2,
-            )
-            break
     return tuple(f"{sentence}." for sentence in sentences)
-
-
-def _seeded(one: Recording, other: Recording) -> str:
-    """Return the remedy for two runs of one virtual rig with one seed; empty otherwise."""
-    rig, seed = ([run.meta.get(key) for run in (one, other)] for key in ("rig", "seed"))
-    if rig[0] is None or seed[0] is None or rig[0] != rig[1] or seed[0] != seed[1]:
-        return ""
-    return f"run one of them again with `seed={int(seed[0]) + 1}`"
 
 
 def without_copies(

@@ -21,7 +21,7 @@ from mckibben.diagnosis.loops import (
     largest_of,
     loops_of,
 )
-from mckibben.diagnosis.memory import creep, dead_zones, minor_loop_errors, rate_dependence
+from mckibben.diagnosis.memory import creep, rate_dependence
 from mckibben.diagnosis.tracks import Range, prepare
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
@@ -41,7 +41,7 @@ REPEATS = 3
 
 SHAPE = {
     *("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid"),
-    *("dead_zone_upper", "dead_zone_lower", "closure_error", "rate_dependence", "speeds"),
+    *("rate_dependence", "speeds"),
 }
 """Quantities that are measured only if there is a loop."""
 
@@ -80,8 +80,6 @@ class Characterization(DrawsItself):
         Prandtl-Ishlinskii models; where it is wide, from -1 (low input) to 1 (high input).
     loop_area, loop_area_share : float or None
         Enclosed area [input unit x output unit], and its ratio to the bounding rectangle [%].
-    dead_zone_upper, dead_zone_lower : float or None
-        Change of the input after upper and lower reversals before the output moves [input unit].
     gain : float or None
         Slope of the mean of both branches at mid input [output unit/input unit].
     branch_gap, p_loop : float or None
@@ -93,8 +91,6 @@ class Characterization(DrawsItself):
         one cycle to the next between the same extremes.
     rate_dependence, speeds
         Increase of e_w at twice the speed [%], and the mean speeds compared [input unit/s].
-    closure_error : float or None
-        Return-point memory: output after a minor loop against that before it [%].
     loop_share : float
         Share of the output's variance that the input and its direction explain.
     n_stretches : int or None
@@ -129,8 +125,6 @@ class Characterization(DrawsItself):
     width_centroid: float | None = None
     loop_area: float | None = None
     loop_area_share: float | None = None
-    dead_zone_upper: float | None = None
-    dead_zone_lower: float | None = None
     gain: float | None = None
     branch_gap: float | None = None
     creep: float | None = None
@@ -138,7 +132,6 @@ class Characterization(DrawsItself):
     drift: float | None = None
     rate_dependence: float | None = None
     speeds: Range | None = None
-    closure_error: float | None = None
     loop_share: float = 0.0
     p_loop: float | None = None
     n_stretches: int | None = None
@@ -178,7 +171,7 @@ def characterize(
     *,
     scheduling: Sequence[str] = (),
 ) -> Characterization:
-    """Measure width and shape of the loop, memory, creep and rate dependence of a muscle.
+    """Measure width and shape of the loop, creep and rate dependence of a muscle.
 
     Sensor noise is averaged first, over samples within which the input moves by 1 % of its range.
     Ranges are those of all recordings together.
@@ -285,17 +278,13 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
     largest = largest_of(loops)
     gap, gap_limits, p_loop = gap_of(branches, scale.sign)
     growth, growth_limits, speeds = rate_dependence(loops) or (None, None, None)
-    upper, lower = dead_zones(tracks, scale)
     crept = creep(runs, given, wanted, scale)
     repeated: dict[str, Sequence[float | None]] = {
         **{name: [loop.figures[name] for loop in largest] for name in FIGURES},
         "gain": gains_of(branches, largest, scale),
-        "dead_zone_upper": upper,
-        "dead_zone_lower": lower,
         "creep": [moved for _, moved in crept],
         "creep_time": [time for time, _ in crept],
         "drift": drift(loops),
-        "closure_error": minor_loop_errors(tracks, scale),
     }
     known = {name: [x for x in each if x is not None] for name, each in repeated.items()}
     limits = {name: _interval(each) for name, each in known.items() if name != "creep_time"}

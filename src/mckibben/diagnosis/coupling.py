@@ -98,14 +98,3 @@ def coupling(
     explained = 1 - left / np.where(total > 0, total, 1.0)
     units = tuple(recordings[0].units[name] for name in outputs)
     return Coupling(tuple(inputs), tuple(outputs), effects, units, tuple(explained.tolist()))
-
-
-def fullest(recordings: Sequence[Recording], inputs: Sequence[str]) -> Recording:
-    """Return the recording whose least varying input varies most."""
-
-    def least(recording: Recording) -> float:
-        return float(min(np.ptp(recording[name]) / whole[name] for name in inputs))
-
-    spans = {name: np.concatenate([r[name] for r in recordings]) for name in inputs}
-    whole = {name: max(float(np.ptp(x)), np.finfo(float).tiny) for name, x in spans.items()}
-    return max(recordings, key=least)

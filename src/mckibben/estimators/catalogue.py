@@ -8,7 +8,7 @@ from typing import Any
 
 from mckibben import registry
 from mckibben.errors import ModelError
-from mckibben.estimators.core.estimator import DefaultFor, Estimator, Purpose
+from mckibben.estimators.core.estimator import Estimator, Purpose
 from mckibben.estimators.core.settings import check_settings
 
 
@@ -107,15 +107,6 @@ def summary(model: str) -> str:
     'ARX model, linear. Linear dynamics, in closed form.'
     """
     return f"{full_name(model)}. {ability(model)}"
-
-
-def default_model(use: DefaultFor) -> str:
-    """Return the default model of a use.
-
-    >>> default_model("load")
-    'mpi'
-    """
-    return next(n for n in registry.names("estimators") if declared(n).default_for == use)
 
 
 def defaults(model: str) -> dict[str, Any]:

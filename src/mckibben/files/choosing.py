@@ -162,20 +162,6 @@ def find_column(wanted: str, channel: str, source: Source) -> Column:
     raise source.error(problem, f"name one of them with `columns[{channel}]=COLUMN`", channel)
 
 
-def matrix_hint(table: Table, *, time: bool) -> str:
-    """Return a hint for a remedy if columns are those of a matrix, without meaningful names."""
-    columns = [column for column in table.columns if column.matrix]
-    if not columns:
-        return ""
-    hint = f", one of {listed([column.header for column in columns])}"
-    first = columns[0]
-    steps = np.diff([] if first.values is None else first.values)
-    usual = np.median(steps) if steps.size else 0.0
-    if time and usual > 0 and np.all(np.abs(steps - usual) < 0.5 * usual):
-        hint += f"; {first.header} rises evenly, as time does: `columns[time]={first.header}`"
-    return hint
-
-
 def _of_one_length(source: Source, fixed: Mapping[str, Column]) -> tuple[Source, dict[str, str]]:
     """Return the source with columns of the recording's length, and why others are left out."""
     columns = source.table.columns
@@ -254,9 +240,8 @@ def _require(named: Mapping[str, Column], source: Source) -> None:
     request, table = source.request, source.table
     for channel in request.channels or ():
         if channel not in named and channel not in source.derived(named):
-            hint = matrix_hint(table, time="time" not in named)
             problem = f"there is no such channel; the columns are {_headers(table)}"
-            remedy = f"name its column with `columns[{channel}]=COLUMN`{hint}"
+            remedy = f"name its column with `columns[{channel}]=COLUMN`"
             if others := [name for name in named if conversion(channel, name, 1.0)]:
                 remedy = f"state {REST_LENGTH}, which makes it of {others[0]}"
             raise source.error(problem, remedy, channel)

@@ -13,7 +13,7 @@ import numpy as np
 from mckibben.files import gaps as gaps_in
 from mckibben.files import sources, timebase
 from mckibben.files.channels import about
-from mckibben.files.choosing import Seen, matrix_hint, seen
+from mckibben.files.choosing import Seen, seen
 from mckibben.files.converting import ASSUMED, Times, in_package_units
 from mckibben.files.formats import MOST_BYTES
 from mckibben.files.notices import noted
@@ -209,8 +209,6 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
     times = clock if step is None else None
     if times is not None:
         times = replace(times, values=timebase.increasing(times.values, source))
-    elif step is None and (columns := matrix_hint(table, time=True)):
-        source.warn(f"no column of times is named; use `columns[time]=COLUMN`{columns}")
     pieces = gaps_in.pieces(channels, times, step, start, source)
     if request.informative:
         _refuse_constant(pieces, source)

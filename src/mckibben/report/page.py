@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mckibben.comparison.channels import any_moves, held_at_levels
+from mckibben.comparison.channels import any_moves
 from mckibben.diagnosis.check import Validation
-from mckibben.diagnosis.coupling import coupling, fullest
+from mckibben.diagnosis.coupling import coupling
 from mckibben.numerals import numeral
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
@@ -188,38 +188,21 @@ def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
     if study.characterization is not None:
         items += results.characterization(study.characterization)
     if not (len(board.inputs) == len(board.outputs) == 1):
-        items += _coupling(board, measured)
-    load = study.load
-    if load is not None and all(load in one.recording.channels for one in view.pictured):
-        runs = [one.recording for one in view.pictured]
-        held = held_at_levels(runs, load)
-        levels = view.each(
-            lambda one: subjects.loop_by(
-                runs if held else [one.recording], one.input, one.output, load, view.points
-            )
-        )[: 1 if held else None]
-        label = f"Output over input, coloured by {load}"
-        items.append(Figure("levels", levels, label, f"{label}.", "square"))
+        items.append(_coupling(board, measured))
     notes = [f"{file}: {'; '.join(said)}." for file, said in notes_by_file(measured).items()]
     notes += [note for note in study.notes if note not in reading_notes(measured)]
     items.append(Text(notes, "note", listed=True) if notes else None)
     return Section("recordings", "Recordings", items, view.names)
 
 
-def _coupling(board: Leaderboard, recordings: Sequence[Recording]) -> list[Any]:
-    """Return the coupling of inputs and outputs, if there are several."""
+def _coupling(board: Leaderboard, recordings: Sequence[Recording]) -> Table:
+    """Return the effects of several inputs on outputs."""
     found = coupling(list(recordings), board.inputs, board.outputs)
-    one = fullest(list(recordings), board.inputs)
-    label = f"Every output over every input, of {one.name}"
     rows: list[list[Any]] = [
         [f"{output} [{found.units[k]}]", *found.effects[k].tolist(), 100 * found.explained[k]]
         for k, output in enumerate(found.outputs)
     ]
-    plots = interactive.plots(subjects.matrix(one, found))
-    return [
-        Figure("coupling", [plots], label, f"{label}.", "matrix", min(len(found.inputs), 6)),
-        Table(["Effect of the whole range of", *found.inputs, "explained [%]"], rows),
-    ]
+    return Table(["Effect of the whole range of", *found.inputs, "explained [%]"], rows)
 
 
 def _method(study: Study, command: str) -> Section:

@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.diagnosis.coupling import Coupling
 from mckibben.recording import Recording
 from mckibben.report.drawing import (
     FEW,
@@ -32,12 +31,6 @@ from mckibben.report.drawing import (
 
 HELD_OUT = "held out to test"
 """Label of the part of a recording that no model was fitted to."""
-
-SMALL = 500
-"""Points of a small picture."""
-
-MOST = 6
-"""Inputs, and outputs, that are pictured."""
 
 
 def time_course(
@@ -214,57 +207,3 @@ def _colours(recordings: Sequence[Recording]) -> list[tuple[str, str]]:
 
 def _label(recording: Recording, channel: str) -> str:
     return axis_label(channel, recording.units[channel])
-
-
-def matrix(recording: Recording, found: Coupling, points: int = SMALL) -> Drawing:
-    """Draw every output (rows) over every input (columns), small; own pairs are in colour."""
-    panels = []
-    for output in found.outputs[:MOST]:
-        for name in found.inputs[:MOST]:
-            x, y = along(recording[name], recording[output], points)[1:]
-            colour = "series-1" if found.own(output, [recording]) == name else "input"
-            panels.append(
-                Panel(
-                    _label(recording, name),
-                    _label(recording, output),
-                    (Curve(x, y, "", colour, "fine"),),
-                )
-            )
-    note = left_out([*found.inputs[MOST:], *found.outputs[MOST:]])
-    return Drawing(tuple(panels), columns=min(len(found.inputs), MOST), note=note)
-
-
-def loop_by(
-    recordings: Sequence[Recording],
-    input_name: str,
-    output_name: str,
-    by: str,
-    points: int = POINTS,
-) -> Drawing:
-    """Draw output over input, coloured by a third channel, a load or a stiffness, from low to high."""
-    paths = [along(r[input_name], r[output_name], points) for r in recordings]
-    x, y = (np.concatenate([path[k] for path in paths]) for k in (1, 2))
-    level = np.concatenate(
-        [r[by][path[0].astype(int)] for r, path in zip(recordings, paths, strict=True)]
-    )
-    every = np.concatenate([r[by] for r in recordings])
-    edges = np.linspace(every.min(), every.max(), N_AGES + 1)
-    recording = recordings[0]
-    unit = f" {recording.units[by]}" if recording.units[by] else ""
-    which = np.clip(np.searchsorted(edges, level, side="right") - 1, 0, len(edges) - 2)
-    curves = []
-    for place in range(len(edges) - 1):
-        chosen = which == place
-        if chosen.any():
-            ends = dict.fromkeys(f"{end:.3g}" for end in (level[chosen].min(), level[chosen].max()))
-            name = f"{by} {' to '.join(ends)}{unit}"
-            colour = f"age-{place + 1}"
-            curves.append(Curve(x[chosen], y[chosen], name, colour, "specks"))
-    x_label, y_label = _label(recording, input_name), _label(recording, output_name)
-    return Drawing((Panel(x_label, y_label, tuple(curves)),))
-
-
-def third_channels(recording: Recording, used: Sequence[str]) -> list[str]:
-    """Return the channels for colouring a loop: varying ones that are not used already."""
-    free = [name for name in recording.channels if name not in used]
-    return [name for name in free if np.ptp(recording[name]) > 0][:N_COLOURS]

@@ -162,15 +162,12 @@ QUANTITIES = (
     ("loop area", "loop_area", "{u} {y}", "enclosed by the largest cycles"),
     ("loop area share", "loop_area_share", "%", "of its bounding rectangle; 100 for a relay"),
     ("mean branch gap", "branch_gap", "{y}", "falling less rising output, free of steady drift"),
-    ("dead zone after upper reversals", "dead_zone_upper", "{u}", "before the output moves back"),
-    ("dead zone after lower reversals", "dead_zone_lower", "{u}", "the same from below"),
     ("gain", "gain", "{y}/{u}", "slope of the mean of both branches at mid input"),
     ("creep", "creep", "{y}", "in a hold of all inputs; positive: in the direction of motion"),
     ("creep time", "creep_time", "s", "time over which creep was measured"),
     ("drift", "drift", "{y}", "from one cycle to the next between the same extremes"),
     ("rate dependence", "rate_dependence", "%", "growth of e_w at twice the speed"),
     ("speed compared", "speeds", "{u}/s", "mean speed of the input in cycles alike"),
-    ("closure error", "closure_error", "%", "output after a minor loop against that before"),
 )
 """Name, field, unit and meaning of every figure; of a field with two ends, both are given."""
 
@@ -402,17 +399,6 @@ def listing(names: Sequence[str]) -> str:
 
 
 # --- Bands and log reviews --------------------------------------------------------------------------
-
-
-def band_on_test(
-    level: float, coverage: Mapping[str, float], width: Mapping[str, float], unit: str
-) -> list[str]:
-    """Return, one sentence per output, the coverage of a band on the test, and its width."""
-    return [
-        f"The band for {percent(level, 3)} holds {percent(coverage[name], 3)} of the test's samples "
-        f"of {name}; its half width is {numeral(wide / 2, 2)} {unit} on average."
-        for name, wide in width.items()
-    ]
 
 
 def calibrated_on_blocks(found: Calibration) -> str:

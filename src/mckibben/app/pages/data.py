@@ -10,20 +10,18 @@ from typing import Any
 import numpy as np
 from nicegui import events, ui
 
-from mckibben import example, registry
+from mckibben import example
 from mckibben.app import together, widgets
 from mckibben.app.pages import importing
 from mckibben.app.state import State, view
 from mckibben.app.steps import Entry, Reading, Step
 from mckibben.app.terms import message_of
-from mckibben.app.virtual import FIRST, TITLES, record
 from mckibben.app.widgets import mark
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files import read
 from mckibben.files.formats import READERS
 from mckibben.recording import Recording
 from mckibben.report.figures import draw
-from mckibben.signals.protocol import protocol
 
 TITLE = "Data"
 ICON = "folder_open"
@@ -93,7 +91,6 @@ def start(state: State) -> None:
         with widgets.empty("show_chart", title, text), widgets.row():
             button = widgets.button("Open the example", partial(_changed, state, add), "science")
             mark(button, "example")
-            _virtual(state)
         _upload(state)
 
 
@@ -128,33 +125,6 @@ def shown(state: State) -> None:
     if state.inputs and state.outputs:
         text = "Channels and roles are right? Characterize the muscle."
         widgets.next_step(text, "Look", "/look")
-
-
-def _virtual(state: State) -> None:
-    """Offer to record a virtual muscle, of which there are runs to choose."""
-
-    def ask() -> None:
-        def offer() -> None:
-            found = {one.name: f"{one.name} ({one.role})" for one in protocol(str(rig.value)).runs}
-            runs.set_options(found, value=list(found)[:2])
-
-        def start() -> None:
-            if not runs.value:
-                raise DataError("no run is chosen", remedy="choose one under Runs")
-            title = names[rig.value]
-            state.jobs.submit(record, title, protocol=rig.value, runs=list(runs.value))
-            shown.close()
-
-        with widgets.dialog("Record a virtual muscle") as shown:
-            names = {name: TITLES.get(name, name) for name in registry.names("protocols")}
-            rig = mark(ui.select(names, value=FIRST, label="Rig"), "rig").props("dense outlined")
-            runs = ui.select([], multiple=True, with_input=True, label="Runs")
-            runs.props("dense outlined use-chips")
-            rig.on_value_change(offer)
-            offer()
-            mark(widgets.primary("Record", start), "record")
-
-    mark(widgets.button("Record a virtual muscle", ask, "smart_toy"), "virtual")
 
 
 # -- files ------------------------------------------------------------------------------------------
@@ -263,7 +233,6 @@ def _recordings(state: State, entries: list[Entry]) -> None:
             "judged by cross-validation alone."
         ).classes("muted")
     _upload(state)
-    _virtual(state)
 
 
 def _line(state: State, entry: Entry) -> list[Any]:

@@ -48,10 +48,6 @@ sample, or none.
 Grid = Mapping[str, tuple[Any, ...]]
 """Setting -> candidate values."""
 
-DefaultFor = Literal["load"]
-"""Where a model is the default: fitted to each load separately, in a comparison of models with a
-load input; or fitted for a plan of recordings.
-"""
 
 Start = Literal["first_sample", "virgin"]
 """State before the first sample of every recording, if it is not estimated."""
@@ -166,9 +162,6 @@ class Estimator(ABC):
 
     makes: ClassVar[tuple[str, ...]] = ()
     """Models that it can refit with as many operators, each by the kinds of its parts in order."""
-
-    default_for: ClassVar[DefaultFor | None] = None
-    """Where it is the default model."""
 
     effort: ClassVar[float] = 0.5
     """Approximate time of a fit to 10 000 samples [s]; comparisons start with the fastest models.

@@ -89,7 +89,6 @@ class MPIEstimator(SeparableEstimator):
     )
     inverse_kind = "exact"
     quick = True
-    default_for = "load"
     makes = ("pi polynomial",)
     effort: ClassVar[float] = 0.2
 
@@ -321,7 +320,6 @@ RDPI = preset(
     caution="weights that follow the rate are arbitrary at other rates",
     inverse_kind="solved",
     quick=False,
-    default_for=None,
     makes=("rate-dependent-pi polynomial",),
     needs_time=True,
     effort=0.9,

@@ -300,8 +300,7 @@ class Polynomial(Invertible):
         if slopes.min() < -1e-12 * np.abs(slopes).max() or slopes.max() <= 0:
             raise ModelError(
                 "'polynomial' has no inverse: it does not increase over its whole input range",
-                remedy="identify it with `settings[output_map]=piecewise-linear`, or "
-                "`settings[monotone]=true`",
+                remedy="identify it with `settings[output_map]=polynomial`, which increases",
             )
 
     def inverse_numbers(self, own: Array) -> Array:

@@ -43,7 +43,7 @@ from mckibben.blocks.learning import (
     start_learning,
 )
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import solved_inverse
+from mckibben.blocks.solving import solved_kernels
 
 
 @summing_step
@@ -190,30 +190,12 @@ class PI(Invertible):
         )
 
 
-@summing_step
-def rate_pi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Advance the model; coefficients are [smoothing, gain of the rate, offset, thresholds, k, d].
-
-    The state is [operators, previous input, filtered rate].
-    """
-    n = state.size - 2
-    r = coefficients[3 : n + 3]
-    k, d = coefficients[n + 3 : 2 * n + 3], coefficients[2 * n + 3 :]
-    u = inputs[0]
-    rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
-    static = 0.0
-    dynamic = 0.0
-    for i in range(n):
-        s = min(max(state[i], u - r[i]), u + r[i])
-        state[i] = s
-        static += d[i] * s
-        dynamic += k[i] * s
-    outputs[0] = coefficients[2] + static + rate * dynamic
-    state[n], state[n + 1] = u, rate
-
-
 @kernel
-def _rate_trial(u: float, memory: tuple[Array, Array]) -> float:
+def rate_pi_output(u: float, memory: tuple[Array, Array]) -> float:
+    """Return the output at an input; the state is [operators, previous input, filtered rate].
+
+    Coefficients are [smoothing, gain of the rate, offset, thresholds, k, d].
+    """
     coefficients, state = memory
     n = state.size - 2
     r = coefficients[3 : n + 3]
@@ -226,7 +208,8 @@ def _rate_trial(u: float, memory: tuple[Array, Array]) -> float:
 
 
 @kernel
-def _rate_advance(u: float, coefficients: Array, state: Array) -> None:
+def rate_pi_advance(u: float, coefficients: Array, state: Array) -> None:
+    """Update the state to an input."""
     n = state.size - 2
     for i in range(n):
         r = coefficients[3 + i]
@@ -268,9 +251,10 @@ class RateDependentPI(Invertible):
     kind = "rate-dependent-pi"
     settable: ClassVar[Mapping[str, str | None]] = {"rate_time_constant": None}
     solved = True
-    kernel = rate_pi_step
     start_kernel = rate_pi_start
-    inverse_kernel, inverse_start_kernel = solved_inverse(_rate_trial, _rate_advance, rate_pi_start)
+    kernel, inverse_kernel, inverse_start_kernel = solved_kernels(
+        rate_pi_output, rate_pi_advance, rate_pi_start
+    )
     inverse_remembers = "input"
     rate_dependent = True
     increasing = ("thresholds",)

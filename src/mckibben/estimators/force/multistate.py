@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -24,7 +23,6 @@ from mckibben.blocks.force.multistate_friction import (
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.force.laws import ORDERS, Law, force_columns, force_law
-from mckibben.estimators.optimisers.multi_start import Choice
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
 from mckibben.recording import Recording, listed
@@ -33,10 +31,6 @@ Structure = Literal["eleven", "each-way", "eighteen"]
 STRUCTURES = {"eleven": ELEVEN, "each-way": EACH_WAY, "eighteen": EIGHTEEN}
 LEAST_SHARE = 1e-5
 """Smallest force of an element, relative to the range of the output."""
-
-LENGTHS = np.geomspace(0.02, 1.0, 8)
-TIMES = (0.1, 10.0)
-"""Initial break-away lengths of elements, relative to the range, and times [samples]."""
 
 
 def extract_hysteresis(
@@ -74,7 +68,7 @@ def extract_hysteresis(
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class MultistateEstimator(SeparableEstimator):
-    """Multistate friction by bounded least squares from many starts, with exchange of elements.
+    """Multistate friction by bounded least squares from many starts.
 
     Break-away lengths and relaxation times are searched; stiffnesses, and a static law, are solved
     for. With ``static=None`` the output is taken to be the hysteresis alone, as the paper does
@@ -155,25 +149,6 @@ class MultistateEstimator(SeparableEstimator):
                     theta += [length, time] * pairs
                 guesses.append(np.array(theta))
         return guesses
-
-    def choices(self, data: TrainingData) -> list[Choice]:
-        """Return candidate lengths and times for every element, others fixed.
-
-        The cost has many local minima, in which one element does another's work: which of them the
-        best of many starts ends in is left to rounding.
-        """
-        low, high = data.input_range
-        lengths = np.log((high - low) * LENGTHS)
-        times = np.log((data.sample_time or 1.0) * np.array(TIMES))
-        found, first = [], 0
-        for pairs in self._pairs():
-            values = [
-                np.ravel([(length, time) for length in tried])
-                for time, tried in product(times, product(lengths, repeat=pairs))
-            ]
-            found.append(Choice(np.arange(first, first + 2 * pairs), np.array(values)))
-            first += 2 * pairs
-        return found
 
     def _unit(self, place: int, theta: Array) -> MultistateFriction:
         """Return one element with stiffnesses of 1."""
@@ -268,7 +243,7 @@ MULTISTATE = preset(
 
 MULTISTATE_11 = preset(
     MultistateEstimator,
-    "Multistate friction by bounded least squares from many starts, and exchange of elements.",
+    "Multistate friction by bounded least squares from many starts.",
     title="Multistate friction with eleven parameters",
     can="The paper's friction model of eleven parameters.",
     cannot="Structure of the paper's muscle; multistate selects one for yours.",

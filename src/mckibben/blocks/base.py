@@ -90,7 +90,7 @@ class Block(DrawsItself, Parametrised):
     input range without data.
     """
 
-    undoing: ClassVar[bool] = False
+    inverts: ClassVar[bool] = False
     """Whether blocks of this class invert another block, see `forward_model`."""
 
     no_inverse: ClassVar[str] = "has no exact inverse"

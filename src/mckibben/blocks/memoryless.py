@@ -229,7 +229,9 @@ def polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: A
 
 
 @step
-def undo_polynomial(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+def polynomial_inverse_step(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
     """Invert an increasing polynomial; the state is the count of samples clipped.
 
     Coefficients are [centre, scale, lowest, highest argument, ascending coefficients].
@@ -272,7 +274,7 @@ class Polynomial(Invertible):
 
     kind = "polynomial"
     kernel = polynomial_step
-    inverse_kernel = undo_polynomial
+    inverse_kernel = polynomial_inverse_step
     inverse_start_kernel = nothing_clipped
     parameters = ("polynomial",)
     layout = ("centre", "scale", "polynomial")

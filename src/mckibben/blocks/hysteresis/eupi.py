@@ -103,7 +103,7 @@ class EUPI(Invertible):
 
     kind = "eupi"
     solved = True
-    inverse_remembers = "input"
+    inverse_memory = "input"
     start_kernel = eupi_start
     kernel, inverse_kernel, inverse_start_kernel = solved_kernels(
         eupi_output, eupi_advance, eupi_start
@@ -170,6 +170,6 @@ class EUPI(Invertible):
         reversible = self.thresholds[0] == 0 and self.falling_slope <= 1
         return float(slope + (self.weights[0] if reversible else 0.0))
 
-    def remembered(self, state: Array) -> tuple[float, ...]:
+    def stored_for_inverse(self, state: Array) -> tuple[float, ...]:
         """Return the lowest input, as operators do not determine the last one."""
         return (self.input_range[0],)

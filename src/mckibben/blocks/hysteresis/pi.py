@@ -100,8 +100,8 @@ def pi_adaptive_step(
     """Advance the inverse of a PI model, and adapt its weights and offset to measurements."""
     n = int(coefficients[0]) - 1
     r = coefficients[inverse_at(coefficients) + 3 : inverse_at(coefficients) + n + 3]
-    s, last, learnt = state[:n], state[n : n + 3], state[n + 3 :]
-    follow_learning(coefficients, r, s, last, learnt, scratch, inputs[0], inputs[1])
+    s, last, adapted = state[:n], state[n : n + 3], state[n + 3 :]
+    follow_learning(coefficients, r, s, last, adapted, scratch, inputs[0], inputs[1])
     outputs[0] = s[0]
 
 
@@ -137,7 +137,7 @@ class PI(Invertible):
     start_kernel = pi_start
     inverse_kernel = pi_inverse_step
     inverse_start_kernel = pi_inverse_start
-    inverse_remembers = "output"
+    inverse_memory = "output"
     increasing = ("thresholds",)
     parameters = ("weights", "offset")
     n_states = one_per("thresholds")  # one a play operator
@@ -174,7 +174,7 @@ class PI(Invertible):
         """Return [lowest, highest input, offset, thresholds, weights]."""
         return np.array([*self.input_limits, *own])
 
-    def remembered(self, state: Array) -> tuple[float, ...]:
+    def stored_for_inverse(self, state: Array) -> tuple[float, ...]:
         return (self.offset + np.dot(self.weights, state),)
 
     @property
@@ -255,7 +255,7 @@ class RateDependentPI(Invertible):
     kernel, inverse_kernel, inverse_start_kernel = solved_kernels(
         rate_pi_output, rate_pi_advance, rate_pi_start
     )
-    inverse_remembers = "input"
+    inverse_memory = "input"
     rate_dependent = True
     increasing = ("thresholds",)
     parameters = ("rate_weights", "weights", "offset")
@@ -299,7 +299,7 @@ class RateDependentPI(Invertible):
         check_invertible_sum(self.kind, self.thresholds, self.weights)
         super().check_invertible()
 
-    def remembered(self, state: Array) -> tuple[float, ...]:
+    def stored_for_inverse(self, state: Array) -> tuple[float, ...]:
         return (float(state[-2]),)
 
     def reachable(self) -> tuple[Array, Array]:

@@ -400,7 +400,7 @@ class KrasnoselskiiPokrovskii(Triangle, Invertible):
     kind = "krasnoselskii-pokrovskii"
     typical = Triangle.near_diagonal(4.0)
     solved = True
-    inverse_remembers = "input"
+    inverse_memory = "input"
     start_kernel = ridges_start
     kernel, inverse_kernel, inverse_start_kernel = solved_kernels(
         ridges_output, ridges_advance, ridges_start
@@ -428,6 +428,6 @@ class KrasnoselskiiPokrovskii(Triangle, Invertible):
             return float(least / np.diff(self.levels).min())
         return float(np.min(on_diagonal(self.weights) / np.diff(self.levels)))
 
-    def remembered(self, state: Array) -> tuple[float, ...]:
+    def stored_for_inverse(self, state: Array) -> tuple[float, ...]:
         """Return the last input, within the levels."""
         return (float(np.clip(state[-1], *self.input_range)),)

@@ -79,7 +79,7 @@ class Run:
     def condensed(self) -> Run:
         """Return the run reduced to scored samples and turning points of the input.
 
-        Play operators do not feel how the input went from one turning point to the next. Turns within
+        Play operators do not depend on the path between turning points. Turns within
         the noise go too, so this is for searching, not for the final word.
         """
         from mckibben.signals import reversals

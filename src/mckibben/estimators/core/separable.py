@@ -197,7 +197,7 @@ class SeparableEstimator(Estimator):
             max_evaluations=self.polish_evaluations,
             jacobian=jacobian,
         )
-        tracker.saw_all(own)
+        tracker.update_from(own)
         return best
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:
@@ -273,7 +273,7 @@ class SeparableEstimator(Estimator):
             own = tracker.part(place / len(values), (place + 1) / len(values))
             settings = self.get_params() | {setting: value}
             found.append((type(self)(**settings).identify(data, own), own))
-            tracker.saw_all(own)
+            tracker.update_from(own)
         block, best = min(found, key=lambda item: item[1].best_cost)
         tracker.best_cost, tracker.best = best.best_cost, best.best
         return block

@@ -416,7 +416,7 @@ class BalanceEstimator(CoupledEstimator):
             z[: len(structure.terms)] = structure.begin(grip * structure.bench.highest)
             z = problem.balanced(structure, z, search.active)
             starts.append((search.cost(z), z))
-            tracker.saw(z, starts[-1][0])
+            tracker.update(z, starts[-1][0])
         return min(starts, key=lambda start: start[0])[1]
 
     def _likely(self, search: Search) -> Array:

@@ -136,7 +136,7 @@ class Search:
         damping, slow = FIRST_DAMPING, 0
         errors, slopes = self.errors(z, self.active)
         cost = _size(errors)
-        tracker.saw(z, cost)
+        tracker.update(z, cost)
         for _ in range(steps):
             usable = np.isfinite(slopes).all(axis=1) & np.isfinite(errors)
             moving = slopes[usable][:, self.free]
@@ -156,7 +156,7 @@ class Search:
                 return z
             slow = slow + 1 if found > (1.0 - SLOW) * cost else 0
             z, cost = tried, found
-            tracker.saw(z, cost)
+            tracker.update(z, cost)
             if slow >= SLOWEST:
                 return z
             damping = max(damping / 5.0, LIGHTEST**2)

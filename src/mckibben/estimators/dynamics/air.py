@@ -116,7 +116,7 @@ class AirEstimator(SeparableEstimator):
             for late in asked:
                 own = tracker.part(1 - 0.7 ** len(tried), 1 - 0.7 ** (len(tried) + 1))
                 tried[late] = self._at(late, data, own)
-                tracker.saw_all(own)
+                tracker.update_from(own)
             best = min(tried, key=lambda late: tried[late][0])
             near = (best - 1, best + 1, best - 2, best + 2)
             asked = [late for late in near if 0 <= late <= most and late not in tried][:2]
@@ -203,7 +203,7 @@ class AirEstimator(SeparableEstimator):
         best = multi_start(
             residuals, [start], lower, upper, own, n_refined=1, max_evaluations=POLISHED
         )
-        tracker.saw_all(own)
+        tracker.update_from(own)
         without = best.copy()
         without[2] = 0.0
         cost, least = (float(np.sqrt(np.mean(residuals(p) ** 2))) for p in (best, without))

@@ -179,7 +179,7 @@ class PredictionErrorEstimator(Estimator):
             runs = tuple(replace(run, outputs=run.outputs[:, [place]]) for run in data.runs)
             own = tracker.part(place * share, (place + 1) * share)
             parts += self._of_output(replace(data, runs=runs, outputs=(output,)), own)
-            tracker.saw_all(own)
+            tracker.update_from(own)
         return (parts[0] if self.single else Parallel(tuple(parts))), data
 
     def _of_output(self, data: TrainingData, tracker: Tracker) -> tuple[TransferFunction, ...]:
@@ -211,7 +211,7 @@ class PredictionErrorEstimator(Estimator):
             runs = known  # a free run needs no outputs, so it alone goes on where they do not count
         if orders.c == orders.d == orders.f == 0:
             theta = arx(runs, orders)
-            tracker.saw(theta, evaluate(theta, orders, runs, start)[2])
+            tracker.update(theta, evaluate(theta, orders, runs, start)[2])
         else:
             plant = replace(orders, c=0, d=0)
             if plant.f:
@@ -222,7 +222,7 @@ class PredictionErrorEstimator(Estimator):
             if plant != orders:
                 own = tracker.part(0.5, 1.0)
                 theta = minimise(runs, orders, [with_noise(theta, orders, runs)], own, start)
-                tracker.saw_all(own)
+                tracker.update_from(own)
                 tracker.best, tracker.best_cost = own.best, own.best_cost
         theta[: orders.zeros] *= np.repeat(wanted / given, orders.b)
         theta[-1] *= wanted

@@ -493,7 +493,7 @@ class FreeRuns:
         half = self.model.output_scale[1]
         errors = (self.outputs(self.model.unpack(theta))[self.counts] - self.target) / half
         errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
-        self.tracker.saw(theta, half * float(np.sqrt(np.mean(errors**2))))
+        self.tracker.update(theta, half * float(np.sqrt(np.mean(errors**2))))
         return errors
 
     def slopes(self, theta: Array) -> Array:

@@ -107,14 +107,14 @@ class CreepPIEstimator(SeparableEstimator):
             return super().identify(data, tracker)
         first, second = tracker.part(0.0, 0.5), tracker.part(0.5, 0.9)
         settled = self._with(settled=True).identify(data, first)
-        tracker.saw_all(first)
+        tracker.update_from(first)
         tracker.best, tracker.best_cost = first.best, first.best_cost
-        begun = self._with(settled=False).identify(data, second)
-        tracker.saw_all(second)
+        estimated = self._with(settled=False).identify(data, second)
+        tracker.update_from(second)
         if not second.best_cost < HELPS * first.best_cost:
             return settled
         tracker.best, tracker.best_cost = second.best, second.best_cost
-        return begun
+        return estimated
 
     def _with(self, **settings: bool) -> Self:
         """Return the same estimator with other settings."""
@@ -140,7 +140,7 @@ class CreepPIEstimator(SeparableEstimator):
             return 0
         return self.n_creep * (1 + max(run.place for run in data.runs))
 
-    def begun(self, theta: Array, run: Run, data: TrainingData) -> Array:
+    def initial_creep(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the decay of initial creep over a run, (n, n_initial).
 
         What an element was behind by, times its compliance, is one number an element and a run.
@@ -157,7 +157,7 @@ class CreepPIEstimator(SeparableEstimator):
     ) -> Array:
         """Return its derivatives by the logarithms of the time constants, (n, n_creep)."""
         taus, _ = self.tail(theta)
-        columns = self.begun(theta, run, data) * left
+        columns = self.initial_creep(theta, run, data) * left
         by_element = columns.reshape(len(columns), -1, self.n_creep).sum(axis=1)
         return np.asarray(by_element * elapsed(run)[:, np.newaxis] / taus)
 
@@ -210,7 +210,7 @@ class CreepPIEstimator(SeparableEstimator):
         crept = with_creep(
             PolynomialMap(self.map_size).pieces(x), *self.creep(theta), run.sample_time
         )
-        return np.hstack([crept, self.begun(theta, run, data)])
+        return np.hstack([crept, self.initial_creep(theta, run, data)])
 
     def argument(self, theta: Array, run: Run, data: TrainingData) -> tuple[Array, Array]:
         """Return the argument of the map, 0 to 1, and its derivatives by the relative weights."""

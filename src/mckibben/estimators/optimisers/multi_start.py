@@ -40,13 +40,13 @@ def multi_start(
 
     def evaluate(point: Array) -> Array:
         r = residuals(point)
-        tracker.saw(point, float(np.sqrt(np.mean(r**2))))
+        tracker.update(point, float(np.sqrt(np.mean(r**2))))
         return r
 
     def cost(point: Array) -> float:
         return float(np.mean(evaluate(point) ** 2))
 
-    def begun(start: Array) -> tuple[Array, float]:
+    def evaluated(start: Array) -> tuple[Array, float]:
         inside = np.clip(start, lower, upper)
         return inside, cost(inside)
 
@@ -72,29 +72,29 @@ def multi_start(
             gtol=None,
         )
 
-    follow_best(starts, begun, refine, n_refined)
+    follow_best(starts, evaluated, refine, n_refined)
     assert tracker.best is not None
     return tracker.best
 
 
 def follow_best(
     starts: Iterable[Array],
-    begun: Callable[[Array], tuple[Array, float]],
-    followed: Callable[[Array], object],
+    first_steps: Callable[[Array], tuple[Array, float]],
+    refine: Callable[[Array], object],
     most: int,
     same: float = -1.0,
 ) -> None:
     """Evaluate many starts, and refine the best ``most`` of them.
 
-    ``begun`` leads from a start to a place not far from it, and the cost there. Starts whose costs
+    ``first_steps`` leads from a start to a place not far from it, and the cost there. Starts whose costs
     differ by up to ``same``, relatively, have come to one place, which is followed once.
     """
-    tried = sorted((begun(start) for start in starts), key=lambda found: found[1])
+    tried = sorted((first_steps(start) for start in starts), key=lambda found: found[1])
     costs: list[float] = []
     for place, cost in tried:
         if len(costs) < most and all(abs(cost - other) > same * cost for other in costs):
             costs.append(cost)
-            followed(place)
+            refine(place)
 
 
 def trust_region(

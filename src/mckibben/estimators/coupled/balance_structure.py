@@ -222,13 +222,13 @@ class Structure:
     def shape(self) -> dict[str, slice]:
         """Index of the nonlinear parameters, after the linear coefficients.
 
-        The grip [bar]; what friction grows with by schedules; the logarithms of the ratio of limits and
-        of the lags; stretch of walls [mm/bar], forces at which muscles go slack, places of obstacles;
-        time constants of air in front, while filling [s], the logarithm of the ratio of venting, the
+        The friction offset [bar] and its slopes by scheduling inputs; the logarithms of the ratio of
+        limits and of the lags; stretch of walls [mm/bar], forces at which muscles go slack, places of
+        obstacles; time constants of air in front, while filling [s], the logarithm of the ratio of venting, the
         dead zone [bar], and the pressure over which one fades [bar].
         """
         n_x = len(self.bench.scheduled)
-        widths = {"grip": 1, "grips": n_x, "asymmetry": 1, "lags": self.n_lags}
+        widths = {"friction_offset": 1, "friction_slopes": n_x, "asymmetry": 1, "lags": self.n_lags}
         widths |= {"walls": 1, "pushes": self.n, "places": self.m * len(self.obstacles)}
         widths |= {"filling": 1, "venting": 1, "dead": 1, "contact": 1}
         return _slices(widths, self.n_linear)
@@ -316,10 +316,14 @@ class Structure:
         n = self.mix.shape[1]
         return np.concatenate([self.base + self.mix @ free[:n], free[n:]])
 
-    def begin(self, grip: float) -> Array:
+    def begin(self, friction_offset: float) -> Array:
         """Return initial free parameters: without effect, except the friction offset."""
         free = np.zeros(len(self.terms))
-        put: dict[str, ArrayLike] = {"grip": grip, "lags": np.log(self.lags), "pushes": NEVER}
+        put: dict[str, ArrayLike] = {
+            "friction_offset": friction_offset,
+            "lags": np.log(self.lags),
+            "pushes": NEVER,
+        }
         low = self.bench.lowest[:, np.newaxis]
         put["places"] = (low + np.outer(self.bench.travel, [p for _, p in self.obstacles])).ravel()
         for name, numbers in put.items():
@@ -369,8 +373,8 @@ class Structure:
         per_x = bench.highest / bench.largest
         ratio, (shortest, longest) = np.log(MOST_ASYMMETRIC), np.log(bench.lag_range)
         ends: dict[str, tuple[ArrayLike, ArrayLike, ArrayLike]] = {
-            "grip": (0.0, MOST_GRIP * bench.highest, bench.highest),
-            "grips": (0.0, MOST_GRIP * per_x, per_x),
+            "friction_offset": (0.0, MOST_GRIP * bench.highest, bench.highest),
+            "friction_slopes": (0.0, MOST_GRIP * per_x, per_x),
             "asymmetry": (-ratio, ratio, 1.0),
             "lags": (shortest, longest, 1.0),
             "walls": (0.0, MOST_WALL * much, 0.2 * MOST_WALL * much),
@@ -405,7 +409,10 @@ class Structure:
         merged = final and taut and not bench.directed
         if merged:
             springs[np.arange(m), 1 + np.arange(m)] += bladders
-        grips, ratio = self.shaped(values, "grips"), float(self.shaped(values, "asymmetry")[0])
+        friction_slopes, ratio = (
+            self.shaped(values, "friction_slopes"),
+            float(self.shaped(values, "asymmetry")[0]),
+        )
         sides = [[side] for side, _ in self.obstacles]
         met = [np.hstack([sides, self.met(values, j)]).ravel() for j in range(m if sides else 0)]
         heavy = not final or of["mass"].any()
@@ -422,8 +429,8 @@ class Structure:
             bladders=() if merged else vector(bladders),
             pushes=() if taut else vector(pushes),
             limits=self.limits,
-            grip=float(self.shaped(values, "grip")[0]),
-            grips=vector(grips) if not final or grips.any() else (),
+            friction_offset=float(self.shaped(values, "friction_offset")[0]),
+            friction_slopes=vector(friction_slopes) if not final or friction_slopes.any() else (),
             asymmetry=None if final and ratio == 1.0 else ratio,
             obstacles=rows(np.array(met)),
             lags=vector(self.shaped(values, "lags")),

@@ -117,8 +117,8 @@ class BalanceEstimator(CoupledEstimator):
         ``obstacle`` either way, springs by squares of what schedules (``springs``), friction that grows
         with scheduling inputs (``friction_slopes``) or differs by direction (``asymmetry``), stretch of
         the wall (``walls``), air's lag in front (``filling``, ``venting``), a ``dead`` zone, or one that
-        fades (``contact``), ``muscles`` that differ, and that go ``slack``. Each is added if the error of what
-        is left out falls by more than its standard error. Default all.
+        fades (``contact``), ``muscles`` that differ, and that go ``slack``. Each is added if the error
+        of what is left out falls by more than its standard error. Default all.
     friction : {"pressure", "constant"}
         Whether the forces at which stops break away grow with pressure.
     n_stops : int

@@ -224,8 +224,8 @@ class Structure:
 
         The friction offset [bar] and its slopes by scheduling inputs; the logarithms of the ratio of
         limits and of the lags; stretch of walls [mm/bar], forces at which muscles go slack, places of
-        obstacles; time constants of air in front, while filling [s], the logarithm of the ratio of venting, the
-        dead zone [bar], and the pressure over which one fades [bar].
+        obstacles; time constant of the air in front while filling [s], the logarithm of the ratio to
+        that while venting, the dead zone [bar], and the pressure over which one fades [bar].
         """
         n_x = len(self.bench.scheduled)
         widths = {"friction_offset": 1, "friction_slopes": n_x, "asymmetry": 1, "lags": self.n_lags}

@@ -111,7 +111,7 @@ def balance() -> Balance:
         damping=(0.1,) * 3,
         walls=(0.05,) * 3,
         limits=(0.02, 0.06, 0.2, 0.6, 1.8, 5.0),
-        grip=0.5,
+        friction_offset=0.5,
         lags=(0.8, 12.0),
         hull=((-20.0, 50.0),) * 3,
         scale=50.0,

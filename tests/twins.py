@@ -832,7 +832,11 @@ class _Parallel:
             return [0.0] * len(self.stops[k])
         block, dz = self.block, y + self.block.walls[k] * p - self.z[k]
         scheduling = self.scheduling(x)
-        pressed = p + block.grip + _sum(block.grips or (0.0,) * len(scheduling), scheduling)
+        pressed = (
+            p
+            + block.friction_offset
+            + _sum(block.friction_slopes or (0.0,) * len(scheduling), scheduling)
+        )
         return [
             min(max(s + dz, -(block.asymmetry or 1.0) * width), width)
             for s, width in zip(

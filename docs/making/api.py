@@ -55,7 +55,7 @@ USES = {
         "Invert a model, close the loop",
         "mckibben: invert track; mckibben.studying.results: Inverse Tracking; "
         "mckibben.control: track Tracked control_law Controller BlockController tune_pid "
-        "DisturbanceObserver EstimatedLoad Twin dead_time_undone previewed before Before slow_rise "
+        "DisturbanceObserver EstimatedLoad Twin preview_time previewed before Before slow_rise "
         "uncompensated; mckibben.stream: run FixedRate Deadlines Step",
     ),
     "rigs": Use(

@@ -193,14 +193,14 @@ def compensates(block: Any) -> bool:
 
 def described(block: Any) -> Any:
     """Return the block whose equations are shown: for `balance`, those solved for the pressure."""
-    return block.forward if block.undoing else block
+    return block.forward if block.inverts else block
 
 
 def inverse(block: Any) -> str:
     """Return a description of a model's inverse."""
     if compensates(block):
         return "the model is itself a compensator"
-    if block.undoing:
+    if block.inverts:
         return "yes, explicit: the equations are solved for the pressure"
     try:
         found = block.inverse()

@@ -59,7 +59,7 @@ class ElasticPlastic(Invertible):
     kind = "elastic-plastic"
     start_kernel = elastic_plastic_start
     kernel, inverse_kernel, inverse_start_kernel = solved_kernels(trial, advance, start_kernel)
-    solved, inverse_remembers = True, "input"
+    solved, inverse_memory = True, "input"
     parameters = ("gain", "weight", "threshold")  # the kernel's coefficients, in this order
     typical = (4.0, -1.5, 0.4, (0.0, 5.0))  # arguments of `example`, which the tests use
     notation = Notation(

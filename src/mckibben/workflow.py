@@ -322,7 +322,7 @@ def track(
     from mckibben.blocks.base import Block
     from mckibben.blocks.feedback import FeedforwardFeedback
     from mckibben.blocks.inverse import drives
-    from mckibben.control import BlockController, before, control_law, dead_time_undone, tune_pid
+    from mckibben.control import BlockController, before, control_law, preview_time, tune_pid
     from mckibben.control import track as close
     from mckibben.control.identified import beyond_known
     from mckibben.control.roles import asked, offered
@@ -359,7 +359,7 @@ def track(
             lambda: tune_pid(plant, sample_time=step, scheduled=held, references=block.inputs),
         )
         if controller_file is not None:
-            ahead = dead_time_undone(block) if chosen.preview is None else chosen.preview
+            ahead = preview_time(block) if chosen.preview is None else chosen.preview
             ahead += block.samples_ahead * step
             if not isinstance(law, Block) or (
                 isinstance(law, FeedforwardFeedback) and ahead > step
@@ -459,7 +459,7 @@ def _inverse(
     if not chosen.adaptive:
         if (feedforward := ForceFeedforward.of(block)) is not None:
             return Inverse(feedforward, "feedforward")
-        if not block.undoing and drives(block.outputs[0]) and not drives(block.inputs[0]):
+        if not block.inverts and drives(block.outputs[0]) and not drives(block.inputs[0]):
             return Inverse(block, "itself")
     kind = "adaptive" if chosen.adaptive else "inverse"
     time = 60.0 if chosen.time is None else chosen.time

@@ -150,7 +150,7 @@ def test_a_memory_that_never_came_of_running_is_refused() -> None:
     block = Adaptive(PI.example(), 10.0, 0.05)
     memory = block.resumed(experienced(block, 2.0)[0]).memory
     assert memory is not None
-    for place in (-block.n_learnt + 2 * block.learnable.fitted.size, -SENSES + READY):
+    for place in (-block.n_adapted + 2 * block.learnable.fitted.size, -SENSES + READY):
         spoilt = np.array(memory)
         spoilt[place] = -1.0
         with pytest.raises(ModelError, match="'adaptive'"):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.adaptive import Adaptive, adaptive
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_adaptive import FRICTION, STIFFNESS, learnt_of, ratios
+from mckibben.blocks.coupled.balance_adaptive import FRICTION, STIFFNESS, adaptable_of, ratios
 from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.laws import wander
 from tests.blocks.balances import ALONE, CROWDED, HIGHEST, STEP, balances, in_series
@@ -98,7 +98,7 @@ SINGLE = replace(ALONE, settled=True, loads=((),), scheduled=())
 def factors(block: Adaptive, state: Array) -> Array:
     """Return the estimated parameters of a learner's state."""
     size = block.learnable.fitted.size
-    return state[-block.n_learnt :][:size]
+    return state[-block.n_adapted :][:size]
 
 
 def followed(block: Adaptive, plant: Any) -> tuple[Array, Array]:
@@ -116,7 +116,7 @@ def followed(block: Adaptive, plant: Any) -> tuple[Array, Array]:
 @pytest.mark.parametrize(("kind", "factor"), [(STIFFNESS, 0.85), (FRICTION, 1.3)])
 def test_what_changed_is_compensated_and_found(kind: int, factor: float) -> None:
     block = Adaptive(Inverse(SINGLE), 20.0, 0.02)
-    kinds = np.array([one for _, one in learnt_of(SINGLE)])
+    kinds = np.array([one for _, one in adaptable_of(SINGLE)])
     plant = SINGLE.learnable.with_parameters(
         np.where(kinds == kind, factor, SINGLE.learnable.fitted)
     )
@@ -129,7 +129,7 @@ def test_what_changed_is_compensated_and_found(kind: int, factor: float) -> None
 def test_whatever_a_balance_is_in_series_with_it_learns() -> None:
     """Three muscles under a load, on two coordinates: late measurements teach nothing false."""
     balance = CROWDED
-    kinds = np.array([kind for _, kind in learnt_of(balance)])
+    kinds = np.array([kind for _, kind in adaptable_of(balance)])
     changes = np.where(kinds == STIFFNESS, 1.2, balance.learnable.fitted)
     aged = balance.learnable.with_parameters(changes).inverse()
     assert isinstance(aged, Balance)

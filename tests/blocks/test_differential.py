@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import ModelError, Parallel, Recording
+from mckibben.blocks.dynamics.state_network import StateNetwork
 from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.multistate_friction import EIGHTEEN, MultistateFriction
 from mckibben.blocks.hysteresis.differential import BoucWen, GeneralizedBoucWen
@@ -52,23 +53,28 @@ def test_it_rests_where_a_slow_force_leads(model: Any, force: float) -> None:
 
 def test_steady_state_is_what_a_force_that_repeats_leads_to() -> None:
     """A band-limited period gives the response of the same one sampled more finely."""
+    model = replace(StateNetwork.example(), rate=200.0, substeps=10)
     rng, n, ratio = np.random.default_rng(0), 300, 5
     lines = np.zeros(n // 2 + 1, dtype=complex)
     lines[4:30] = np.exp(2j * np.pi * rng.random(26))
-    u = np.fft.irfft(lines, n) * 600.0
-    steady = HARD.steady_state(Recording({"force": u}, STEP))["displacement"]
+    u = np.fft.irfft(lines, n) * 30.0
+    steady = model.steady_state(Recording({"force": u}, STEP))["displacement"]
     fine = np.fft.irfft(np.append(lines, np.zeros((20 * ratio - 1) * n // 2)), 20 * ratio * n)
-    fine *= 600.0 * 20 * ratio
-    finely = replace(HARD, substeps=1)
+    fine *= 30.0 * 20 * ratio
+    finely = replace(model, substeps=1)
     long = finely.simulate(np.tile(fine, 8), sample_time=STEP / (20 * ratio))
     late = long[-fine.size :: 20 * ratio]
     np.testing.assert_allclose(steady, late, atol=2e-4 * np.ptp(late))
-    from_rest = HARD.simulate(u, sample_time=STEP)
+    from_rest = model.simulate(u, sample_time=STEP)
     assert np.abs(from_rest - late).max() > 0.05 * np.ptp(late)
 
 
-def test_a_response_that_never_repeats_is_told() -> None:
-    undamped = BoucWenOscillator(2.0, 0.0, 50.0, 50.0, 0.0, 0.0)
+def test_a_response_that_never_repeats_is_refused() -> None:
+    undamped = replace(
+        StateNetwork.example(),
+        linear=((0.0, 1.0, 0.0, 0.0), (-1.0, 0.0, 1.0, 0.0)),
+        readout=((0.0, 0.0), (0.0, 0.0)),
+    )
     shaken = Recording({"force": np.sin(np.arange(40.0))}, STEP)
     with pytest.raises(ModelError):
         undamped.steady_state(shaken)

@@ -139,7 +139,12 @@ def test_muscles_that_no_place_holds_stay_and_go_on_when_one_does() -> None:
 
 def test_friction_beyond_the_area_still_finds_pressures_that_balance() -> None:
     """Steps of Newton's method that would leave the bracket are halved."""
-    rubbing = {"friction": ((100.0, 80.0),), "limits": (0.05, 0.8), "walls": (0.1,), "grip": 0.5}
+    rubbing = {
+        "friction": ((100.0, 80.0),),
+        "limits": (0.05, 0.8),
+        "walls": (0.1,),
+        "friction_offset": 0.5,
+    }
     block = replace(ALONE, tare=True, **rubbing)  # type: ignore[arg-type]
     inputs = np.column_stack([[10.4, 3.4, 5.0, -1.9], np.zeros(4)])
     pressures = block.simulate(inputs)
@@ -180,7 +185,7 @@ def test_slack_muscles_push_as_hard_as_they_can(friction: tuple[tuple[float, ...
         {"pushes": (150.0, 120.0)},
         {"pushes": (0.5, 0.1)},
         {"pushes": (), "bladders": (), "mass": (0.01, 0.02)},
-        {"asymmetry": 0.4, "grips": (0.3,), "obstacles": 2 * ((1.0, 3.0, 2.0, 0.1),)},
+        {"asymmetry": 0.4, "friction_slopes": (0.3,), "obstacles": 2 * ((1.0, 3.0, 2.0, 0.1),)},
         {"directions": ((1.0, 0.3), (-0.2, 1.0)), "pushes": (), "bladders": ()},
     ],
 )
@@ -190,7 +195,7 @@ def test_slopes_of_a_balance_are_those_of_differences(change: dict[str, Any]) ->
         SLACK,
         tare=True,
         hull=((-2.0, 6.0), (-2.0, 8.0)),
-        grip=0.1,
+        friction_offset=0.1,
         lines=(1e-5, 1e-5),  # slopes leave out that what flows in depends on the area
         **change,
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, DataError, Recording, compare
-from mckibben.comparison.channels import Channels, channels_of, dead_loads_told
+from mckibben.comparison.channels import Channels, channels_of, with_dead_loads_scheduled
 from mckibben.comparison.planning import plan_of
 from mckibben.comparison.splits import ENOUGH, held_out, validation_folds
 from mckibben.signals import triangle
@@ -82,11 +82,11 @@ def test_only_what_is_held_at_a_level_of_each_recording_is_a_dead_load() -> None
     one = Channels(("pressure",), ("displacement",))
     shaken = 0.3 * np.random.default_rng(0).random(TIME.size)
     noisy = [run.with_channels(force=run["force"] + shaken) for run in (hung(10.0), hung(20.0, 1))]
-    assert dead_loads_told([hung(10.0), hung(20.0)], one).scheduling == ("force",)
-    assert dead_loads_told(noisy, one).scheduling == ("force",)
-    assert dead_loads_told([hung(10.0), hung(10.0)], one) == one
+    assert with_dead_loads_scheduled([hung(10.0), hung(20.0)], one).scheduling == ("force",)
+    assert with_dead_loads_scheduled(noisy, one).scheduling == ("force",)
+    assert with_dead_loads_scheduled([hung(10.0), hung(10.0)], one) == one
     varied = hung(10.0).with_channels(force=TIME.astype(float))
-    assert dead_loads_told([varied, hung(20.0)], one) == one
+    assert with_dead_loads_scheduled([varied, hung(20.0)], one) == one
 
 
 def test_given_runs_are_scored_and_nothing_is_fitted_to_them() -> None:

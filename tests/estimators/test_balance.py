@@ -35,7 +35,7 @@ MUSCLE = Balance(
     lines=(0.04,),
     walls=(0.0,),
     limits=(0.05, 0.3, 1.2),
-    grip=0.6,
+    friction_offset=0.6,
     lags=(1.0, 12.0),
     hull=((-8.0, 40.0),),
     scale=40.0,
@@ -190,7 +190,10 @@ def test_what_is_found_has_a_standard_error(found: BalanceEstimator) -> None:
 
 def test_it_keeps_to_physics(found: BalanceEstimator) -> None:
     b = balance_of(found)
-    assert min(*b.friction[0], *b.relaxation[0], b.damping[0], *b.lines, b.walls[0], b.grip) >= 0
+    assert (
+        min(*b.friction[0], *b.relaxation[0], b.damping[0], *b.lines, b.walls[0], b.friction_offset)
+        >= 0
+    )
     y = np.linspace(b.hull[0][0], b.hull[0][1], 200)
     u = y / b.scale
     area = sum(a * u**i for i, a in enumerate(b.areas[0]))

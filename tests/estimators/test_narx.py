@@ -51,7 +51,7 @@ def test_first_choices_are_those_of_brute_force() -> None:
 
 
 @pytest.mark.parametrize("horizon", [None, 20])
-@pytest.mark.parametrize("kind", ["narx-polynomial", "tanh", "wavelet"])
+@pytest.mark.parametrize("kind", ["narx-polynomial", "tanh"])
 def test_slopes_of_free_runs_are_those_of_finite_differences(
     kind: str, horizon: int | None
 ) -> None:

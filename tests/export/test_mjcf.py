@@ -190,7 +190,7 @@ def test_the_regulator_lags() -> None:
 @pytest.mark.parametrize(
     "changed",
     [
-        {"grip": 0.5, "limits": (0.1, 0.2, 0.3, 0.4)},
+        {"friction_offset": 0.5, "limits": (0.1, 0.2, 0.3, 0.4)},
         {"asymmetry": 1.5},
         {"lags": (1.0,), "relaxation": ((2.0,),)},
         {"areas": ((100.0, -60.0, 5.0),)},

@@ -155,7 +155,7 @@ def _crowded(**changes: Any) -> Any:
         given=tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2, 3)),
         pressure_range=(0.0, 6.0),
         asymmetry=0.7,
-        grips=(0.2,),
+        friction_slopes=(0.2,),
         obstacles=(
             (1.0, 5.0, 4.0, 1.0, -1.0, 1.0, 3.0, 0.0),
             (1.0, 4.0, 6.0, 0.0, -1.0, -2.0, 5.0, 1.0),

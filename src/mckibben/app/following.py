@@ -76,7 +76,7 @@ def made(workspace: Workspace, name: str, use: str, settings: Mapping[str, Any])
     block, given = workspace.model(name), dict(settings)
     if use == "force":
         given = {"wanted": "force"}
-    elif drives(block.outputs[0]) or (block.undoing and not drives(block.inputs[0])):
+    elif drives(block.outputs[0]) or (block.inverts and not drives(block.inputs[0])):
         raise ModelError("it is a compensator already", remedy="choose the model that it undoes")
     elif use == "learned":
         names = [channel.name for channel in (*block.inputs, *block.outputs)]

@@ -12,7 +12,7 @@ from typing import Any
 from mckibben import registry, workflow
 from mckibben.app.jobs import Tell
 from mckibben.app.workspace import Workspace
-from mckibben.comparison.channels import Channels, dead_loads_told, loads_told
+from mckibben.comparison.channels import Channels, with_dead_loads_scheduled, with_loads_scheduled
 from mckibben.comparison.choosing import recommended
 from mckibben.comparison.planning import objections, plan_of
 from mckibben.comparison.ranking import ranked
@@ -44,8 +44,8 @@ def sides_of(
     if load or not (inputs and outputs):
         return Channels(tuple(inputs), tuple(outputs), (load,) if load else None)
     recordings = workspace.with_role("train") or list(workspace.used().values())
-    found = loads_told(recordings, Channels(tuple(inputs), tuple(outputs)))
-    return dead_loads_told(recordings, found)
+    found = with_loads_scheduled(recordings, Channels(tuple(inputs), tuple(outputs)))
+    return with_dead_loads_scheduled(recordings, found)
 
 
 def comparable(workspace: Workspace, sides: Channels) -> list[Json]:

@@ -52,7 +52,7 @@ from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError, require
 
-TRUSTED = 1 / 3
+INITIAL_SPREAD = 1 / 3
 """Initial standard deviations of the fitted parameters, relative to those of the expected changes.
 """
 
@@ -170,7 +170,7 @@ class Adaptive(Block):
     """
 
     kind: ClassVar[str] = "adaptive"
-    undoing: ClassVar[bool] = True
+    inverts: ClassVar[bool] = True
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("forward",)
 
@@ -189,7 +189,7 @@ class Adaptive(Block):
         self.forward.inverse()  # which refuses what has none
         self._check_settings()
         if self.memory is not None:
-            if len(self.memory) not in (self.n_states, self.n_learnt):
+            if len(self.memory) not in (self.n_states, self.n_adapted):
                 raise ModelError(
                     f"the memory of {self.kind!r} has {len(self.memory)} numbers, its "
                     f"state {self.n_states}",
@@ -241,15 +241,15 @@ class Adaptive(Block):
         _, part, behind = learning_part(self.forward)
         slope = width_of((part, *behind)) / width_of((part,))
         core = Adaptive(part, self.time, self.noise / (slope if 0 < slope < np.inf else 1.0))
-        learnt = self.memory is not None and len(self.memory) == core.n_learnt
-        return replace(core, memory=self.memory) if learnt else core
+        adapted = self.memory is not None and len(self.memory) == core.n_adapted
+        return replace(core, memory=self.memory) if adapted else core
 
     @cached_property
     def _around(self) -> tuple[Block | None, Block | None]:
         """Return the inverses of the parts after the core, and of those before it."""
         before, _, behind = learning_part(self.forward)
-        undo_behind = Series(behind).inverse() if behind else None
-        return undo_behind, Series(before).inverse() if before else None
+        inverse_behind = Series(behind).inverse() if behind else None
+        return inverse_behind, Series(before).inverse() if before else None
 
     @cached_property
     def parts(self) -> tuple[Block, ...]:
@@ -308,7 +308,7 @@ class Adaptive(Block):
     # -- memory ------------------------------------------------------------------------------
 
     @cached_property
-    def n_learnt(self) -> int:
+    def n_adapted(self) -> int:
         """Number of adaptive states: theta, used, root, senses."""
         p = self.learnable.fitted.size
         return 2 * p + (p * (p + 1)) // 2 + SENSES * len(self.core.forward.outputs)
@@ -318,7 +318,7 @@ class Adaptive(Block):
         """States of the inverse, auxiliary states of the last sample, and adaptive states."""
         if self.parts:
             return super().n_states
-        return self.fixed.n_states + self.learnable.n_more_states + self.n_learnt
+        return self.fixed.n_states + self.learnable.n_more_states + self.n_adapted
 
     @property
     def n_scratch(self) -> int:
@@ -331,7 +331,7 @@ class Adaptive(Block):
     @property
     def start(self) -> Initial:
         """Saved state to resume from, or the forward block's start; for a series, each part's own."""
-        if self.parts and (self.memory is None or len(self.memory) == self.n_learnt):
+        if self.parts and (self.memory is None or len(self.memory) == self.n_adapted):
             return "first_sample"
         return self.forward.start if self.memory is None else self.memory
 
@@ -350,11 +350,11 @@ class Adaptive(Block):
         asked = first[: len(first) - len(self.measured)]
         if len(start) == self.n_states:
             return explicit_state(self, start)
-        if len(start) == self.n_learnt:
-            learnt = np.array(start)
-            self._split(learnt)[4][READY::SENSES] = 0.0  # the next measurement has no prediction
+        if len(start) == self.n_adapted:
+            adapted = np.array(start)
+            self._split(adapted)[4][READY::SENSES] = 0.0  # the next measurement has no prediction
             own = self.fixed.initial_state(asked, self.forward.start)
-            return np.concatenate([own, np.zeros(self.learnable.n_more_states), learnt])
+            return np.concatenate([own, np.zeros(self.learnable.n_more_states), adapted])
         state = self.initial_state(first, "first_sample")
         state[: self.fixed.n_states] = self.fixed.initial_state(asked, start)
         return state
@@ -365,7 +365,7 @@ class Adaptive(Block):
     def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Return views of a state of the core: inverse state, theta, used, root and senses."""
         p = self.learnable.fitted.size
-        sizes = [len(state) - self.n_learnt, p, p, (p * (p + 1)) // 2]
+        sizes = [len(state) - self.n_adapted, p, p, (p * (p + 1)) // 2]
         own, theta, used, root, senses = np.split(state, np.cumsum(sizes))
         return own, theta, used, root, senses
 
@@ -379,7 +379,7 @@ class Adaptive(Block):
             if part.n_clipped(own):  # in the run before, by the last number of an inverse
                 own[getattr(part, "fixed", part).n_states - 1] = 0.0
         return replace(
-            self, memory=vector(numbers if memory else self._core_state(numbers)[-self.n_learnt :])
+            self, memory=vector(numbers if memory else self._core_state(numbers)[-self.n_adapted :])
         )
 
     # -- running -----------------------------------------------------------------------------
@@ -403,7 +403,7 @@ class Adaptive(Block):
                 learnable.scales,
                 np.diag(learnable.spread),
                 learnable.fitted,
-                start_root(learnable.spread * TRUSTED**2),
+                start_root(learnable.spread * INITIAL_SPREAD**2),
                 learnable.numbers(sample_time),
             ]
         )

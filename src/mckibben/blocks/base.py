@@ -90,7 +90,7 @@ class Block(DrawsItself, Parametrised):
     input range without data.
     """
 
-    undoing: ClassVar[bool] = False
+    inverts: ClassVar[bool] = False
     """Whether blocks of this class invert another block, see `forward_model`."""
 
     no_inverse: ClassVar[str] = "has no exact inverse"
@@ -115,6 +115,9 @@ class Block(DrawsItself, Parametrised):
 
     retired: ClassVar[Mapping[str, Any]] = {}
     """Fields of older files, with the value of each that had no effect."""
+
+    renamed: ClassVar[Mapping[str, str]] = {}
+    """Names of fields in older files, with those of today."""
 
     sample_time: float | None = None
     """Sample time of a discrete block [s]; None if it has no fixed one."""

@@ -187,7 +187,7 @@ class Composition(Block):
 
     rate_dependent = _of_any("rate_dependent")
     of_local_rules = _of_any("of_local_rules")
-    undoing = _of_any("undoing")
+    inverts = _of_any("inverts")
 
     @property
     def is_linear(self) -> bool:  # type: ignore[override]

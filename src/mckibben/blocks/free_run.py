@@ -64,8 +64,10 @@ def run_free(
     if before is not None:
         start = block.final_state(before, initial=known_start(block, before, outputs).tolist())
     else:
-        begun = ((r, mask) for r, mask in zip(known, rows, strict=True) if _begins(recording, r))
-        own, mask = next(begun, (None, None))
+        beginning = (
+            (r, mask) for r, mask in zip(known, rows, strict=True) if _begins(recording, r)
+        )
+        own, mask = next(beginning, (None, None))
         start = (
             measured_start(block, recording, outputs)
             if own is None

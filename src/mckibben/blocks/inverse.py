@@ -52,7 +52,7 @@ class Invertible(Block):
     inverse_path_dependent: ClassVar[bool] = False
     """Whether the path of a reference between two turning points matters."""
 
-    inverse_remembers: ClassVar[Literal["input", "output"] | None] = None
+    inverse_memory: ClassVar[Literal["input", "output"] | None] = None
     """What the inverse stores of the last sample in addition to this block's state."""
 
     counts_clipped: ClassVar[bool] = True
@@ -96,7 +96,7 @@ class Invertible(Block):
     @property
     def n_inverse_states(self) -> int:
         """Number of states of the inverse."""
-        return self.n_states + (self.inverse_remembers is not None) + self.counts_clipped
+        return self.n_states + (self.inverse_memory is not None) + self.counts_clipped
 
     @property
     def n_inverse_scratch(self) -> int:
@@ -105,7 +105,9 @@ class Invertible(Block):
 
     def inverse_state(self, state: Array) -> Array:
         """Return the state of the inverse for a state of this block, if it is determined."""
-        found = np.array([*state, *self.remembered(state), *([0.0] if self.counts_clipped else [])])
+        found = np.array(
+            [*state, *self.stored_for_inverse(state), *([0.0] if self.counts_clipped else [])]
+        )
         if found.size != self.n_inverse_states:
             raise ModelError(
                 f"{len(state)} states of {self.kind!r} do not determine those of its inverse",
@@ -113,9 +115,9 @@ class Invertible(Block):
             )
         return found
 
-    def remembered(self, state: Array) -> tuple[float, ...]:
+    def stored_for_inverse(self, state: Array) -> tuple[float, ...]:
         """Return the additional states of the inverse for a state of this block."""
-        return (float(state[-1]),) if self.inverse_remembers == "input" else ()
+        return (float(state[-1]),) if self.inverse_memory == "input" else ()
 
     @property
     def learnable(self) -> Learnable | None:
@@ -164,7 +166,7 @@ class Inverse(Block):
     """
 
     kind: ClassVar[str] = "inverse"
-    undoing: ClassVar[bool] = True
+    inverts: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("forward",)
 
     forward: Annotated[InstanceOf[Invertible], BeforeValidator(nested)]
@@ -255,4 +257,4 @@ def commands(block: Block) -> bool:
     Not every inverse does: a forward model solved from a law of forces is an inverse too, and returns a
     displacement.
     """
-    return block.undoing and drives(block.outputs[0])
+    return block.inverts and drives(block.outputs[0])

@@ -330,7 +330,7 @@ def _inverts(trial: Trial) -> None:
     _tracks(trial, inverse, trial.outputs)
     low, high = block.reachable()
     trial.demand(bool((low < high).all()), "the lowest output of reachable is below the highest")
-    if np.isfinite([*low, *high]).all() and not block.undoing:
+    if np.isfinite([*low, *high]).all() and not block.inverts:
         _tracks(trial, inverse, wander(*narrowed(low, high), trial.rng, trial.pace))
         _recovers(trial, inverse, low, high)
 

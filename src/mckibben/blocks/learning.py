@@ -123,7 +123,7 @@ restarts.
 @kernel
 def learn(
     c: Array,
-    learnt: Array,
+    adapted: Array,
     place: int,
     slopes: Array,
     work: Array,
@@ -137,7 +137,7 @@ def learn(
     ----------
     c : array
         Coefficients of a learner, see `family_at`.
-    learnt : array
+    adapted : array
         [theta, used, root, senses], changed.
     place : int
         Which of the outputs is measured.
@@ -150,9 +150,9 @@ def learn(
     """
     p, share, noise = int(c[0]), c[1], c[2]
     scales, widest, fresh = c[3 : 3 + p], c[3 + p : 3 + 2 * p], c[3 + 3 * p : family_at(c)]
-    theta, root = learnt[:p], learnt[2 * p : 2 * p + fresh.size]
+    theta, root = adapted[:p], adapted[2 * p : 2 * p + fresh.size]
     first = 2 * p + fresh.size + place * SENSES
-    sense = learnt[first : first + SENSES]
+    sense = adapted[first : first + SENSES]
     if measured - measured != 0.0:
         return False
     if sense[READY] == 0.0:
@@ -255,7 +255,7 @@ def _bound(root: Array, widest: Array, i: int) -> None:
 
 
 @kernel
-def pull_back(c: Array, learnt: Array, along: Array, work: Array) -> None:
+def pull_back(c: Array, adapted: Array, along: Array, work: Array) -> None:
     """Pull unobservable parameters back to the fitted ones within the adaptation time.
 
     It is weighed as if the fit were measured too: by the covariance, over the widest. ``along`` and
@@ -263,17 +263,17 @@ def pull_back(c: Array, learnt: Array, along: Array, work: Array) -> None:
     """
     p = along.size
     for i in range(p):
-        work[i] = c[1] * (c[3 + 2 * p + i] - learnt[i]) / (c[3 + i] * c[3 + p + i])
-    covariant(learnt, work, along)
+        work[i] = c[1] * (c[3 + 2 * p + i] - adapted[i]) / (c[3 + i] * c[3 + p + i])
+    covariant(adapted, work, along)
     for i in range(p):
-        learnt[i] += c[3 + i] * along[i]
+        adapted[i] += c[3 + i] * along[i]
 
 
 @kernel
-def covariant(learnt: Array, vector: Array, product: Array) -> None:
+def covariant(adapted: Array, vector: Array, product: Array) -> None:
     """Multiply by the covariance U D U'."""
     p = product.size
-    root = learnt[2 * p : 2 * p + root_size(p)]
+    root = adapted[2 * p : 2 * p + root_size(p)]
     first = p + (p * (p - 1)) // 2
     for j in range(p - 1, -1, -1):
         first -= j
@@ -319,14 +319,14 @@ def family_at(c: Array) -> int:
 
 
 @kernel
-def start_learning(c: Array, learnt: Array) -> None:
+def start_learning(c: Array, adapted: Array) -> None:
     """Start adaptation, [theta, used, root, senses], with the fitted parameters."""
     p, noise = int(c[0]), c[2]
     fitted, fresh = c[3 + 2 * p : 3 + 3 * p], c[3 + 3 * p : family_at(c)]
-    fill(learnt[:p], fitted)
-    fill(learnt[p : 2 * p], fitted)
-    fill(learnt[2 * p : 2 * p + fresh.size], fresh)
-    senses = learnt[2 * p + fresh.size :]
+    fill(adapted[:p], fitted)
+    fill(adapted[p : 2 * p], fitted)
+    fill(adapted[2 * p : 2 * p + fresh.size], fresh)
+    senses = adapted[2 * p + fresh.size :]
     senses[:] = 0.0
     for first in range(0, senses.size, SENSES):
         senses[first + USUAL], senses[first + SURPRISE] = 3.0 * noise, 1.0
@@ -350,7 +350,7 @@ def follow_learning(
     r: Array,
     s: Array,
     last: Array,
-    learnt: Array,
+    adapted: Array,
     scratch: Array,
     y: float,
     measured: float,
@@ -362,8 +362,8 @@ def follow_learning(
     """
     n, p, family = r.size, r.size + 1, family_at(c)
     limits, least = c[family : family + 2], c[family + 2 : inverse_at(c)]
-    theta, used = learnt[:p], learnt[p : 2 * p]
-    sense = learnt[family - 3 - p :]
+    theta, used = adapted[:p], adapted[p : 2 * p]
+    sense = adapted[family - 3 - p :]
     work, slopes = scratch[: 2 * p], scratch[2 * p : 3 * p]
     predicted, asked = theta[n], used[n]
     for i in range(n):
@@ -371,7 +371,7 @@ def follow_learning(
         predicted += theta[i] * s[i]
         asked += used[i] * s[i]
     slopes[n] = 1.0
-    if learn(c, learnt, 0, slopes, work, measured, predicted, asked):
+    if learn(c, adapted, 0, slopes, work, measured, predicted, asked):
         keep_rising(theta, least)
     if y > last[0]:
         last[2] = 1.0
@@ -404,9 +404,9 @@ def learning_kernels(
         """Advance the inverse, and adapt weights and offset to measurements."""
         n = int(coefficients[0]) - 1
         own = coefficients[inverse_at(coefficients) :]
-        last, learnt = state[n + before : n + before + 3], state[n + before + 3 :]
+        last, adapted = state[n + before : n + before + 3], state[n + before + 3 :]
         way = follow_learning(
-            coefficients, own[3 : n + 3], state[:n], last, learnt, scratch, inputs[0], inputs[1]
+            coefficients, own[3 : n + 3], state[:n], last, adapted, scratch, inputs[0], inputs[1]
         )
         outputs[0] = take(way, own, state, n)
 

@@ -229,7 +229,9 @@ def polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: A
 
 
 @step
-def undo_polynomial(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+def polynomial_inverse_step(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
     """Invert an increasing polynomial; the state is the count of samples clipped.
 
     Coefficients are [centre, scale, lowest, highest argument, ascending coefficients].
@@ -272,7 +274,7 @@ class Polynomial(Invertible):
 
     kind = "polynomial"
     kernel = polynomial_step
-    inverse_kernel = undo_polynomial
+    inverse_kernel = polynomial_inverse_step
     inverse_start_kernel = nothing_clipped
     parameters = ("polynomial",)
     layout = ("centre", "scale", "polynomial")
@@ -300,8 +302,7 @@ class Polynomial(Invertible):
         if slopes.min() < -1e-12 * np.abs(slopes).max() or slopes.max() <= 0:
             raise ModelError(
                 "'polynomial' has no inverse: it does not increase over its whole input range",
-                remedy="identify it with `settings[output_map]=piecewise-linear`, or "
-                "`settings[monotone]=true`",
+                remedy="identify it with `settings[output_map]=polynomial`, which increases",
             )
 
     def inverse_numbers(self, own: Array) -> Array:

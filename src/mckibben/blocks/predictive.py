@@ -4,7 +4,7 @@ In every sample the exact inverse runs over the references of a horizon, from th
 If its pressures are within all limits, they are the output: then this is the exact inverse. Otherwise
 all pressures of the horizon are optimised together (`mckibben.blocks.planning`), with the model as
 prediction, hysteresis included; the first of them is the output, and the model advances by it. So a
-reversal that is too fast for the supply begins early, and the error is shared before and after.
+reversal that is too fast for the supply start_inverse early, and the error is shared before and after.
 
 References arrive ``horizon - 1`` samples ahead, one a sample, and are stored until they are due.
 """
@@ -81,17 +81,17 @@ def model_state(compensator: Block, state: Array) -> Array:
     )
 
 
-def at_once(block: Any) -> Any:
+def without_dead_time(block: Any) -> Any:
     """Return a block without its dead times, which its inverse does not compensate."""
     match block:
         case Series() | PerChannel():
-            return replace(block, parts=tuple(map(at_once, block.parts)))
+            return replace(block, parts=tuple(map(without_dead_time, block.parts)))
         case Inverse():
-            return replace(block, forward=at_once(block.forward))
+            return replace(block, forward=without_dead_time(block.forward))
     return replace(block, dead_time=0.0) if block.dead_time > 0 else block
 
 
-def undoing_state(compensator: Block) -> Callable[[Array], Array]:
+def inverse_state_of(compensator: Block) -> Callable[[Array], Array]:
     """Return the kernel that converts a model's state to its compensator's."""
     match compensator:
         case Inverse():
@@ -99,7 +99,7 @@ def undoing_state(compensator: Block) -> Callable[[Array], Array]:
         case Series() | PerChannel():
             turn = -1 if isinstance(compensator, Series) else 1
             parts = compensator.parts[::turn]  # in the order of the model
-            ways = [undoing_state(part) for part in parts]
+            ways = [inverse_state_of(part) for part in parts]
             ends = np.cumsum([part.inverse().n_states for part in parts])[:-1]
 
             def joined(memory: Array) -> Array:
@@ -183,7 +183,7 @@ def _start_in_room(function: Any) -> Any:
 
 @cache
 def predictive_kernels(
-    model_step: Step, undo_step: Step, undo_start: Start, resume: Resume
+    model_step: Step, inverse_step: Step, inverse_start: Start, resume: Resume
 ) -> tuple[Step, Start]:
     """Return step and start of a predictive compensator.
 
@@ -193,8 +193,12 @@ def predictive_kernels(
     both. The state is [the model's, references to come (horizon by m), last pressures (n), whether there
     are some, plans made].
     """
-    answers, undoes, begins = _in_room(model_step), _in_room(undo_step), _start_in_room(undo_start)
-    predictive_step = step_of(answers, undoes, resume, decorate=kernel)
+    run_model, run_inverse, start_inverse = (
+        _in_room(model_step),
+        _in_room(inverse_step),
+        _start_in_room(inverse_start),
+    )
+    predictive_step = step_of(run_model, run_inverse, resume, decorate=kernel)
 
     @kernel
     def predictive_start(
@@ -202,21 +206,21 @@ def predictive_kernels(
     ) -> None:
         """Start as the inverse does: as if its first reference had always been applied."""
         c = coefficients
-        undoing = scratch[: int(c[3])]
+        inverse_state = scratch[: int(c[3])]
         numbers = c[HEAD + 1 + 3 * int(c[0]) + int(c[4]) :]
-        begins(numbers, undoing, scratch[int(c[3]) :], inputs, virgin)
+        start_inverse(numbers, inverse_state, scratch[int(c[3]) :], inputs, virgin)
         state[:] = 0.0
-        fill(state[: int(c[2])], undoing)
+        fill(state[: int(c[2])], inverse_state)
 
     return step(predictive_step), predictive_start
 
 
 def step_of(
-    answers: Any, undoes: Any, resume: Any, *, decorate: Callable[[Any], Any]
+    run_model: Any, run_inverse: Any, resume: Any, *, decorate: Callable[[Any], Any]
 ) -> Callable[..., None]:
     """Return the step of `predictive_kernels`, uncompiled; its callees are compiled, or decorated.
 
-    Where a model is of several kernels, ``answers``, ``undoes`` and ``resume`` are not compiled either.
+    For a model of several kernels, ``run_model``, ``run_inverse`` and ``resume`` are not compiled.
     """
 
     @decorate
@@ -252,12 +256,12 @@ def step_of(
                     way[k] = 1.0 if moved > 0.0 else -1.0
                 given[k] = p
             fill(trial, kept)
-            answers(model, trial, room, given, answer)
+            run_model(model, trial, room, given, answer)
             fill(after, trial)
             for k in range(n):
                 given[k] = path[(t + 1) * n + k] + way[k] * nudges[k]
                 fill(trial, kept)
-                answers(model, trial, room, given, change)
+                run_model(model, trial, room, given, change)
                 for i in range(m):
                     slopes[(t * m + i) * n + k] = (change[i] - answer[i]) / (way[k] * nudges[k])
                 given[k] = path[(t + 1) * n + k]
@@ -270,14 +274,14 @@ def step_of(
     ) -> None:
         """Compute the first pressures of a horizon within all limits, and take that step."""
         c = coefficients
-        n, m, length, size, n_undoing = int(c[0]), int(c[6]), int(c[1]), int(c[2]), int(c[3])
+        n, m, length, size, n_inverse = int(c[0]), int(c[6]), int(c[1]), int(c[2]), int(c[3])
         planned, count = length * n, length * m
         nudges, limits = c[HEAD : HEAD + n], c[HEAD + n : HEAD + 3 * n + 1]
         own = c[HEAD + 3 * n + 1 :]
-        model, undo = own[: int(c[4])], own[int(c[4]) : int(c[4]) + int(c[5])]
+        model, inverse = own[: int(c[4])], own[int(c[4]) : int(c[4]) + int(c[5])]
         memory, desired, last = state[:size], state[size : size + count], state[size + count :]
-        states, undoing = scratch[: 3 * size], scratch[3 * size : 3 * size + n_undoing]
-        more = scratch[3 * size + n_undoing :]
+        states, inverse_state = scratch[: 3 * size], scratch[3 * size : 3 * size + n_inverse]
+        more = scratch[3 * size + n_inverse :]
         asked, given = more[: inputs.size], more[inputs.size : 2 * inputs.size - m + n]
         rest = more[2 * inputs.size - m + n :]
         path, nominal = rest[: n + planned], rest[n + planned : 2 * (n + planned)]
@@ -287,12 +291,12 @@ def step_of(
         for i in range(count - m):
             desired[i] = inputs[i % m] if first else desired[i + m]
         fill(desired[count - m :], inputs[:m])
-        resume(model, memory, undoing)
+        resume(model, memory, inverse_state)
         fill(asked, inputs)
         fill(given[n:], inputs[m:])
         for t in range(length):
             fill(asked[:m], desired[t * m : (t + 1) * m])
-            undoes(undo, undoing, room, asked, path[(t + 1) * n : (t + 2) * n])
+            run_inverse(inverse, inverse_state, room, asked, path[(t + 1) * n : (t + 2) * n])
         if first:  # whatever the rate
             for k in range(n):
                 last[k] = min(max(path[n + k], limits[1 + k]), limits[1 + n + k])
@@ -309,7 +313,7 @@ def step_of(
             last[n + 1] += 1.0
         fill(last[:n], path[n : 2 * n])
         fill(given[:n], last[:n])
-        answers(model, memory, room, given, asked[:m])
+        run_model(model, memory, room, given, asked[:m])
         fill(outputs, last[:n])
 
     return predictive_step
@@ -321,13 +325,15 @@ def one_step_of(block: Block, sample_time: float) -> Callable[..., None]:
     given, found = np.empty((1, len(block.inputs))), np.empty((1, len(block.outputs)))
     run = block.bind(sample_time, state, given, found)
 
-    def answers(numbers: Array, memory: Array, room: Array, inputs: Array, outputs: Array) -> None:
+    def run_model(
+        numbers: Array, memory: Array, room: Array, inputs: Array, outputs: Array
+    ) -> None:
         del numbers, room
         state[:], given[0] = memory, inputs
         run()
         memory[:], outputs[:] = state, found[0]
 
-    return answers
+    return run_model
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -347,7 +353,7 @@ class Predictive(Block):
     """
 
     kind: ClassVar[str] = "predictive"
-    undoing: ClassVar[bool] = True
+    inverts: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("compensator",)
     retired: ClassVar[Mapping[str, Any]] = {"total_limit": None, "flow_limit": None, "volumes": ()}
     rate_dependent: ClassVar[bool] = True
@@ -368,7 +374,7 @@ class Predictive(Block):
     outputs = same_as("compensator.outputs")
 
     def __post_init__(self) -> None:
-        model_state(self._undoing, np.zeros(self._undoing.n_states))
+        model_state(self._inverse, np.zeros(self._inverse.n_states))
         if strange := [c.name for c in self.outputs if not drives(c)]:
             raise ModelError(
                 f"{self.kind!r} plans commands of muscles, and the outputs of "
@@ -388,14 +394,14 @@ class Predictive(Block):
         return self.compensator.inverse()
 
     @cached_property
-    def _undoing(self) -> Block:
+    def _inverse(self) -> Block:
         """The compensator of the model without dead times."""
-        return at_once(self.compensator)
+        return without_dead_time(self.compensator)
 
     @cached_property
     def _planned(self) -> Block:
         """The model used for prediction."""
-        return self._undoing.inverse()
+        return self._inverse.inverse()
 
     @cached_property
     def pressures(self) -> tuple[Array, Array]:
@@ -420,7 +426,7 @@ class Predictive(Block):
         """Return the initial state: as if its reference had always been applied."""
         if initial is not None and not isinstance(initial, str):
             return explicit_state(self, initial)
-        own = model_state(self._undoing, self._undoing.initial_state(first, initial))
+        own = model_state(self._inverse, self._inverse.initial_state(first, initial))
         return np.concatenate([own, np.zeros(self.n_states - own.size)])
 
     @property
@@ -430,24 +436,24 @@ class Predictive(Block):
     @property
     def n_scratch(self) -> int:
         """Scratch: trial states, pressures, slopes, and the working memory of a plan."""
-        model, undo = self._planned, self._undoing
-        n, m = len(self.outputs), undo.n_driven
-        given = len(model.inputs) + len(undo.inputs)
-        own = 3 * model.n_states + undo.n_states + given + 2 * n + n + 2 * m
-        room = max(plan_scratch(self.horizon), model.n_scratch, undo.n_scratch)
+        model, inverse = self._planned, self._inverse
+        n, m = len(self.outputs), inverse.n_driven
+        given = len(model.inputs) + len(inverse.inputs)
+        own = 3 * model.n_states + inverse.n_states + given + 2 * n + n + 2 * m
+        room = max(plan_scratch(self.horizon), model.n_scratch, inverse.n_scratch)
         return own + self.horizon * (2 * n + m * (1 + n)) + room
 
     @cached_property
     def _kernels(self) -> tuple[Step, Start] | None:
         """Kernels of a compensator of one kernel; None for several."""
-        resume = resume_of(self._undoing)
+        resume = resume_of(self._inverse)
         if resume is None or not isinstance(self.compensator.start, str):
             return None
-        (undo_step, undo_start), (model_step, _) = (
-            self._undoing.c_kernels,
+        (inverse_step, inverse_start), (model_step, _) = (
+            self._inverse.c_kernels,
             self._planned.c_kernels,
         )
-        return predictive_kernels(model_step, undo_step, undo_start, resume)
+        return predictive_kernels(model_step, inverse_step, inverse_start, resume)
 
     @property
     def kernel(self) -> Step | None:  # type: ignore[override]
@@ -464,7 +470,7 @@ class Predictive(Block):
                 remedy="export pi, gpi or balance that starts at its first sample, or "
                 "stream this one from Python",
             )
-        blocks = (self._planned, self._undoing)
+        blocks = (self._planned, self._inverse)
         return self._numbers(sample_time, [block.coefficients(sample_time) for block in blocks])
 
     def _numbers(self, sample_time: float | None, own: list[Array]) -> Array:
@@ -472,7 +478,7 @@ class Predictive(Block):
         low, high = self.pressures
         rate = np.inf if self.rate_limit is None else self.rate_limit
         change = rate * needs_sample_time(self.kind, sample_time)
-        sizes = [self._planned.n_states, self._undoing.n_states, *map(len, own)]
+        sizes = [self._planned.n_states, self._inverse.n_states, *map(len, own)]
         head = [len(low), self.horizon, *sizes, self.compensator.n_driven]
         return np.concatenate([head, NUDGE * (high - low), [change], low, high, *own])
 
@@ -480,15 +486,15 @@ class Predictive(Block):
         if self._kernels is not None:
             return super().bind(sample_time, state, inputs, outputs)
         numbers = self._numbers(sample_time, [np.empty(0), np.empty(0)])
-        scratch, undoing = np.empty(self.n_scratch), undoing_state(self._undoing)
+        scratch, state_of_inverse = np.empty(self.n_scratch), inverse_state_of(self._inverse)
         own_time = needs_sample_time(self.kind, sample_time)
-        answers, undoes = (one_step_of(b, own_time) for b in (self._planned, self._undoing))
+        run_model, run_inverse = (one_step_of(b, own_time) for b in (self._planned, self._inverse))
 
         def resume(model: Array, memory: Array, own: Array) -> None:
             del model
-            own[:] = undoing(memory)
+            own[:] = state_of_inverse(memory)
 
-        advance = step_of(answers, undoes, resume, decorate=lambda function: function)
+        advance = step_of(run_model, run_inverse, resume, decorate=lambda function: function)
 
         def run() -> None:
             for t in range(len(inputs)):

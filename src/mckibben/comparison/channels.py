@@ -141,7 +141,7 @@ def channels_of(
         sides = _over_held(recordings, sides)
     given = _named(recordings, inputs, sides[0])
     wanted = _named(recordings, outputs, sides[1])
-    channels = loads_told(recordings, Channels(given, wanted, (load,) if load else None))
+    channels = with_loads_scheduled(recordings, Channels(given, wanted, (load,) if load else None))
     further = channels.scheduling or ()
     named = (*channels.inputs, *channels.outputs, *further)
     if twice := [name for name in named if named.count(name) > 1]:
@@ -175,7 +175,7 @@ def recognised(recordings: Sequence[Recording], channels: Sequence[str]) -> Side
     return _over_held(recordings, (inputs, outputs or tuple(rest[:1])))
 
 
-def loads_told(recordings: Sequence[Recording], channels: Channels) -> Channels:
+def with_loads_scheduled(recordings: Sequence[Recording], channels: Channels) -> Channels:
     """Return channels with forces as scheduling loads, if there are other inputs."""
     loads = loads_among(recordings, channels.inputs)
     if channels.scheduling is not None or not loads:
@@ -184,7 +184,7 @@ def loads_told(recordings: Sequence[Recording], channels: Channels) -> Channels:
     return replace(channels, inputs=driven, scheduling=loads)
 
 
-def dead_loads_told(recordings: Sequence[Recording], channels: Channels) -> Channels:
+def with_dead_loads_scheduled(recordings: Sequence[Recording], channels: Channels) -> Channels:
     """Return channels of one muscle with the loads that are constant in every recording."""
     if not (channels.single and recordings):
         return channels

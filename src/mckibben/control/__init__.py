@@ -7,7 +7,7 @@ from mckibben.control.laws import control_law as control_law
 from mckibben.control.loop import Tracked as Tracked
 from mckibben.control.loop import track as track
 from mckibben.control.observer import DisturbanceObserver as DisturbanceObserver
-from mckibben.control.preview import dead_time_undone as dead_time_undone
+from mckibben.control.preview import preview_time as preview_time
 from mckibben.control.preview import previewed as previewed
 from mckibben.control.tuning import tune_pid as tune_pid
 from mckibben.control.twin import Twin as Twin

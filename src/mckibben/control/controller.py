@@ -12,7 +12,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import BASE, MEASURED, FeedforwardFeedback
 from mckibben.blocks.fields import Channel
 from mckibben.control.connecting import Offer
-from mckibben.control.preview import dead_time_undone
+from mckibben.control.preview import preview_time
 
 Ahead = tuple[Array, Array]
 
@@ -77,7 +77,7 @@ class BlockController(Controller):
     block: Block
 
     def __post_init__(self) -> None:
-        self.preview, self.forward_model = dead_time_undone(self.block), self.block.forward_model
+        self.preview, self.forward_model = preview_time(self.block), self.block.forward_model
         self.samples_ahead = self.block.samples_ahead
 
     @property

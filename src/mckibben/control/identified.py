@@ -71,7 +71,7 @@ def beyond_known(model: Block, recording: Recording) -> list[str]:
     placed = balance_in(model)
     if placed is not None:
         checked = _of_balance(placed, model, recording)
-    elif model.undoing:
+    elif model.inverts:
         checked = []
     else:
         known = known_ranges(model)

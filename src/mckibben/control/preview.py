@@ -2,7 +2,7 @@
 
 Commands act after the dead time of the air. With a planned motion, the compensator can be given the
 reference that much ahead: offline, `previewed` shifts the reference; sample by sample, `Stream.step`
-gets the reference of `dead_time_undone` later; `mckibben.control.track` does so by default.
+gets the reference of `preview_time` later; `mckibben.control.track` does so by default.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ MOST_PREVIEW = 1e4
 """Longest preview [s]."""
 
 
-def dead_time_undone(compensator: Block) -> float:
+def preview_time(compensator: Block) -> float:
     """Return the dead time of the inverted model [s], which is the preview needed.
 
     With feedback, that of the compensator; 0 if the inverted model is unknown.
@@ -25,7 +25,7 @@ def dead_time_undone(compensator: Block) -> float:
     Examples
     --------
     >>> from mckibben.blocks.dynamics.air import Air
-    >>> dead_time_undone(Air.example().inverse())
+    >>> preview_time(Air.example().inverse())
     0.02
     """
     model = compensator.forward_model
@@ -46,7 +46,7 @@ def previewed(reference: Recording, preview: float) -> Recording:
     reference : Recording
         With time.
     preview : float
-        How much later [s], not negative, in whole samples; see `dead_time_undone`. The end is held.
+        How much later [s], not negative, in whole samples; see `preview_time`. The end is held.
 
     Raises
     ------

@@ -152,7 +152,7 @@ def carried(model: Block) -> Balance:
         "an area that is not linear in length": len(balance.areas[0]) > 2,
         "friction that depends on pressure": bool(balance.limits)
         and any(balance.friction[0])
-        and balance.grip < CONSTANT * highest,
+        and balance.friction_offset < CONSTANT * highest,
         "friction that differs by direction": balance.asymmetry not in (None, 1.0),
         "relaxation": any(balance.relaxation[0]),
         "stretch of the wall": any(balance.walls),
@@ -228,7 +228,7 @@ def _tendons(
     stops = zip(muscle.friction[0], muscle.limits, strict=True)
     for number, (stiffness, limit) in enumerate(stops, start=1):
         if stiffness > 0:
-            travel = limit * muscle.grip / MM
+            travel = limit * muscle.friction_offset / MM
             add(f"_stop_{number}", MM * stiffness, springyield=_row(travel))
     # beyond the shortenings known elasticity goes on straight: what bends there is taken away again
     ends = [(f"_{end}", side, muscle.hull[0][side > 0]) for end, side in (("low", -1), ("high", 1))]

@@ -19,7 +19,7 @@ MUSCLES = {
     "relaxation": "decay of the force at constant length; at constant load it appears as creep",
     "slack": "state of a muscle that is longer than the distance between its ends",
     "coupling": "motion of a muscle caused by the pressures of its neighbours",
-    "friction pressure offset": "friction is proportional to pressure plus this offset (`grip`) [bar]",
+    "friction pressure offset": "friction is proportional to pressure plus this offset [bar]",
     "line damping": "damping at rest by air flow between pressure sensor and muscle [N s/mm]",
     "tare": "whether displacement is zero at the start of each recording",
 }

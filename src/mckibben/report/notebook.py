@@ -109,7 +109,7 @@ def _picture(x: Array, y: Array) -> str:
 
 TITLES: Mapping[str, Callable[[Any], str]] = MappingProxyType(
     {
-        "block": lambda one: f"{'Compensator' if one.undoing else 'Model'} {one.title}",
+        "block": lambda one: f"{'Compensator' if one.inverts else 'Model'} {one.title}",
         "characterization": lambda one: f"Characterization, {one.input} to {one.output}",
         "leaderboard": lambda one: f"Leaderboard, {one.input} to {one.output}",
         "recording": lambda one: f"Recording {one.name}: {words.duration(one)}",

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, ClassVar, NamedTuple, Self
 
@@ -126,8 +127,8 @@ class Balance(Invertible):
     limits : sequence of float
         Travel at which every stop breaks away, of the pressure that friction is proportional to
         [mm/bar], increasing.
-    grip : float
-        Pressure below zero at which stops hold nothing [bar]; they break away at ``limits (p + grip)``.
+    friction_offset : float
+        p_0: friction vanishes at the pressure -p_0 [bar]; stops break away at ``limits (p + p_0)``.
     lags : sequence of float
         Time constants of what relaxes [s].
     hull : sequence of n pairs of float
@@ -159,7 +160,7 @@ class Balance(Invertible):
     asymmetry : float, optional
         Ratio of the travel at which stops break away while muscles lengthen to that while they shorten;
         positive. Default 1.
-    grips : sequence of float
+    friction_slopes : sequence of float
         Friction offset per scheduling input, in addition to pressure; not negative [bar by its unit].
         Default none.
     obstacles : sequence of m sequences of float
@@ -180,10 +181,11 @@ class Balance(Invertible):
     inverse_start_kernel: ClassVar[Start] = balance_inverse_start
     inverse_path_dependent: ClassVar[bool] = True
     increasing = ("limits",)
+    renamed: ClassVar[Mapping[str, str]] = {"grip": "friction_offset", "grips": "friction_slopes"}
     parameters: ClassVar[tuple[str, ...]] = (
         *("springs", "elasticity", "areas", "friction", "relaxation", "loads"),
-        *("damping", "lines", "walls", "grip", "bladders", "pushes", "mass"),
-        *("asymmetry", "grips", "obstacles"),
+        *("damping", "lines", "walls", "friction_offset", "bladders", "pushes", "mass"),
+        *("asymmetry", "friction_slopes", "obstacles"),
     )
     notation: ClassVar[Notation] = Notation(
         r"A_k(y) = \sum_i a_{ki} (y / L)^i,\quad E_k(y) = b_k y + \sum_{i \ge 2} e_{ki} "
@@ -198,14 +200,14 @@ class Balance(Invertible):
         lines="l_k [N s/mm]",
         walls="w_k [mm/bar]",
         limits="r_m [mm/bar]",
-        grip="p_0 [bar]",
+        friction_offset="p_0 [bar]",
         lags=r"\tau_l [s]",
         scale="L [mm]",
         bladders="b_k [N/mm]",
         pushes="P_k [N]",
         mass="m_k [N s^2/mm]",
         asymmetry=r"\rho",
-        grips="g_i",
+        friction_slopes="g_i",
         obstacles="o_{ki}",
         directions="W_{ki}",
         preload="p_s [bar]",
@@ -222,7 +224,7 @@ class Balance(Invertible):
     damping: Vector
     walls: Vector
     limits: Vector
-    grip: FiniteFloat
+    friction_offset: FiniteFloat
     lags: Vector
     hull: Rows
     scale: Annotated[FiniteFloat, Gt(0)]
@@ -239,7 +241,7 @@ class Balance(Invertible):
     mass: Vector = ()
     known: Rows = ()
     asymmetry: Annotated[FiniteFloat, Gt(0)] | None = None
-    grips: Vector = ()
+    friction_slopes: Vector = ()
     obstacles: Rows = ()
     directions: Rows = ()
     preload: FiniteFloat = 0.0
@@ -287,7 +289,7 @@ class Balance(Invertible):
                     remedy=f"give {count} rows of {width}",
                 )
         optional = ("lines", "bladders", "pushes", "mass")
-        lengths = dict.fromkeys(("damping", "walls", *optional), n) | {"grips": n_x}
+        lengths = dict.fromkeys(("damping", "walls", *optional), n) | {"friction_slopes": n_x}
         for name, count in lengths.items():
             values = getattr(self, name)
             if len(values) != count and (values or name in ("damping", "walls")):
@@ -356,7 +358,7 @@ class Balance(Invertible):
                 rf"\sum_k W_{{kj}} \left(p_k A_k(y_k) - R_k\right) = {outer.replace('_k', '_j')}"
             )
             balance = (pulls, rf"R_k = {inner},\quad y_k = \sum_j W_{{kj}} q_j")
-        limit = "r_m (p_k + p_0" + (r" + \sum_i g_i x_i)" if any(self.grips) else ")")
+        limit = "r_m (p_k + p_0" + (r" + \sum_i g_i x_i)" if any(self.friction_slopes) else ")")
         ends = (
             rf"\pm {limit}"
             if self.asymmetry is None
@@ -427,12 +429,26 @@ class Balance(Invertible):
         head = [
             *(n, m, n_x, self.degree, self.n_loads, len(self.limits), len(self.lags)),
             *(len(self.elasticity[0]), len(self.areas[0]), self.n_obstacles, self.scale),
-            *(self.grip, self.asymmetry or 1.0, low, high, 1.0 / step, self.tare, not self.settled),
+            *(
+                self.friction_offset,
+                self.asymmetry or 1.0,
+                low,
+                high,
+                1.0 / step,
+                self.tare,
+                not self.settled,
+            ),
             *(bool(self.mass), self.preload, bool(self.directions)),
         ]
         lags = np.array(self.lags)
         gains = lags / step * -np.expm1(-step / lags)
-        shared = (head, self.limits, np.exp(-step / lags), gains, self.grips or n_x * (0.0,))
+        shared = (
+            head,
+            self.limits,
+            np.exp(-step / lags),
+            gains,
+            self.friction_slopes or n_x * (0.0,),
+        )
         obstacles = self.obstacles or m * ((),)
         tables = zip(self.springs, self.loads, obstacles, strict=True)
         none = n * (0.0,)
@@ -510,7 +526,7 @@ class Balance(Invertible):
             return f"{force}/{below}" if below else force
         if field == "loads":
             return f"{force}/{self.scheduled[index[-1] - self.n_loads].unit}"
-        if field == "grips":
+        if field == "friction_slopes":
             return f"{driving}/{self.scheduled[index[-1]].unit}"
         units = {"N": force, "mm": moved, "bar": driving}
         declared = super().unit_of(field, index) or ""
@@ -518,15 +534,15 @@ class Balance(Invertible):
 
     def name_of(self, field: str, index: tuple[int, ...]) -> str:
         """Return the label of a parameter: its muscle, channel, and scheduling input."""
-        if field in ("grip", "asymmetry"):
-            return field
+        if field in ("friction_offset", "asymmetry"):
+            return field.replace("_", " ")
         on = self.driven if field in ("springs", "loads", "obstacles") else self.given
         whose = "coordinate" if self.directions and on is self.driven else "muscle"
         of = f" of {whose} {index[0] + 1}" if len(on) > 1 else ""
         if field in ONE_EACH:
             return f"{ONE_EACH[field]}{of}"
         place = index[-1]
-        if field == "grips":
+        if field == "friction_slopes":
             return f"friction offset by {self.scheduled[place].name}"
         if field == "springs":
             power, to = divmod(place, 1 + len(on))
@@ -566,7 +582,7 @@ class Balance(Invertible):
             lines=(0.06, 0.04),
             walls=(0.05, 0.1),
             limits=(0.5, 2.0),
-            grip=0.5,
+            friction_offset=0.5,
             lags=(0.8, 12.0),
             hull=((-20.0, 50.0), (-20.0, 50.0)),
             bladders=(4.0, 5.0),
@@ -580,8 +596,18 @@ class Balance(Invertible):
 
 
 NOT_NEGATIVE = (
-    *("friction", "relaxation", "damping", "walls", "lines", "grip", "bladders", "pushes", "mass"),
-    "grips",
+    *(
+        "friction",
+        "relaxation",
+        "damping",
+        "walls",
+        "lines",
+        "friction_offset",
+        "bladders",
+        "pushes",
+        "mass",
+    ),
+    "friction_slopes",
 )
 """Fields of non-negative numbers."""
 

@@ -94,7 +94,7 @@ def balance_adaptive_step(
     """Adapt parameters, and compute pressures.
 
     The family's coefficients are [coordinates, a row for every parameter, the balance's]. The state is
-    [the balance's, coordinates of the last sample, their slopes by parameters, what is learnt]; scratch
+    [the balance's, coordinates of the last sample, their slopes by parameters, what is adapted]; scratch
     is [work of learning, coefficients now, factors on springs, a balance's, that of `slopes_of`].
     """
     learner, size, at = coefficients, int(coefficients[0]), family_at(coefficients) + 1
@@ -103,8 +103,8 @@ def balance_adaptive_step(
     family, fitted = learner[at:rows_end].reshape((size, ROW + m)), learner[rows_end:]
     n_x = int(fitted[2]) + int(fitted[4])
     memory, asked, rest = state[:n_own], state[n_own : n_own + m], state[n_own + m :]
-    slopes, learnt = rest[: m * size], rest[m * size :]
-    theta, used, as_fitted = learnt[:size], learnt[size : 2 * size], learner[3 + 2 * size :]
+    slopes, adapted = rest[: m * size], rest[m * size :]
+    theta, used, as_fitted = adapted[:size], adapted[size : 2 * size], learner[3 + 2 * size :]
     work, along, more = scratch[: 2 * size], scratch[2 * size : 3 * size], scratch[3 * size :]
     c, g, room = more[: fitted.size], more[fitted.size : fitted.size + m], more[fitted.size + m :]
     changed_any = False
@@ -114,11 +114,11 @@ def balance_adaptive_step(
         for i in range(size):
             predicted += row[i] * (theta[i] - used[i])
         measured = inputs[m + n_x + j]
-        one = learn(learner, learnt, j, row, work, measured, predicted, asked[j])
+        one = learn(learner, adapted, j, row, work, measured, predicted, asked[j])
         changed_any = changed_any or one
     if changed_any:
-        pull_back(learner, learnt, along, work)
-        keep_balanced(learner, family, learnt, along, work)
+        pull_back(learner, adapted, along, work)
+        keep_balanced(learner, family, adapted, along, work)
         fill(used, theta)
     for i in range(size):
         along[i] = used[i] - as_fitted[i]
@@ -227,7 +227,7 @@ def slopes_of(
 
 
 @kernel
-def keep_balanced(c: Array, family: Array, learnt: Array, along: Array, work: Array) -> None:
+def keep_balanced(c: Array, family: Array, adapted: Array, along: Array, work: Array) -> None:
     """Project parameters onto the physical bounds of a balance.
 
     What is changed takes the others along as they are known to go together, which may not be possible
@@ -238,19 +238,19 @@ def keep_balanced(c: Array, family: Array, learnt: Array, along: Array, work: Ar
         for i in range(p):
             by, area = int(family[i, 8]), 1.0
             if by >= 0:
-                area = min(max(learnt[by], family[by, 4]), family[by, 5])
+                area = min(max(adapted[by], family[by, 4]), family[by, 5])
             low = max(family[i, 4], area * family[i, 6])
             high = min(family[i, 5], area * family[i, 7])
-            inside = min(max(learnt[i], low), high)
-            lacks = inside - learnt[i]
+            inside = min(max(adapted[i], low), high)
+            lacks = inside - adapted[i]
             if turn > 0:
-                learnt[i] = inside
+                adapted[i] = inside
             elif lacks != 0.0:
                 for j in range(p):
                     work[j] = 1.0 if j == i else 0.0
-                covariant(learnt, work, along)
+                covariant(adapted, work, along)
                 for j in range(p):
-                    learnt[j] += lacks * c[3 + j] / c[3 + i] * along[j] / along[i]
+                    adapted[j] += lacks * c[3 + j] / c[3 + i] * along[j] / along[i]
 
 
 # -- what a balance can have -----------------------------------------------------------------------
@@ -261,13 +261,13 @@ def learnable_balance(balance: Balance) -> Learnable:
 
     Factors are expected to change by 30 %, forces by 10 % of that of the highest pressure at rest.
     """
-    m, learnt, known = len(balance.driven), learnt_of(balance), balance.known_coordinates
-    muscles, kinds = np.array(learnt).T
+    m, adapted, known = len(balance.driven), adaptable_of(balance), balance.known_coordinates
+    muscles, kinds = np.array(adapted).T
     offsets, at_rest = kinds == OFFSET, np.array(balance.areas)[muscles, 0] * top_of(balance)
     fitted, scales = np.where(offsets, 0.0, 1.0), np.where(offsets, at_rest, 1.0)
 
     def numbers(sample_time: float | None) -> Array:
-        table = family_of(balance, learnt, scales)
+        table = family_of(balance, adapted, scales)
         return np.concatenate([[m], table.ravel(), balance.coefficients(sample_time)])
 
     return Learnable(
@@ -276,7 +276,7 @@ def learnable_balance(balance: Balance) -> Learnable:
         fitted=fitted,
         scales=scales,
         spread=np.diag(np.where(offsets, 0.1, 0.3) ** 2),
-        with_parameters=lambda theta: Inverse(changed(balance, learnt, theta - fitted)),
+        with_parameters=lambda theta: Inverse(changed(balance, adapted, theta - fitted)),
         numbers=numbers,
         known=known,
         compensates=True,
@@ -285,7 +285,7 @@ def learnable_balance(balance: Balance) -> Learnable:
     )
 
 
-def learnt_of(balance: Balance) -> list[tuple[int, int]]:
+def adaptable_of(balance: Balance) -> list[tuple[int, int]]:
     """Return muscle and kind of every adaptive parameter."""
     found = []
     for k in range(len(balance.given)):
@@ -303,12 +303,12 @@ def top_of(balance: Balance) -> float:
     return USUAL_TOP if reach is None else max(abs(reach[0]), abs(reach[1]))
 
 
-def family_of(balance: Balance, learnt: list[tuple[int, int]], scales: Array) -> Array:
+def family_of(balance: Balance, adapted: list[tuple[int, int]], scales: Array) -> Array:
     """Return a row per parameter, shape (k, `ROW` + m)."""
     counts = (balance.elasticity[0], balance.areas[0], balance.limits, balance.lags)
     behind = DYNAMIC + np.cumsum([0, *map(len, counts)])
-    table = np.zeros((len(learnt), ROW + len(balance.driven)))
-    for row, (k, kind), scale in zip(table, learnt, scales, strict=True):
+    table = np.zeros((len(adapted), ROW + len(balance.driven)))
+    for row, (k, kind), scale in zip(table, adapted, scales, strict=True):
         friction, stiffness = ratios(balance, k)
         row[0], row[4:ROW] = k, (*FACTORS, -NEVER, NEVER, -1)
         if kind == OFFSET:
@@ -319,8 +319,8 @@ def family_of(balance: Balance, learnt: list[tuple[int, int]], scales: Array) ->
             row[1], row[6], row[ROW:] = DYNAMIC - 1, 1.0 / stiffness, shares_of(balance)[k]
         elif kind == FRICTION:
             row[7] = friction
-        if kind in (STIFFNESS, FRICTION) and (k, AREA) in learnt:
-            row[8] = learnt.index((k, AREA))
+        if kind in (STIFFNESS, FRICTION) and (k, AREA) in adapted:
+            row[8] = adapted.index((k, AREA))
     return table
 
 
@@ -330,11 +330,11 @@ def shares_of(balance: Balance) -> Array:
     return np.asarray(squares / squares.sum(axis=0))
 
 
-def changed(balance: Balance, learnt: list[tuple[int, int]], changes: Array) -> Balance:
+def changed(balance: Balance, adapted: list[tuple[int, int]], changes: Array) -> Balance:
     """Return the balance with changed forces and factors."""
     n, m = balance.moves.shape
     table = np.zeros((len(KINDS), n))
-    table[tuple(np.array(learnt).T[::-1])] = changes
+    table[tuple(np.array(adapted).T[::-1])] = changes
     stiffened = 1.0 + shares_of(balance).T @ table[STIFFNESS]
     springs = np.array(balance.springs).reshape(m, -1, 1 + m)
     springs[:, :, 1:] *= np.sqrt(np.outer(stiffened, stiffened))[:, np.newaxis]

@@ -4,7 +4,8 @@ y_t = f(y_{t-1}, ..., y_{t-n}, u_{t-d}, ..., u_{t-d-m+1}, F_r1[u]_t, ...), run f
 model's own. Without play operators such a model forgets its branch while the input is held. Everything
 is centred and scaled: outputs by `output_scale`, inputs and operators by `input_scale`.
 
-The mapping f is a polynomial, or linear plus one layer of sigmoids or wavelets, as MATLAB's networks.
+The mapping f is a polynomial, or linear plus one layer of sigmoids, as MATLAB's networks; of saved
+models also of wavelets.
 
 Sources: Eq. (4) of "Analysis and modeling of a pneumatic artificial muscle system"; Chen, Billings and
 Luo, "Orthogonal least squares methods and their application to non-linear system identification", 1989.
@@ -375,11 +376,11 @@ class NarxNetwork(Narx):
         return np.array([*self.head(sample_time), *shape, *self.places, *self.pack()])
 
     def slopes(self, regressors: Array) -> tuple[Array, Array]:
-        """Return the derivatives by bias, linear and hidden weights, and by past outputs."""
+        """Return the derivatives by bias, linear and hidden weights, and past outputs, for tanh."""
         (k, n), past = regressors.shape, self.output_lags
         units = np.reshape(self.hidden, (-1, n + 2))
-        a, steepness = activated(self.activation, regressors @ units[:, :n].T + units[:, n])
-        by_sum = steepness * units[:, n + 1]
+        a = np.tanh(regressors @ units[:, :n].T + units[:, n])
+        by_sum = (1.0 - a**2) * units[:, n + 1]
         by_hidden = np.empty((k, len(units), n + 2))
         by_hidden[:, :, :n] = by_sum[:, :, np.newaxis] * regressors[:, np.newaxis, :]
         by_hidden[:, :, n], by_hidden[:, :, n + 1] = by_sum, a
@@ -400,12 +401,3 @@ class NarxNetwork(Narx):
             linear=(0.9, 0.05, 0.03),
             hidden=(0.5, 1.0, -0.5, 0.1, 0.02, -0.3, 0.8, 0.2, -0.2, -0.015),
         )
-
-
-def activated(activation: str, s: Array) -> tuple[Array, Array]:
-    """Return the activation of the units at their weighted sums, and its derivative."""
-    if activation == "tanh":
-        a = np.tanh(s)
-        return a, 1 - a**2
-    bell = np.exp(-0.5 * s**2)
-    return (1 - s**2) * bell, (s**3 - 3 * s) * bell

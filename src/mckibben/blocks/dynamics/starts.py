@@ -142,7 +142,9 @@ def known_starts(free: Array, counts: Mask, least: float = KNOWN) -> tuple[Array
     size = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
     responses, spread, turned = np.linalg.svd(free / size, full_matrices=False)
     moved = spread > 1e-12 * spread[0]
-    seen, known, v = np.linalg.svd(responses[np.ix_(counts, moved)], full_matrices=False)
-    determined = known > least
-    states = turned[moved].T @ (v[determined] / spread[moved]).T / known[determined] / size[:, None]
-    return np.asarray(states), np.asarray(seen[:, determined])
+    left, norms, right = np.linalg.svd(responses[np.ix_(counts, moved)], full_matrices=False)
+    determined = norms > least
+    states = (
+        turned[moved].T @ (right[determined] / spread[moved]).T / norms[determined] / size[:, None]
+    )
+    return np.asarray(states), np.asarray(left[:, determined])

@@ -176,7 +176,7 @@ class BoucWen(Invertible):
     """
 
     kind = "bouc-wen"
-    solved, inverse_remembers, n_states = True, "input", 2
+    solved, inverse_memory, n_states = True, "input", 2
     peaks = many_peaks
     start_kernel = bouc_wen_start
     kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
@@ -274,7 +274,7 @@ class GeneralizedBoucWen(Invertible):
     """
 
     kind = "generalized-bouc-wen"
-    solved, inverse_remembers, n_states = True, "input", 2
+    solved, inverse_memory, n_states = True, "input", 2
     peaks = many_peaks
     start_kernel = bouc_wen_start
     kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
@@ -403,7 +403,7 @@ class Duhem(Invertible):
     """
 
     kind = "duhem"
-    solved, inverse_remembers, n_states = True, "input", 2
+    solved, inverse_memory, n_states = True, "input", 2
     peaks = many_peaks
     start_kernel = duhem_start
     kernel, inverse_kernel, inverse_start_kernel = loop_kernels(

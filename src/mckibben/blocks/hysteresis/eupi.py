@@ -23,9 +23,9 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import one_per
 from mckibben.blocks.hysteresis.play_operators import check_thresholds, start_operators
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import inlined, kernel, summing_step
+from mckibben.blocks.kernels import inlined, kernel
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import solved_inverse
+from mckibben.blocks.solving import solved_kernels
 from mckibben.errors import ModelError
 
 
@@ -33,21 +33,6 @@ from mckibben.errors import ModelError
 def unparallel_play(s: float, x: float, r: float, alpha: float, beta: float) -> float:
     """Advance an operator whose edges differ in slope."""
     return max(min(s, alpha * x + beta * r), x - r)
-
-
-@summing_step
-def eupi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Advance the model; coefficients are [u_0, alpha, beta, offset, a_1..a_3, thresholds, weights]."""
-    n = state.size
-    alpha, beta, offset = coefficients[1], coefficients[2], coefficients[3]
-    a1, a2, a3 = coefficients[4], coefficients[5], coefficients[6]
-    r, w = coefficients[7 : n + 7], coefficients[n + 7 :]
-    x = inputs[0] - coefficients[0]
-    y = 0.0
-    for i in range(n):
-        state[i] = unparallel_play(state[i], x, r[i], alpha, beta)
-        y += w[i] * state[i]
-    outputs[0] = offset + ((a3 * x + a2) * x + a1) * x + y
 
 
 @kernel
@@ -63,14 +48,19 @@ def eupi_matrix(x: Array, alpha: float, beta: float, r: Array, s: Array, operato
 
 
 @kernel
-def _advance(u: float, c: Array, state: Array) -> None:
+def eupi_advance(u: float, c: Array, state: Array) -> None:
+    """Update the operators to an input."""
     x = u - c[0]
     for i in range(state.size):
         state[i] = unparallel_play(state[i], x, c[7 + i], c[1], c[2])
 
 
 @kernel
-def _trial(u: float, memory: tuple[Array, Array]) -> float:
+def eupi_output(u: float, memory: tuple[Array, Array]) -> float:
+    """Return the output at an input.
+
+    Coefficients are [u_0, alpha, beta, offset, a_1, a_2, a_3, thresholds, weights].
+    """
     c, state = memory
     n = state.size
     x = u - c[0]
@@ -113,10 +103,11 @@ class EUPI(Invertible):
 
     kind = "eupi"
     solved = True
-    inverse_remembers = "input"
-    kernel = eupi_step
+    inverse_memory = "input"
     start_kernel = eupi_start
-    inverse_kernel, inverse_start_kernel = solved_inverse(_trial, _advance, eupi_start)
+    kernel, inverse_kernel, inverse_start_kernel = solved_kernels(
+        eupi_output, eupi_advance, eupi_start
+    )
     increasing = ("thresholds",)
     parameters = ("weights", "falling_slope", "falling_threshold", "polynomial", "offset")
     typical = (
@@ -179,6 +170,6 @@ class EUPI(Invertible):
         reversible = self.thresholds[0] == 0 and self.falling_slope <= 1
         return float(slope + (self.weights[0] if reversible else 0.0))
 
-    def remembered(self, state: Array) -> tuple[float, ...]:
+    def stored_for_inverse(self, state: Array) -> tuple[float, ...]:
         """Return the lowest input, as operators do not determine the last one."""
         return (self.input_range[0],)

@@ -179,7 +179,7 @@ class GPI(Invertible):
     kind = "gpi"
     kernel, start_kernel, inverse_kernel, inverse_start_kernel = map(of_envelopes, range(4))
     adaptive_step, adaptive_start = map(of_envelopes, (4, 5))
-    inverse_remembers = "output"
+    inverse_memory = "output"
     increasing = ("thresholds",)
     parameters = ("weights", "rising", "falling")
     n_states = one_per("thresholds", 1)  # and the previous input
@@ -235,7 +235,7 @@ class GPI(Invertible):
     def inverse_numbers(self, own: Array) -> Array:
         return np.array([*self.input_limits, *own])
 
-    def remembered(self, state: Array) -> tuple[float, ...]:
+    def stored_for_inverse(self, state: Array) -> tuple[float, ...]:
         return (np.dot(self.weights, state[:-1]),)
 
     @property

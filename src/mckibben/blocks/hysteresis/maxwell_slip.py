@@ -144,7 +144,7 @@ class MaxwellSlip(Invertible):
 
     kind = "maxwell-slip"
     solved = True
-    inverse_remembers = "input"
+    inverse_memory = "input"
     kernel = maxwell_slip_step
     start_kernel = maxwell_slip_start
     inverse_kernel = maxwell_slip_inverse_step

@@ -20,14 +20,13 @@ model, Visintin, "Differential models of hysteresis", 1994.
 From sample to sample the input goes in a straight line (first-order hold) or stays (zero-order); the
 equations are integrated by the classic Runge-Kutta method in substeps of equal length. f jumps only
 where y' passes 0, so that z' has corners and no jumps; steps over these leave errors of second order.
-Straight lines take (omega T)^2 / 12 off a sine of the input, T being the sample time: `steady_state` has
-the input band-limited between samples.
+No estimator makes these models: they are for systems whose equations are known, and for saved files.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -35,8 +34,8 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, Run, Start, needs_sample_time
-from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
+from mckibben.blocks.base import Block, Start, needs_sample_time
+from mckibben.blocks.dynamics.repeating import Hold, Substeps
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import gathered
@@ -47,10 +46,6 @@ HEAD = 7
 
 SETTLING = 64
 """Number of steps in which an initial equilibrium is reached."""
-
-STABLE = 2.5
-"""Angle of the fastest oscillation per substep [rad] above which Runge-Kutta steps may be unstable.
-"""
 
 
 def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[Step, Start]:
@@ -117,35 +112,10 @@ def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[S
 
 
 class Oscillator(Block):
-    """Mass, damper and spring with a hysteretic element of a subclass, from force to displacement.
-
-    Parameters
-    ----------
-    mass : float
-        m, the moving mass [kg]; positive.
-    damping : float
-        c, force by velocity [N s/mm]; not negative.
-    stiffness : float
-        k, force by displacement [N/mm]; positive.
-    output_offset : float or None
-        Added to the displacement [mm]; None for none.
-    substeps : int
-        Runge-Kutta steps from sample to sample.
-    hold : {"first", "zero"}
-        What the input does between samples: go on in a straight line, or stay.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample: at rest where the first input leads slowly, or at rest
-        without any force, from which the input then goes to the first sample within one sample time.
-    input, output : Channel
-        Force and displacement.
-    """
+    """Mass, damper and spring with a hysteretic element of a subclass, from force to displacement."""
 
     rate_dependent = True
-    steady_state = steady_state
     n_states = 4  # displacement, velocity, force of the element, last input
-    slope_by: ClassVar[Any]
-    """Slope of the element's force over y, from [force, velocity, `element`]; compiled."""
-
     elements: ClassVar[tuple[str, ...]]
     """Fields of the hysteretic element."""
 
@@ -155,41 +125,13 @@ class Oscillator(Block):
     output_offset: float | None
     substeps: int
     hold: Hold
-    initial: Any
-
-    @property
-    def element(self) -> Array:
-        """Parameters of the hysteretic element, one-dimensional."""
-        return gathered(self, self.elements)
-
-    @property
-    def fastest(self) -> float:
-        """Angular frequency of small motions about zero force [rad/s]."""
-        slopes = [type(self).slope_by(0.0, way, self.element) for way in (1.0, -1.0)]
-        return float(np.sqrt((self.stiffness + max(*slopes, 0.0)) / self.inertia))
-
-    @property
-    def inertia(self) -> float:
-        """The mass in N s^2/mm."""
-        return 1e-3 * self.mass
 
     def coefficients(self, sample_time: float | None) -> Array:
+        """Return the coefficients described in `oscillator_kernels`; the mass in N s^2/mm."""
         step = needs_sample_time(self.kind, sample_time)
         head = [step / self.substeps, self.substeps, self.hold == "zero"]
-        springs = [self.inertia, self.damping, self.stiffness, self.output_offset or 0.0]
-        return np.array([*head, *springs, *self.element])
-
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that runs the kernel in place; raise an error for too few substeps."""
-        step = needs_sample_time(self.kind, sample_time)
-        angle = self.fastest * step
-        if not angle <= STABLE * self.substeps:
-            raise ModelError(
-                f"{self.kind!r} oscillates by {angle:.3g} rad in a sample of {step:g} s, "
-                f"too fast for {self.substeps} substep(s)",
-                remedy=f"at least {np.ceil(10 * angle):.0f} substeps, or a shorter sample time",
-            )
-        return super().bind(sample_time, state, inputs, outputs)
+        springs = [1e-3 * self.mass, self.damping, self.stiffness, self.output_offset or 0.0]
+        return np.array([*head, *springs, *gathered(self, self.elements)])
 
 
 @kernel
@@ -205,17 +147,31 @@ class BoucWenOscillator(Oscillator):
 
     Parameters
     ----------
+    mass : float
+        m, the moving mass [kg]; positive.
+    damping : float
+        c, force by velocity [N s/mm]; not negative.
+    stiffness : float
+        k, force by displacement [N/mm]; positive.
     slope : float
         Stiffness of the element about z = 0 [N/mm]; positive.
     gamma, delta : float
         Shape of the element: how fast it loses its stiffness, on the whole and by direction [1/mm].
-    **others
-        As of `Oscillator`.
+    output_offset : float or None
+        Added to the displacement [mm]; None for none.
+    substeps : int
+        Runge-Kutta steps from sample to sample.
+    hold : {"first", "zero"}
+        Input between samples: linear, or constant.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: at rest where the first input leads slowly, or at rest
+        without any force, from which the input then goes to the first sample within one sample time.
+    input, output : Channel
+        Force and displacement.
     """
 
     kind = "bouc-wen-oscillator"
     kernel, start_kernel = oscillator_kernels(bouc_wen_slope)
-    slope_by = bouc_wen_slope
     elements = ("slope", "gamma", "delta")
     parameters = ("mass", "damping", "stiffness", "slope", "gamma", "delta", "output_offset")
     typical = (2.0, 0.004, 0.3, 0.2, 0.12, -0.15)
@@ -246,19 +202,11 @@ class BoucWenOscillator(Oscillator):
 
 
 @kernel
-def knot_before(z: float, numbers: Array, n: int) -> int:
-    """Return the knot at which the piece around z starts."""
-    j = 0
-    while j < n - 2 and z >= numbers[j + 1]:
-        j += 1
-    return j
-
-
-@kernel
 def duhem_slope(z: float, velocity: float, numbers: Array) -> float:
     """Return dz/dy; numbers are [knots, rising slopes, falling slopes], equally many."""
-    n = numbers.size // 3
-    j = knot_before(z, numbers, n)
+    n, j = numbers.size // 3, 0
+    while j < n - 2 and z >= numbers[j + 1]:
+        j += 1
     share = (z - numbers[j]) / (numbers[j + 1] - numbers[j])
     share = min(max(share, 0.0), 1.0)
     j += n if velocity > 0.0 else 2 * n
@@ -277,13 +225,12 @@ class DuhemOscillator(Oscillator):
     knots : sequence of float
         Forces of the element [N], increasing, at least two.
     **others
-        As of `Oscillator`.
+        As of `BoucWenOscillator`.
     """
 
     kind = "duhem-oscillator"
     kernel, start_kernel = oscillator_kernels(duhem_slope)
     increasing = ("knots",)
-    slope_by = duhem_slope
     elements = ("knots", "rising", "falling")
     typical = (2.0, 0.004, 0.3, (0.5, 0.2, 0.25), (0.25, 0.2, 0.5), (-2.0, 0.0, 2.0))
     parameters = ("mass", "damping", "stiffness", "rising", "falling", "output_offset")

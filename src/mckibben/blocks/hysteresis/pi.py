@@ -43,7 +43,7 @@ from mckibben.blocks.learning import (
     start_learning,
 )
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import solved_inverse
+from mckibben.blocks.solving import solved_kernels
 
 
 @summing_step
@@ -100,8 +100,8 @@ def pi_adaptive_step(
     """Advance the inverse of a PI model, and adapt its weights and offset to measurements."""
     n = int(coefficients[0]) - 1
     r = coefficients[inverse_at(coefficients) + 3 : inverse_at(coefficients) + n + 3]
-    s, last, learnt = state[:n], state[n : n + 3], state[n + 3 :]
-    follow_learning(coefficients, r, s, last, learnt, scratch, inputs[0], inputs[1])
+    s, last, adapted = state[:n], state[n : n + 3], state[n + 3 :]
+    follow_learning(coefficients, r, s, last, adapted, scratch, inputs[0], inputs[1])
     outputs[0] = s[0]
 
 
@@ -137,7 +137,7 @@ class PI(Invertible):
     start_kernel = pi_start
     inverse_kernel = pi_inverse_step
     inverse_start_kernel = pi_inverse_start
-    inverse_remembers = "output"
+    inverse_memory = "output"
     increasing = ("thresholds",)
     parameters = ("weights", "offset")
     n_states = one_per("thresholds")  # one a play operator
@@ -174,7 +174,7 @@ class PI(Invertible):
         """Return [lowest, highest input, offset, thresholds, weights]."""
         return np.array([*self.input_limits, *own])
 
-    def remembered(self, state: Array) -> tuple[float, ...]:
+    def stored_for_inverse(self, state: Array) -> tuple[float, ...]:
         return (self.offset + np.dot(self.weights, state),)
 
     @property
@@ -190,30 +190,12 @@ class PI(Invertible):
         )
 
 
-@summing_step
-def rate_pi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Advance the model; coefficients are [smoothing, gain of the rate, offset, thresholds, k, d].
-
-    The state is [operators, previous input, filtered rate].
-    """
-    n = state.size - 2
-    r = coefficients[3 : n + 3]
-    k, d = coefficients[n + 3 : 2 * n + 3], coefficients[2 * n + 3 :]
-    u = inputs[0]
-    rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
-    static = 0.0
-    dynamic = 0.0
-    for i in range(n):
-        s = min(max(state[i], u - r[i]), u + r[i])
-        state[i] = s
-        static += d[i] * s
-        dynamic += k[i] * s
-    outputs[0] = coefficients[2] + static + rate * dynamic
-    state[n], state[n + 1] = u, rate
-
-
 @kernel
-def _rate_trial(u: float, memory: tuple[Array, Array]) -> float:
+def rate_pi_output(u: float, memory: tuple[Array, Array]) -> float:
+    """Return the output at an input; the state is [operators, previous input, filtered rate].
+
+    Coefficients are [smoothing, gain of the rate, offset, thresholds, k, d].
+    """
     coefficients, state = memory
     n = state.size - 2
     r = coefficients[3 : n + 3]
@@ -226,7 +208,8 @@ def _rate_trial(u: float, memory: tuple[Array, Array]) -> float:
 
 
 @kernel
-def _rate_advance(u: float, coefficients: Array, state: Array) -> None:
+def rate_pi_advance(u: float, coefficients: Array, state: Array) -> None:
+    """Update the state to an input."""
     n = state.size - 2
     for i in range(n):
         r = coefficients[3 + i]
@@ -268,10 +251,11 @@ class RateDependentPI(Invertible):
     kind = "rate-dependent-pi"
     settable: ClassVar[Mapping[str, str | None]] = {"rate_time_constant": None}
     solved = True
-    kernel = rate_pi_step
     start_kernel = rate_pi_start
-    inverse_kernel, inverse_start_kernel = solved_inverse(_rate_trial, _rate_advance, rate_pi_start)
-    inverse_remembers = "input"
+    kernel, inverse_kernel, inverse_start_kernel = solved_kernels(
+        rate_pi_output, rate_pi_advance, rate_pi_start
+    )
+    inverse_memory = "input"
     rate_dependent = True
     increasing = ("thresholds",)
     parameters = ("rate_weights", "weights", "offset")
@@ -315,7 +299,7 @@ class RateDependentPI(Invertible):
         check_invertible_sum(self.kind, self.thresholds, self.weights)
         super().check_invertible()
 
-    def remembered(self, state: Array) -> tuple[float, ...]:
+    def stored_for_inverse(self, state: Array) -> tuple[float, ...]:
         return (float(state[-2]),)
 
     def reachable(self) -> tuple[Array, Array]:

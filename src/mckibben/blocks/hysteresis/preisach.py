@@ -37,7 +37,7 @@ from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import Parametrised
-from mckibben.blocks.solving import solved_inverse, solved_start
+from mckibben.blocks.solving import solved_kernels, solved_start
 from mckibben.errors import ModelError
 
 
@@ -335,7 +335,8 @@ def _ramp(u: float, levels: Array, i: int) -> float:
 
 
 @kernel
-def _advance(u: float, c: Array, state: Array) -> None:
+def ridges_advance(u: float, c: Array, state: Array) -> None:
+    """Update the operators to an input."""
     n = int(c[0])
     levels = c[2 : 3 + n]
     place = 0
@@ -348,7 +349,11 @@ def _advance(u: float, c: Array, state: Array) -> None:
 
 
 @kernel
-def _trial(u: float, memory: tuple[Array, Array]) -> float:
+def ridges_output(u: float, memory: tuple[Array, Array]) -> float:
+    """Return the output at an input; the state is [operators, previous input].
+
+    Coefficients are [number of intervals, offset, levels, weights].
+    """
     c, state = memory
     n = int(c[0])
     levels = c[2 : 3 + n]
@@ -360,21 +365,6 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
             y += c[3 + n + place] * max(least, min(_ramp(u, levels, j), state[place]))
             place += 1
     return y
-
-
-@step
-def ridges_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; coefficients are [number of intervals, offset, levels, weights].
-
-    The state is [operators, previous input].
-    """
-    n = int(coefficients[0])
-    weights = coefficients[3 + n :]
-    _advance(inputs[0], coefficients, state)
-    y = coefficients[1]
-    for k in range(weights.size):
-        y += weights[k] * state[k]
-    outputs[0] = y
 
 
 @kernel
@@ -410,10 +400,11 @@ class KrasnoselskiiPokrovskii(Triangle, Invertible):
     kind = "krasnoselskii-pokrovskii"
     typical = Triangle.near_diagonal(4.0)
     solved = True
-    inverse_remembers = "input"
-    kernel = ridges_step
+    inverse_memory = "input"
     start_kernel = ridges_start
-    inverse_kernel, inverse_start_kernel = solved_inverse(_trial, _advance, ridges_start)
+    kernel, inverse_kernel, inverse_start_kernel = solved_kernels(
+        ridges_output, ridges_advance, ridges_start
+    )
     n_states = one_per("weights", 1)  # operators and the previous input
     notation = Notation(
         r"y = y_0 + \sum_{j \le i} w_{ij} s_{ij}",
@@ -437,6 +428,6 @@ class KrasnoselskiiPokrovskii(Triangle, Invertible):
             return float(least / np.diff(self.levels).min())
         return float(np.min(on_diagonal(self.weights) / np.diff(self.levels)))
 
-    def remembered(self, state: Array) -> tuple[float, ...]:
+    def stored_for_inverse(self, state: Array) -> tuple[float, ...]:
         """Return the last input, within the levels."""
         return (float(np.clip(state[-1], *self.input_range)),)

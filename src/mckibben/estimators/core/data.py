@@ -79,7 +79,7 @@ class Run:
     def condensed(self) -> Run:
         """Return the run reduced to scored samples and turning points of the input.
 
-        Play operators do not feel how the input went from one turning point to the next. Turns within
+        Play operators do not depend on the path between turning points. Turns within
         the noise go too, so this is for searching, not for the final word.
         """
         from mckibben.signals import reversals
@@ -245,16 +245,6 @@ class TrainingData:
     def stacked(self, what: str) -> Array:
         """Return a field of all runs, concatenated."""
         return np.concatenate([getattr(run, what) for run in self.runs])
-
-    def between(self, start: float, stop: float) -> TrainingData:
-        """Return the same runs, scored only between two shares of their time."""
-
-        def part(run: Run) -> Run:
-            shares = np.arange(run.counts.size)
-            inside = (shares >= round(start * shares.size)) & (shares < round(stop * shares.size))
-            return replace(run, counts=run.counts & inside)
-
-        return self._changed(part)
 
     def thinned(self, most: int) -> TrainingData:
         """Return the same runs with fewer scored samples, evenly spread; inputs are unchanged."""

@@ -62,7 +62,7 @@ FEW, MOST, MOST_SAMPLES = 6_000, 12_000, 60_000
 """Number of errors used to select terms, and for the final fit; number of samples simulated there.
 """
 
-GRIPS = (0.05, 0.3, 1.0, 4.0)
+FRICTION_OFFSETS = (0.05, 0.3, 1.0, 4.0)
 """Initial friction offsets: pressures below zero, relative to the highest, at which friction
 vanishes.
 """
@@ -87,7 +87,17 @@ PLACES = (0.6, 0.8, 0.9, 0.97)
 
 TERMS = (
     *("elasticity", "areas", "relaxation", "line", "mass", "obstacle", "springs"),
-    *("grips", "asymmetry", "walls", "filling", "venting", "dead", "contact", "muscles", "slack"),
+    *(
+        "friction_slopes",
+        "asymmetry",
+        "walls",
+        "filling",
+        "venting",
+        "dead",
+        "contact",
+        "muscles",
+        "slack",
+    ),
 )
 """Kinds of candidate terms."""
 
@@ -105,10 +115,10 @@ class BalanceEstimator(CoupledEstimator):
         Kinds of terms that may be added to springs, area, friction, relaxation and damping: more
         degrees of ``elasticity`` and ``areas``, more lags (``relaxation``), the ``line``, ``mass``, an
         ``obstacle`` either way, springs by squares of what schedules (``springs``), friction that grows
-        with what schedules (``grips``) or differs by direction (``asymmetry``), stretch of the wall
-        (``walls``), air's lag in front (``filling``, ``venting``), a ``dead`` zone, or one that fades
-        (``contact``), ``muscles`` that differ, and that go ``slack``. Each is added if the error of what
-        is left out falls by more than its standard error. Default all.
+        with scheduling inputs (``friction_slopes``) or differs by direction (``asymmetry``), stretch of
+        the wall (``walls``), air's lag in front (``filling``, ``venting``), a ``dead`` zone, or one that
+        fades (``contact``), ``muscles`` that differ, and that go ``slack``. Each is added if the error
+        of what is left out falls by more than its standard error. Default all.
     friction : {"pressure", "constant"}
         Whether the forces at which stops break away grow with pressure.
     n_stops : int
@@ -343,7 +353,7 @@ class BalanceEstimator(CoupledEstimator):
             if kind in ("elasticity", "areas"):
                 return which < 2
             return kind in ("loads", "damping", "bladder", "friction") or (
-                kind == "grip" and bool(structure.limits) and self.friction == "pressure"
+                kind == "friction_offset" and bool(structure.limits) and self.friction == "pressure"
             )
 
         return np.array([term.muscle is None and there(term) for term in structure.terms])
@@ -410,13 +420,13 @@ class BalanceEstimator(CoupledEstimator):
     def _balanced(self, search: Search, tracker: Tracker) -> Array:
         """Return the best linear force balance at measured positions, over several friction offsets."""
         structure, problem, starts = search.structure, search.problem, []
-        grips = GRIPS[: None if structure.limits else 1]
-        for grip in grips if self.friction == "pressure" else (CONSTANT,):
+        offsets = FRICTION_OFFSETS[: None if structure.limits else 1]
+        for offset in offsets if self.friction == "pressure" else (CONSTANT,):
             z = np.zeros(problem.size(structure))
-            z[: len(structure.terms)] = structure.initial(grip * structure.bench.highest)
+            z[: len(structure.terms)] = structure.initial(offset * structure.bench.highest)
             z = problem.balanced(structure, z, search.active)
             starts.append((search.cost(z), z))
-            tracker.saw(z, starts[-1][0])
+            tracker.update(z, starts[-1][0])
         return min(starts, key=lambda start: start[0])[1]
 
     def _likely(self, search: Search) -> Array:
@@ -424,7 +434,7 @@ class BalanceEstimator(CoupledEstimator):
         structure, prior_errors, problem = search.structure, search.prior_errors, search.problem
         assert prior_errors is not None
         z = np.zeros(problem.size(structure))
-        z[: len(structure.terms)] = structure.initial(FIRST_GRIP * structure.bench.highest)
+        z[: len(structure.terms)] = structure.initial(FIRST_OFFSET * structure.bench.highest)
         for place, term in enumerate(structure.terms):
             if term.kind == "loads":
                 z[place] = 1.0 / prior_errors.prior.sheet.area
@@ -437,7 +447,7 @@ class BalanceEstimator(CoupledEstimator):
         """Return whether a term is a candidate."""
         if term.muscle is not None:
             return self.may("muscles")
-        if term.kind in ("grip", "grips") and self.friction == "constant":
+        if term.kind in ("friction_offset", "friction_slopes") and self.friction == "constant":
             return False
         if term.kind in ("filling", "venting") and not structure.bench.step:
             return False
@@ -479,7 +489,7 @@ class BalanceEstimator(CoupledEstimator):
         return self._search.problem.simulated(blocks, data, self._search.structure, self._z)
 
 
-FIRST_GRIP, TOWARDS, REFINED = 0.1, 60, 3
+FIRST_OFFSET, TOWARDS, REFINED = 0.1, 60, 3
 """First friction offset of the prior, relative to the highest pressure; maximum number of steps
 from there; number of reweightings of the prior.
 """

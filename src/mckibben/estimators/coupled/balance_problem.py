@@ -28,7 +28,7 @@ from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.coupled.constrained import constrained_least_squares
 
 EXACT, OF_AIR = (
-    ("grip", "grips", "asymmetry", "lags", "places"),
+    ("friction_offset", "friction_slopes", "asymmetry", "lags", "places"),
     ("filling", "venting", "dead", "contact"),
 )
 """Nonlinear parameters with exact derivatives, in the order of `balance_slopes`; and those of the

@@ -56,10 +56,10 @@ SLOW, SLOWEST = 1e-3, 2
 DEVIATIONS = (("areas",), ("elasticity", "bladder"), ("friction",), ("relaxation", "damping"))
 """Kinds in which muscles may differ together."""
 
-NEW_SHAPE = ("asymmetry", "grips", "walls", "filling", "dead", "contact", "venting")
+NEW_SHAPE = ("asymmetry", "friction_slopes", "walls", "filling", "dead", "contact", "venting")
 """Nonlinear parameters that are added alone."""
 
-POSITIVE_SHAPE = ("grip", "grips", "walls", "filling", "dead", "contact")
+POSITIVE_SHAPE = ("friction_offset", "friction_slopes", "walls", "filling", "dead", "contact")
 """Non-negative nonlinear parameters."""
 
 
@@ -136,7 +136,7 @@ class Search:
         damping, slow = FIRST_DAMPING, 0
         errors, slopes = self.errors(z, self.active)
         cost = _size(errors)
-        tracker.saw(z, cost)
+        tracker.update(z, cost)
         for _ in range(steps):
             usable = np.isfinite(slopes).all(axis=1) & np.isfinite(errors)
             moving = slopes[usable][:, self.free]
@@ -156,7 +156,7 @@ class Search:
                 return z
             slow = slow + 1 if found > (1.0 - SLOW) * cost else 0
             z, cost = tried, found
-            tracker.saw(z, cost)
+            tracker.update(z, cost)
             if slow >= SLOWEST:
                 return z
             damping = max(damping / 5.0, LIGHTEST**2)
@@ -350,9 +350,9 @@ class Search:
             if ("springs", which) not in on:
                 yield group(Term("springs", which))
         for which in range(len(self.structure.bench.scheduled)):
-            if ("grips", which) not in on:
-                yield group(Term("grips", which))
-        ruled_out = {"grips", *(() if ("filling", 0) in on else ("venting",))}
+            if ("friction_slopes", which) not in on:
+                yield group(Term("friction_slopes", which))
+        ruled_out = {"friction_slopes", *(() if ("filling", 0) in on else ("venting",))}
         if {("dead", 0), ("contact", 0)} & on:
             ruled_out |= {"dead", "contact"}
         for kind in NEW_SHAPE:

@@ -4,9 +4,9 @@ Either free, where its coordinates are what matters, or held where they were mea
 that it then lacks are: those are linear, and memory does not depend on coefficients. The direct slopes
 are the terms of `mckibben.blocks.coupled.balance_law`; what moves them through the past is carried.
 
-Columns of slopes are the coefficients from those of the first coordinate on, then the shape: the grip,
-what schedules friction, the logarithms of the ratio of limits and of lags, places of obstacles, and what
-changes the pressures that act, whose slopes are given.
+Columns of slopes are the coefficients from those of the first coordinate on, then the shape: the
+friction offset, its slopes by scheduling inputs, the logarithms of the ratio of limits and of lags,
+places of obstacles, and what changes the pressures that act, whose slopes are given.
 """
 
 from __future__ import annotations

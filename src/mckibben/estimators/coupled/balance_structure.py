@@ -229,13 +229,18 @@ class Structure:
     def nonlinear(self) -> dict[str, slice]:
         """Positions of the nonlinear parameters in the values.
 
-        Friction pressure offset (grip) [bar], and its change with scheduling inputs (grips); logarithms
+        Friction offset [bar], and its slopes by scheduling inputs; logarithms
         of the ratio of friction limits and of the lags; stretch of walls [mm/bar]; forces at which
         muscles go slack (pushes); positions of obstacles (places); time constant of filling [s],
         logarithm of the ratio of venting to filling, dead zone [bar], and the pressure over which
         contact builds up [bar].
         """
-        widths = {"grip": 1, "grips": self.n_x, "asymmetry": 1, "lags": len(self.lags)}
+        widths = {
+            "friction_offset": 1,
+            "friction_slopes": self.n_x,
+            "asymmetry": 1,
+            "lags": len(self.lags),
+        }
         widths |= {"walls": 1, "pushes": self.n, "places": self.m * len(self.obstacles)}
         widths |= {"filling": 1, "venting": 1, "dead": 1, "contact": 1}
         return _slices(widths, self.n_linear)
@@ -325,12 +330,12 @@ class Structure:
         n = self.mix.shape[1]
         return np.concatenate([self.base + self.mix @ free[:n], free[n:]])
 
-    def initial(self, grip: float) -> Array:
+    def initial(self, friction_offset: float) -> Array:
         """Return initial free parameters: all terms without effect, except the friction offset."""
         low = self.bench.lowest[:, np.newaxis]
         positions = low + np.outer(self.bench.travel, [position for _, position in self.obstacles])
         free = np.zeros(len(self.terms))
-        free[self.free("grip")] = grip
+        free[self.free("friction_offset")] = friction_offset
         free[self.free("lags")] = np.log(self.lags)
         free[self.free("pushes")] = NEVER
         free[self.free("places")] = positions.ravel()
@@ -380,8 +385,8 @@ class Structure:
         per_x = bench.highest / bench.largest
         (shortest, longest), log_ratio = np.log(bench.lag_range), np.log(5.0)
         bounds: dict[str, tuple[ArrayLike, ArrayLike, ArrayLike]] = {
-            "grip": (0.0, 4.0 * bench.highest, bench.highest),
-            "grips": (0.0, 4.0 * per_x, per_x),
+            "friction_offset": (0.0, 4.0 * bench.highest, bench.highest),
+            "friction_slopes": (0.0, 4.0 * per_x, per_x),
             "asymmetry": (-log_ratio, log_ratio, 1.0),
             "lags": (shortest, longest, 1.0),
             "walls": (0.0, 0.1 * per_bar, 0.2 * 0.1 * per_bar),
@@ -419,7 +424,7 @@ class Structure:
         merged = final and taut and not bench.directed
         if merged:
             springs[np.arange(m), 1 + np.arange(m)] += bladders
-        grips = self.nonlinear_values(values, "grips")
+        friction_slopes = self.nonlinear_values(values, "friction_slopes")
         ratio = float(self.nonlinear_values(values, "asymmetry")[0])
         sides = [[side] for side, _ in self.obstacles]
         obstacles = [
@@ -440,8 +445,8 @@ class Structure:
             bladders=() if merged else vector(bladders),
             pushes=() if taut else vector(pushes),
             limits=self.limits,
-            grip=float(self.nonlinear_values(values, "grip")[0]),
-            grips=vector(grips) if not final or grips.any() else (),
+            friction_offset=float(self.nonlinear_values(values, "friction_offset")[0]),
+            friction_slopes=vector(friction_slopes) if not final or friction_slopes.any() else (),
             asymmetry=None if final and ratio == 1.0 else ratio,
             obstacles=rows(np.array(obstacles)),
             lags=vector(self.nonlinear_values(values, "lags")),

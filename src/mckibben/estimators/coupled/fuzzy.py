@@ -221,7 +221,7 @@ def project(problem: Problem, n_sets: int, low: Array, high: Array, tracker: Tra
     def slopes(theta: Array) -> Array:
         sets = start.replaced(theta)
         by_theta, left = sensitivities(problem, sets)
-        tracker.saw(theta, float(np.sqrt(np.mean(left**2))))
+        tracker.update(theta, float(np.sqrt(np.mean(left**2))))
         return np.vstack([by_theta, np.diag(staying)])
 
     tracker.budget = MOST_STEPS + 1

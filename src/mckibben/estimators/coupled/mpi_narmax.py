@@ -310,5 +310,5 @@ class RecurrentProblem:
 
         own = tracker.part(0.1, 0.9)
         found = particle_swarm(costs, lower, upper, SWARM, own, rng, start=start)
-        tracker.saw_all(own)
+        tracker.update_from(own)
         return split(found)

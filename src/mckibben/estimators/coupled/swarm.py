@@ -70,7 +70,7 @@ def particle_swarm(
         better = cost < own_cost
         own[better], own_cost[better] = position[better], cost[better]
         for point, value in zip(position, cost, strict=True):
-            tracker.saw(point, float(value))
+            tracker.update(point, float(value))
         leader = own[np.argmin(own_cost)]
         weight = first + (last - first) * iteration / max(swarm.iterations, 1)
         pulls = rng.random((2, *shape))

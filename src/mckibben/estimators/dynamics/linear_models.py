@@ -65,7 +65,7 @@ class PredictionErrorEstimator(Estimator):
         Channels to learn from. Of several inputs, A is common to all, and every input has an F of its
         own; several outputs are identified one after another. Runs then start at rest at their first
         inputs, where `initial` is "fitted" too.
-    beside : sequence of str, optional
+    scheduling : sequence of str, optional
         Further inputs, such as a load. Default: of several inputs or outputs ``pressure_extensor`` and
         ``force``, where there are any.
     initial : {"fitted", "first_sample", "virgin"}
@@ -86,7 +86,7 @@ class PredictionErrorEstimator(Estimator):
     input: str | tuple[str, ...] = "pressure"
     output: str | tuple[str, ...] = "displacement"
     initial: Initial = "fitted"
-    beside: tuple[str, ...] | None = None
+    scheduling: tuple[str, ...] | None = None
     n_zeros: Annotated[int, Interval(ge=1, le=20)] = 2
     n_poles: Order = 2
     shared_poles: bool = True
@@ -124,7 +124,7 @@ class PredictionErrorEstimator(Estimator):
     @property
     def single(self) -> bool:
         """Whether there are one input and one output."""
-        return isinstance(self.input, str) and isinstance(self.output, str) and not self.beside
+        return isinstance(self.input, str) and isinstance(self.output, str) and not self.scheduling
 
     @classmethod
     def objection(
@@ -136,10 +136,10 @@ class PredictionErrorEstimator(Estimator):
     ) -> str | None:
         if not inputs or not outputs:
             return "it needs an input and an output"
-        beside = scheduling or ()
+        further = scheduling or ()
         if scheduling is None and len((*inputs, *outputs)) > 2:
-            beside = schedules(recordings, (*inputs, *outputs))
-        for name in beside:
+            further = schedules(recordings, (*inputs, *outputs))
+        for name in further:
             if absent := [each.name for each in recordings if name not in each]:
                 return f"it needs the channel {name!r}, which {absent[0]} lacks"
         return resting(recordings, inputs)
@@ -153,8 +153,8 @@ class PredictionErrorEstimator(Estimator):
     ) -> dict[str, Any]:
         if len(inputs) == len(outputs) == 1 and scheduling is None:
             return {"input": inputs[0], "output": outputs[0]}
-        beside = None if scheduling is None else tuple(scheduling)
-        return {"input": tuple(inputs), "output": tuple(outputs), "beside": beside}
+        named = None if scheduling is None else tuple(scheduling)
+        return {"input": tuple(inputs), "output": tuple(outputs), "scheduling": named}
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
@@ -164,10 +164,10 @@ class PredictionErrorEstimator(Estimator):
             return super().data(recordings, rows)
         driving, given = ((of,) if isinstance(of, str) else of for of in (self.input, self.output))
         every = listed(recordings)
-        beside = self.beside
-        if beside is None:
-            beside = schedules(every, (*driving, *given))
-        moving = [name for name in beside if any(name in r and np.ptp(r[name]) > 0 for r in every)]
+        further = self.scheduling
+        if further is None:
+            further = schedules(every, (*driving, *given))
+        moving = [name for name in further if any(name in r and np.ptp(r[name]) > 0 for r in every)]
         whole = replace(self, input=(*driving, *moving), output=tuple(given))
         return super(PredictionErrorEstimator, whole).data(recordings, rows)
 
@@ -179,7 +179,7 @@ class PredictionErrorEstimator(Estimator):
             runs = tuple(replace(run, outputs=run.outputs[:, [place]]) for run in data.runs)
             own = tracker.part(place * share, (place + 1) * share)
             parts += self._of_output(replace(data, runs=runs, outputs=(output,)), own)
-            tracker.saw_all(own)
+            tracker.update_from(own)
         return (parts[0] if self.single else Parallel(tuple(parts))), data
 
     def _of_output(self, data: TrainingData, tracker: Tracker) -> tuple[TransferFunction, ...]:
@@ -211,7 +211,7 @@ class PredictionErrorEstimator(Estimator):
             runs = known  # a free run needs no outputs, so it alone goes on where they do not count
         if orders.c == orders.d == orders.f == 0:
             theta = arx(runs, orders)
-            tracker.saw(theta, evaluate(theta, orders, runs, start)[2])
+            tracker.update(theta, evaluate(theta, orders, runs, start)[2])
         else:
             plant = replace(orders, c=0, d=0)
             if plant.f:
@@ -222,7 +222,7 @@ class PredictionErrorEstimator(Estimator):
             if plant != orders:
                 own = tracker.part(0.5, 1.0)
                 theta = minimise(runs, orders, [with_noise(theta, orders, runs)], own, start)
-                tracker.saw_all(own)
+                tracker.update_from(own)
                 tracker.best, tracker.best_cost = own.best, own.best_cost
         theta[: orders.zeros] *= np.repeat(wanted / given, orders.b)
         theta[-1] *= wanted

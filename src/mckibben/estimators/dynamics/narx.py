@@ -29,7 +29,6 @@ from mckibben.blocks.dynamics.narx import (
     Narx,
     NarxNetwork,
     NarxPolynomial,
-    activated,
     products,
 )
 from mckibben.blocks.fields import vector
@@ -101,8 +100,6 @@ class NarxEstimator(SearchEstimator):
         Most terms of a polynomial; half and a quarter of them are tried too, and the best free run kept.
     n_units : int
         Units of a network's hidden layer.
-    activation : {"tanh", "wavelet"}
-        Of the units.
     n_starts : int
         Random hidden layers tried.
     """
@@ -134,7 +131,6 @@ class NarxEstimator(SearchEstimator):
     degree: Annotated[int, Interval(ge=1, le=6)] = 3
     n_terms: Annotated[int, Interval(ge=1, le=200)] = 16
     n_units: Annotated[int, Interval(ge=1, le=100)] = 5
-    activation: Literal["tanh", "wavelet"] = "tanh"
     n_starts: Annotated[int, Interval(ge=1, le=100)] = 3
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
@@ -224,9 +220,7 @@ class NarxEstimator(SearchEstimator):
     ) -> list[Narx]:
         """Return networks fitted to one-step errors by variable projection, one per start."""
         x, y = one_step_pairs(fields, data, LAYER_SAMPLES)
-        layers = HiddenLayers(
-            x, y, {"activation": self.activation, **fields}, self.n_units, tracker
-        )
+        layers = HiddenLayers(x, y, fields, self.n_units, tracker)
         rng = np.random.default_rng(self.seed)
         models: list[Narx] = []
         for _ in range(self.n_starts):
@@ -398,7 +392,7 @@ class HiddenLayers:
 
     def _columns(self, rows: Array) -> Array:
         """Return the regressors of the output weights: constant, regressors, units; then damping."""
-        a, _ = activated(self.fields["activation"], self.x @ rows[:, :-1].T + rows[:, -1])
+        a = np.tanh(self.x @ rows[:, :-1].T + rows[:, -1])
         columns = np.column_stack([np.ones(len(a)), self.x, a])
         return np.vstack([columns, DAMPING * np.eye(columns.shape[1])])
 
@@ -499,7 +493,7 @@ class FreeRuns:
         half = self.model.output_scale[1]
         errors = (self.outputs(self.model.unpack(theta))[self.counts] - self.target) / half
         errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
-        self.tracker.saw(theta, half * float(np.sqrt(np.mean(errors**2))))
+        self.tracker.update(theta, half * float(np.sqrt(np.mean(errors**2))))
         return errors
 
     def slopes(self, theta: Array) -> Array:

@@ -45,7 +45,7 @@ NOISE_SAMPLES = 2000
 SAME = 1e-6
 """Relative difference of equal errors."""
 
-FELT = 1e-13
+LEAST_RESPONSE = 1e-13
 """Smallest share of a start's response at the samples used for which it is estimated."""
 
 LEAST_GAIN = 2e-9
@@ -276,11 +276,11 @@ def evaluate(
             e, jacobian = errors(theta, orders, run, start)
             e, own = e[run.counts], jacobian[run.counts]
         else:
-            states, seen = known_starts(starts, run.counts, FELT)
-            e, jacobian = errors(theta, orders, run, start, -states @ (seen.T @ e[run.counts]))
+            states, responses = known_starts(starts, run.counts, LEAST_RESPONSE)
+            e, jacobian = errors(theta, orders, run, start, -states @ (responses.T @ e[run.counts]))
             e, own = e[run.counts], jacobian[run.counts, : orders.size]
-            e = e - seen @ (seen.T @ e)
-            own = own - seen @ (seen.T @ own)
+            e = e - responses @ (responses.T @ e)
+            own = own - responses @ (responses.T @ own)
         found.append(e)
         slopes.append(own)
     e = np.concatenate(found)
@@ -300,7 +300,7 @@ def minimise(
     here = At(orders, runs, start, tracker)
     search = partial(trust_region, scale="jac", least_gain=LEAST_GAIN)
 
-    def begun(theta: Array) -> tuple[Array, float]:
+    def first_steps(theta: Array) -> tuple[Array, float]:
         found, squares = search(here.errors, here.slopes, theta, max_evaluations=FIRST_STEPS)[-1]
         return found, float(np.sqrt(squares))
 
@@ -308,7 +308,7 @@ def minimise(
         search(here.errors, here.slopes, theta, max_evaluations=STEPS)
 
     starting = (theta for theta in starts if admissible(theta, orders))
-    follow_best(starting, begun, followed, FOLLOWED, SAME)
+    follow_best(starting, first_steps, followed, FOLLOWED, SAME)
     assert tracker.best is not None
     return tracker.best
 
@@ -324,7 +324,7 @@ class At:
         if not admissible(theta, self.orders):
             return np.full(sum(int(run.counts.sum()) for run in self.runs), np.inf)
         e, self._slopes, cost = evaluate(theta, self.orders, self.runs, self.start)
-        self.tracker.saw(theta, cost)
+        self.tracker.update(theta, cost)
         return e
 
     def slopes(self, theta: Array) -> Array:

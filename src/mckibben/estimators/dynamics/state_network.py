@@ -272,7 +272,7 @@ class NetworkRuns:
         found = self._followed(theta, theta.size)
         self._slopes = found[:, 1:]
         errors = found[:, 0] - self.target
-        self.tracker.saw(theta, float(np.sqrt(np.mean(errors**2))))
+        self.tracker.update(theta, float(np.sqrt(np.mean(errors**2))))
         return np.asarray(errors)
 
     def slopes(self, theta: Array) -> Array:

@@ -229,7 +229,7 @@ class ActivationPressureEstimator(SearchEstimator):
         from scipy.optimize import least_squares
 
         found = least_squares(errors, np.append(start, 0.0), bounds=(lower, upper)).x
-        tracker.saw(found, float(np.sqrt(np.mean(errors(found) ** 2))))
+        tracker.update(found, float(np.sqrt(np.mean(errors(found) ** 2))))
         phi = found[:4] / largest ** np.array([3, 2, 1, 0])
         slope = float(found[4]) / max(middle, 1e-9)
         return phi, (slope, 1.0 - slope * middle)

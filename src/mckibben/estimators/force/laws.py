@@ -124,7 +124,7 @@ class ChouHannafordEstimator(SeparableEstimator):
         """Return pressure times squared length, relative to its least, and absolute.
 
         The law crosses zero at b / sqrt(3): weights of at least 0 keep that between no length at all
-        and the shortest seen.
+        and the shortest recorded.
         """
         length, pressure = run.inputs.T
         shortest = data.input_range[0]

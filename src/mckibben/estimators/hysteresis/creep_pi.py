@@ -25,7 +25,6 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, Operators
 from mckibben.estimators.core.separable import (
     LEAST_REVERSIBLE,
-    SEARCH_SAMPLES,
     SeparableEstimator,
     counting,
 )
@@ -44,9 +43,6 @@ FASTEST, SLOWEST = 3.0, 3.0
 
 HELPS = 0.9
 """Ratio of errors below which an initial creep state is estimated."""
-
-FEWEST = 20
-"""Smallest number of samples for testing that choice on later parts of runs."""
 
 MOST_CREEP = 0.3
 """Largest compliance of an element, relative to the immediate response."""
@@ -67,8 +63,7 @@ class CreepPIEstimator(SeparableEstimator):
         Visco-elastic elements.
     settled : bool, optional
         Whether creep had ended before every recording, at its first input; otherwise its state there is
-        estimated. Default: estimated where this reduces the error by more than a tenth, and predicts
-        later parts of the recordings better.
+        estimated. Default: estimated where this reduces the error by more than a tenth.
     map_size : int
         Degree of the increasing polynomial behind them.
     threshold_share : float
@@ -112,32 +107,14 @@ class CreepPIEstimator(SeparableEstimator):
             return super().identify(data, tracker)
         first, second = tracker.part(0.0, 0.5), tracker.part(0.5, 0.9)
         settled = self._with(settled=True).identify(data, first)
-        tracker.saw_all(first)
+        tracker.update_from(first)
         tracker.best, tracker.best_cost = first.best, first.best_cost
-        begun = self._with(settled=False).identify(data, second)
-        helps = second.best_cost < HELPS * first.best_cost and self._foresees(data, second)
-        tracker.saw_all(second)
-        if not helps:
+        estimated = self._with(settled=False).identify(data, second)
+        tracker.update_from(second)
+        if not second.best_cost < HELPS * first.best_cost:
             return settled
         tracker.best, tracker.best_cost = second.best, second.best_cost
-        return begun
-
-    def _foresees(self, data: TrainingData, tracker: Tracker) -> bool:
-        """Return whether estimated initial creep improves the prediction of later parts of runs."""
-        missed = {True: 0.0, False: 0.0}
-        for end in (0.5, 0.75):
-            known = data.between(0.0, end).thinned(SEARCH_SAMPLES)
-            later = data.between(end, end + 0.25).thinned(SEARCH_SAMPLES)
-            if min(known.target.size, later.target.size) < FEWEST:
-                return False
-            for settled in missed:
-                tried, part = self._with(settled=settled), tracker.part(0.9, 0.9)
-                theta = tried._search(known, part)
-                tracker.saw_all(part)
-                linear, offset = tried.solve(tried.matrix(theta, known), known)
-                errors = tried.matrix(theta, later) @ linear + offset - later.target
-                missed[settled] += float(errors @ errors)
-        return missed[False] < missed[True]
+        return estimated
 
     def _with(self, **settings: bool) -> Self:
         """Return the same estimator with other settings."""
@@ -163,7 +140,7 @@ class CreepPIEstimator(SeparableEstimator):
             return 0
         return self.n_creep * (1 + max(run.place for run in data.runs))
 
-    def begun(self, theta: Array, run: Run, data: TrainingData) -> Array:
+    def initial_creep(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the decay of initial creep over a run, (n, n_initial).
 
         What an element was behind by, times its compliance, is one number an element and a run.
@@ -180,7 +157,7 @@ class CreepPIEstimator(SeparableEstimator):
     ) -> Array:
         """Return its derivatives by the logarithms of the time constants, (n, n_creep)."""
         taus, _ = self.tail(theta)
-        columns = self.begun(theta, run, data) * left
+        columns = self.initial_creep(theta, run, data) * left
         by_element = columns.reshape(len(columns), -1, self.n_creep).sum(axis=1)
         return np.asarray(by_element * elapsed(run)[:, np.newaxis] / taus)
 
@@ -233,7 +210,7 @@ class CreepPIEstimator(SeparableEstimator):
         crept = with_creep(
             PolynomialMap(self.map_size).pieces(x), *self.creep(theta), run.sample_time
         )
-        return np.hstack([crept, self.begun(theta, run, data)])
+        return np.hstack([crept, self.initial_creep(theta, run, data)])
 
     def argument(self, theta: Array, run: Run, data: TrainingData) -> tuple[Array, Array]:
         """Return the argument of the map, 0 to 1, and its derivatives by the relative weights."""

@@ -1,13 +1,11 @@
-"""Multi-start optimisation within bounds, with exchange of parameter groups."""
+"""Multi-start optimisation within bounds."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -17,33 +15,6 @@ MARGIN = 1e-9
 
 SHORTEST = 1e-9
 """Step, relative to the parameters, that counts as zero."""
-
-EXCHANGES = 3
-"""Maximum number of exchanges of parameter groups, each followed by a refinement."""
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Alternatives, shape (n, k), for some of the parameters together."""
-
-    places: NDArray[np.intp]
-    values: Array
-
-
-def exchange(cost: Callable[[Array], float], start: Array, choices: Sequence[Choice]) -> Array:
-    """Return the best point after exchanging group after group, or the start if none is better.
-
-    It leaves local minima from which no small step leads on.
-    """
-    best, least = start, cost(start)
-    for choice in choices:
-        held = best
-        for values in choice.values:
-            tried = held.copy()
-            tried[choice.places] = values
-            if (found := cost(tried)) < least:
-                best, least = tried, found
-    return best
 
 
 def multi_start(
@@ -56,13 +27,11 @@ def multi_start(
     n_refined: int,
     max_evaluations: int,
     jacobian: Callable[[Array], Array] | None = None,
-    choices: Sequence[Choice] = (),
 ) -> Array:
     """Return the best point after refining the most promising of many starts within bounds.
 
     Every start is evaluated once; the best ``n_refined`` are refined by a bounded trust-region
-    method, with the derivatives of the residuals where given, else with finite differences. Where
-    there are choices, the best is then improved by exchange, and refined again.
+    method, with the derivatives of the residuals where given, else with finite differences.
 
     Residuals are refined relative to the least RMSE of the starts, and parameters relative to their
     bounds, so that no tolerance or step of the search depends on a unit.
@@ -71,13 +40,13 @@ def multi_start(
 
     def evaluate(point: Array) -> Array:
         r = residuals(point)
-        tracker.saw(point, float(np.sqrt(np.mean(r**2))))
+        tracker.update(point, float(np.sqrt(np.mean(r**2))))
         return r
 
     def cost(point: Array) -> float:
         return float(np.mean(evaluate(point) ** 2))
 
-    def begun(start: Array) -> tuple[Array, float]:
+    def evaluated(start: Array) -> tuple[Array, float]:
         inside = np.clip(start, lower, upper)
         return inside, cost(inside)
 
@@ -103,36 +72,29 @@ def multi_start(
             gtol=None,
         )
 
-    follow_best(starts, begun, refine, n_refined)
-    for _ in range(EXCHANGES if choices else 0):
-        assert tracker.best is not None
-        best = tracker.best
-        better = exchange(cost, best, choices)
-        if better is best:
-            break
-        refine(better)
+    follow_best(starts, evaluated, refine, n_refined)
     assert tracker.best is not None
     return tracker.best
 
 
 def follow_best(
     starts: Iterable[Array],
-    begun: Callable[[Array], tuple[Array, float]],
-    followed: Callable[[Array], object],
+    first_steps: Callable[[Array], tuple[Array, float]],
+    refine: Callable[[Array], object],
     most: int,
     same: float = -1.0,
 ) -> None:
     """Evaluate many starts, and refine the best ``most`` of them.
 
-    ``begun`` leads from a start to a place not far from it, and the cost there. Starts whose costs
+    ``first_steps`` leads from a start to a place not far from it, and the cost there. Starts whose costs
     differ by up to ``same``, relatively, have come to one place, which is followed once.
     """
-    tried = sorted((begun(start) for start in starts), key=lambda found: found[1])
+    tried = sorted((first_steps(start) for start in starts), key=lambda found: found[1])
     costs: list[float] = []
     for place, cost in tried:
         if len(costs) < most and all(abs(cost - other) > same * cost for other in costs):
             costs.append(cost)
-            followed(place)
+            refine(place)
 
 
 def trust_region(

@@ -44,11 +44,11 @@ class Tracker:
 
         return Tracker(progress=report, budget=self.budget)
 
-    def saw_all(self, part: Tracker) -> None:
+    def update_from(self, part: Tracker) -> None:
         """Register a finished part, without its best point."""
         self.evaluations += part.evaluations
 
-    def saw(self, point: Array, cost: float) -> None:
+    def update(self, point: Array, cost: float) -> None:
         """Register one evaluation."""
         self.evaluations += 1
         if cost < self.best_cost:

@@ -54,8 +54,8 @@ STEPS = (
         "data",
         "Data",
         "Each recording is listed with its channels and role. *Import settings* shows how the file was "
-        "read, and changes it: columns, units, rate, sign, calibration, lines, encoding. Drag across the "
-        "plot to trim a recording. Every step can be undone.",
+        "read, and changes it: columns, units, rate, sign, calibration, lines, encoding. Drag across "
+        "the plot to trim a recording. Every step can be undone.",
         ("example",),
         "over-time",
     ),

@@ -53,9 +53,9 @@ STEPS = (
     Step(
         "data",
         "Data",
-        "Each recording is listed with its channels and role. *Import settings* sets "
-        "columns, units, rate, sign, calibration, lines, encoding. Drag across the plot to trim a "
-        "recording. Every step can be undone.",
+        "Each recording is listed with its channels and role. *Import settings* shows how the file was "
+        "read, and changes it: columns, units, rate, sign, calibration, lines, encoding. Drag across "
+        "the plot to trim a recording. Every step can be undone.",
         ("example",),
         "over-time",
     ),
@@ -78,7 +78,7 @@ STEPS = (
         "models",
         "Models: the leaderboard",
         "Each fit runs in its own process in the background. The best model is listed first. Tabs show "
-        "the loop, time plot, residual, parameters, band and check of the selected model.",
+        "the loop, time plot, residual, parameters and check of the selected model.",
         ("fit",),
         "closer-loop",
     ),
@@ -93,8 +93,8 @@ STEPS = (
     Step(
         "take",
         "Take away",
-        "Download the report, figures, model, C99, FMU, ROS 2 package and recordings, and a script that "
-        "repeats all steps.",
+        "Download the report, model, C99, FMU, ROS 2 package, MuJoCo file and recordings, and a script "
+        "that repeats all steps.",
         ("tab-take",),
         "things",
     ),

@@ -76,7 +76,7 @@ def test_tutorial_runs_as_a_notebook(
     ("page", "written"),
     [
         ("README.md", ("study/report.html", "study/gpi.json")),
-        ("docs/jupyter.md", ("model.json", "loops.png", "loop.html")),
+        ("docs/jupyter.md", ("model.json", "loops.png")),
     ],
 )
 def test_page_runs_from_top_to_bottom(

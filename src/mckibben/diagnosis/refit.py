@@ -111,6 +111,8 @@ def refitted(
             new = fitted(whole, [np.ones(len(log), dtype=bool) for log in whole])
     except MckibbenError as error:
         return f"No model could be fitted to the log: {error}"
+    if not any(errors.any() for errors in before):
+        return "The model has no error on the log."
     spans = np.ptp(np.concatenate([log.matrix(outputs) for log in whole]), axis=0)
     sizes = spans if len(outputs) > 1 else np.ones(1)
     squares = [((errors / sizes) ** 2).mean(axis=1) for errors in after]

@@ -63,7 +63,7 @@ OF_FORCE: Mapping[str, Mapping[str, Any]] = {
     "force-schindele": {},
     "force-tondu": {},
     "multistate": {},
-    "multistate-11": {},
+    "multistate-11": {"n_starts": 8},
     "multistate-18": {},
 }
 OF_ARM: Mapping[str, Mapping[str, Any]] = {

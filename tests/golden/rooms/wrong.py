@@ -1,4 +1,4 @@
-"""What is wrong today: right values, each expected to fail until the issue that mends it."""
+"""What was wrong once, with its right value."""
 
 from __future__ import annotations
 
@@ -70,12 +70,6 @@ def _loops_in_steps() -> list[Recording]:
     p = 3 - 3 * np.abs(2 * ((t / 10) % 1) - 1)
     y = 4 * play(p, 0.3) + 2 * play(p, 0.8) + noise(0, 0.02, len(p))
     return [Recording({"pressure": p, "displacement": y}, STEP)]
-
-
-def small_black_box(folder: Path) -> Tree:
-    """A network of states that is better by cross-validation is chosen."""
-    del folder
-    return _chosen(runs("shaken"))
 
 
 def black_box(folder: Path) -> Tree:
@@ -265,7 +259,6 @@ CASES: Mapping[str, tuple[str, Callable[[Path], Tree], Mapping[str, Any]]] = {
         )
         for model in SCALED
     },
-    "state-network": ("mckibben.compare, a network beside p2uz", small_black_box, {}),
     "state-network-benchmark": (
         "mckibben.compare, a network beside p2uz",
         black_box,

@@ -246,6 +246,16 @@ class TrainingData:
         """Return a field of all runs, concatenated."""
         return np.concatenate([getattr(run, what) for run in self.runs])
 
+    def between(self, start: float, stop: float) -> TrainingData:
+        """Return the same runs, scored only between two shares of their time."""
+
+        def part(run: Run) -> Run:
+            shares = np.arange(run.counts.size)
+            inside = (shares >= round(start * shares.size)) & (shares < round(stop * shares.size))
+            return replace(run, counts=run.counts & inside)
+
+        return self._changed(part)
+
     def thinned(self, most: int) -> TrainingData:
         """Return the same runs with fewer scored samples, evenly spread; inputs are unchanged."""
         total = sum(int(run.counts.sum()) for run in self.runs)

@@ -22,7 +22,7 @@ from mckibben.blocks.memoryless import Negative
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Start
 from mckibben.estimators.optimisers.linear import solve_linear
-from mckibben.estimators.optimisers.multi_start import multi_start
+from mckibben.estimators.optimisers.multi_start import Choice, multi_start
 from mckibben.estimators.optimisers.tracker import Tracker
 
 SEARCH_SAMPLES = 1500
@@ -131,6 +131,10 @@ class SeparableEstimator(Estimator):
         offset = [np.ones(len(matrix))] if self.solves_offset else []
         return np.column_stack([*offset, matrix[:, free]])
 
+    def choices(self, data: TrainingData) -> list[Choice]:
+        """Return alternatives for groups of nonlinear parameters; by default none."""
+        return []
+
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block for increasing data; mirrored for decreasing data."""
         if not (self.rises and data.falls):
@@ -171,6 +175,7 @@ class SeparableEstimator(Estimator):
             n_refined=self.n_refined,
             max_evaluations=most,
             jacobian=jacobian,
+            choices=self.choices(data),
         )
         return self._polish(theta, data, tracker)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -23,6 +24,7 @@ from mckibben.blocks.force.multistate_friction import (
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.force.laws import ORDERS, Law, force_columns, force_law
+from mckibben.estimators.optimisers.multi_start import Choice
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
 from mckibben.recording import Recording, listed
@@ -32,6 +34,10 @@ STRUCTURES = {"eleven": ELEVEN, "each-way": EACH_WAY, "eighteen": EIGHTEEN}
 
 LEAST_SHARE = 1e-5
 """Smallest force of an element, relative to the range of the output."""
+
+LENGTHS = np.geomspace(0.02, 1.0, 8)
+TIMES = (0.1, 10.0)
+"""Initial break-away lengths of elements, relative to the range, and times [samples]."""
 
 
 def extract_hysteresis(
@@ -69,7 +75,7 @@ def extract_hysteresis(
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class MultistateEstimator(SeparableEstimator):
-    """Multistate friction by bounded least squares from many starts.
+    """Multistate friction by bounded least squares from many starts, with exchange of elements.
 
     Break-away lengths and relaxation times are searched; stiffnesses and the static law are linear and
     are solved for. With ``static=None`` the output is the hysteresis alone, as in the paper; see
@@ -151,6 +157,25 @@ class MultistateEstimator(SeparableEstimator):
                     theta += [length, time] * n_pairs
                 guesses.append(np.array(theta))
         return guesses
+
+    def choices(self, data: TrainingData) -> list[Choice]:
+        """Return candidate lengths and times of one element at a time.
+
+        The cost has many local minima, in which elements have changed roles, and rounding decides in
+        which of them a search ends.
+        """
+        low, high = data.input_range
+        lengths = np.log((high - low) * LENGTHS)
+        times = np.log((data.sample_time or 1.0) * np.array(TIMES))
+        choices, first = [], 0
+        for n_pairs in self._n_pairs:
+            candidates = [
+                np.ravel([(length, time) for length in element])
+                for time, element in product(times, product(lengths, repeat=n_pairs))
+            ]
+            choices.append(Choice(np.arange(first, first + 2 * n_pairs), np.array(candidates)))
+            first += 2 * n_pairs
+        return choices
 
     def _unit_element(self, index: int, theta: Array) -> MultistateFriction:
         """Return one element with stiffnesses of 1."""
@@ -248,7 +273,7 @@ MULTISTATE = preset(
 
 MULTISTATE_11 = preset(
     MultistateEstimator,
-    "Multistate friction by bounded least squares from many starts.",
+    "Multistate friction by bounded least squares from many starts, and exchange of elements.",
     title="Multistate friction with eleven parameters",
     can="The paper's friction model of eleven parameters.",
     cannot="Its structure is that of the paper's muscle; try multistate for others.",

@@ -36,8 +36,8 @@ MOST_BY_RATE = 5.0
 MOST_STEPS = 150
 """Maximum number of evaluations of a refinement with identified thresholds."""
 
-LEAST_DISTANCE = 1e-9
-"""Smallest distance of thresholds, relative to the input range."""
+RAISED, LEAST_DISTANCE = 1e-7, 1e-9
+"""Step of thresholds for derivatives, and their smallest distance, relative to the input range."""
 
 RATE_SHARE = 0.5
 """Largest change of a weight by rate, relative to the largest weight, at the fastest recorded
@@ -253,6 +253,23 @@ class MPIEstimator(SeparableEstimator):
     def _pieces(self, theta: Array, operators: Array, data: TrainingData) -> Array:
         low, high = self.level(theta, data)
         return self.map.pieces((operators @ self.weights(theta) - low) / (high - low))
+
+    def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
+        """Return the derivative of the map's argument times the slope of the map."""
+        operators, weights = self._operators(theta, data), self.weights(theta)
+        columns = operators
+        if self.identified:
+            low, high = data.input_range
+            half, radii = 0.5 * (high - low), self.radii(theta, data) + RAISED * (high - low)
+            there = counting(data, lambda run: self.operators(radii, run, data))
+            by_radii = weights * (there - operators) / (RAISED * (high - low)) * half
+            by_radii = by_radii.reshape(len(operators), -1, self.n_operators).sum(axis=1)
+            columns = np.column_stack([operators, by_radii])
+        lowest, highest = self._ends(theta, columns, data)
+        low, high = self.level(theta, data)
+        x = (operators @ weights - low) / (high - low)
+        moved = (columns - lowest - np.outer(x, highest - lowest)) / (high - low)
+        return np.asarray((self.map.slopes(x) @ linear)[:, np.newaxis] * moved)
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every piece, so that the map increases."""

@@ -58,6 +58,10 @@ class FreePolynomialMap(PolynomialMap):
     def pieces(self, x: Array) -> Array:
         return np.asarray((2 * x - 1)[:, np.newaxis] ** np.arange(1, self.size + 1))
 
+    def slopes(self, x: Array) -> Array:
+        exponents = np.arange(1, self.size + 1)
+        return np.asarray(2 * exponents * (2 * x - 1)[:, np.newaxis] ** (exponents - 1))
+
     def centred(self, weights: Array) -> Array:
         return np.append(0.0, weights)
 

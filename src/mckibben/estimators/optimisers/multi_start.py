@@ -1,11 +1,13 @@
-"""Multi-start optimisation within bounds."""
+"""Multi-start optimisation within bounds, with exchange of parameter groups."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -15,6 +17,33 @@ MARGIN = 1e-9
 
 SHORTEST = 1e-9
 """Step, relative to the parameters, that counts as zero."""
+
+EXCHANGES = 3
+"""Maximum number of exchanges of parameter groups, each followed by a refinement."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Alternatives, shape (n, k), for some of the parameters together."""
+
+    places: NDArray[np.intp]
+    values: Array
+
+
+def exchange(cost: Callable[[Array], float], start: Array, choices: Sequence[Choice]) -> Array:
+    """Return the best point after exchanging group after group, or the start if none is better.
+
+    It leaves local minima from which no small step leads on.
+    """
+    best, least = start, cost(start)
+    for choice in choices:
+        held = best
+        for values in choice.values:
+            tried = held.copy()
+            tried[choice.places] = values
+            if (found := cost(tried)) < least:
+                best, least = tried, found
+    return best
 
 
 def multi_start(
@@ -27,11 +56,13 @@ def multi_start(
     n_refined: int,
     max_evaluations: int,
     jacobian: Callable[[Array], Array] | None = None,
+    choices: Sequence[Choice] = (),
 ) -> Array:
     """Return the best point after refining the most promising of many starts within bounds.
 
     Every start is evaluated once; the best ``n_refined`` are refined by a bounded trust-region
-    method, with the derivatives of the residuals where given, else with finite differences.
+    method, with the derivatives of the residuals where given, else with finite differences. Where
+    there are choices, the best is then improved by exchange, and refined again.
 
     Residuals are refined relative to the least RMSE of the starts, and parameters relative to their
     bounds, so that no tolerance or step of the search depends on a unit.
@@ -73,6 +104,13 @@ def multi_start(
         )
 
     follow_best(starts, evaluated, refine, n_refined)
+    for _ in range(EXCHANGES if choices else 0):
+        assert tracker.best is not None
+        best = tracker.best
+        better = exchange(cost, best, choices)
+        if better is best:
+            break
+        refine(better)
     assert tracker.best is not None
     return tracker.best
 

@@ -109,7 +109,7 @@ def test_multistate_friction(cli: Cli) -> None:
         assert share <= {paper: 0.55, ours: 0.45}.get(model, np.inf)
     closed = tables["closed"]
     sizes = {paper: 11, "18 parameters": 18, "modified Maxwell-slip": 42, "modified PI": 40}
-    for model, size in (sizes | {"generalised Bouc-Wen": 9}).items():
+    for model, size in (sizes | {"generalized Bouc-Wen": 9}).items():
         assert closed[model]["parameters, printed"] == closed[model]["parameters"] == size
     assert min(closed[paper]["r²"], closed[ours]["r²"]) >= 0.995
     assert closed["18 parameters"]["RMSE [N]"] < 0.8 * closed[paper]["RMSE [N]"]

@@ -80,6 +80,17 @@ def test_every_number_of_a_parallelogram(gain: float, gap: float) -> None:
         assert seen == pytest.approx((100 * gap / span, 4.0, 0.4), rel=0.01)
 
 
+@given(st.floats(0.1, 0.9), st.sampled_from([0.0, 0.002, 0.01]))
+@settings(max_examples=20)
+def test_dead_zone_of_a_play_operator_is_twice_its_radius(radius: float, noise: float) -> None:
+    u = triangle(TIME, 20.0, 4.0)
+    found = characterize(noisy(run(u, play(u, radius)), noise))
+    tolerance = 1e-9 if noise == 0 else 4 * noise
+    assert found.dead_zone_upper == pytest.approx(2 * radius, abs=tolerance * 4)
+    assert found.dead_zone_lower == pytest.approx(2 * radius, abs=tolerance * 4)
+    assert found.mid_width == pytest.approx(2 * radius, abs=1e-9 + 4 * noise)
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.003, 0.01])
 @pytest.mark.parametrize("seed", range(2))
 def test_prandtl_ishlinskii_loops_are_symmetric(noise: float, seed: int) -> None:
@@ -145,7 +156,7 @@ def test_without_time_what_needs_time_is_none_and_the_rest_is_the_same() -> None
 def test_an_output_that_falls_with_the_input() -> None:
     u = triangle(TIME, 10.0, 5.0)
     up, down = characterize(run(u, play(u, 0.3))), characterize(run(u, -play(u, 0.3)))
-    for name in ("loop_width", "asymmetry", "branch_gap"):
+    for name in ("loop_width", "asymmetry", "dead_zone_upper", "dead_zone_lower", "branch_gap"):
         assert getattr(down, name) == pytest.approx(getattr(up, name))
     assert down.falls
     assert down.gain == pytest.approx(-1.0)

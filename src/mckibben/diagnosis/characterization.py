@@ -21,7 +21,7 @@ from mckibben.diagnosis.loops import (
     largest_of,
     loops_of,
 )
-from mckibben.diagnosis.memory import creep, rate_dependence
+from mckibben.diagnosis.memory import creep, dead_zones, rate_dependence
 from mckibben.diagnosis.tracks import Range, prepare
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
@@ -41,7 +41,7 @@ REPEATS = 3
 
 SHAPE = {
     *("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid"),
-    *("rate_dependence", "speeds"),
+    *("dead_zone_upper", "dead_zone_lower", "rate_dependence", "speeds"),
 }
 """Quantities that are measured only if there is a loop."""
 
@@ -80,6 +80,8 @@ class Characterization(DrawsItself):
         Prandtl-Ishlinskii models; where it is wide, from -1 (low input) to 1 (high input).
     loop_area, loop_area_share : float or None
         Enclosed area [input unit x output unit], and its ratio to the bounding rectangle [%].
+    dead_zone_upper, dead_zone_lower : float or None
+        Change of the input after upper and lower reversals before the output moves [input unit].
     gain : float or None
         Slope of the mean of both branches at mid input [output unit/input unit].
     branch_gap, p_loop : float or None
@@ -125,6 +127,8 @@ class Characterization(DrawsItself):
     width_centroid: float | None = None
     loop_area: float | None = None
     loop_area_share: float | None = None
+    dead_zone_upper: float | None = None
+    dead_zone_lower: float | None = None
     gain: float | None = None
     branch_gap: float | None = None
     creep: float | None = None
@@ -171,7 +175,7 @@ def characterize(
     *,
     scheduling: Sequence[str] = (),
 ) -> Characterization:
-    """Measure width and shape of the loop, creep and rate dependence of a muscle.
+    """Measure width and shape of the loop, dead zone, creep and rate dependence of a muscle.
 
     Sensor noise is averaged first, over samples within which the input moves by 1 % of its range.
     Ranges are those of all recordings together.
@@ -279,9 +283,12 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
     gap, gap_limits, p_loop = gap_of(branches, scale.sign)
     growth, growth_limits, speeds = rate_dependence(loops) or (None, None, None)
     crept = creep(runs, given, wanted, scale)
+    upper, lower = dead_zones(tracks, scale)
     repeated: dict[str, Sequence[float | None]] = {
         **{name: [loop.figures[name] for loop in largest] for name in FIGURES},
         "gain": gains_of(branches, largest, scale),
+        "dead_zone_upper": upper,
+        "dead_zone_lower": lower,
         "creep": [moved for _, moved in crept],
         "creep_time": [time for time, _ in crept],
         "drift": drift(loops),

@@ -1,4 +1,4 @@
-"""Creep in holds, and loop width by speed."""
+"""Dead zones after reversals, creep in holds, and loop width by speed."""
 
 from __future__ import annotations
 
@@ -6,10 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.diagnosis.loops import Loop
-from mckibben.diagnosis.tracks import Range, Scale
+from mckibben.diagnosis.tracks import Range, Scale, Track
 from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, shortest_hold
+
+MOVED = 0.02
+"""Output change, relative to its range, above which the output has moved."""
+
+DENSE = 8
+"""Smallest number of samples of an interpolated branch."""
 
 SETTLED = 0.1
 """Share of a hold that is discarded at its start, so that lag does not count as creep."""
@@ -18,6 +25,41 @@ ALIKE, SPEED_RATIO = 0.05, 1.5
 """Cycles are compared if their extremes differ by at most this share of the amplitude, and their
 speeds by at least this ratio.
 """
+
+
+def dead_zones(tracks: Sequence[Track], scale: Scale) -> tuple[list[float], list[float]]:
+    """Return the dead zones after upper and after lower reversals [input unit].
+
+    The change of the input from a reversal until the output moves back, extrapolated linearly from the
+    changes at which it has moved by one and by two thresholds. The threshold is 2 % of the output
+    range, six times the noise, or two steps of the sensor, whichever is largest. For a play operator of
+    radius r, 2 r.
+    """
+    upper: list[float] = []
+    lower: list[float] = []
+    for track in tracks:
+        threshold = max(MOVED * scale.y.span, 6 * track.y_noise, 2 * scale.y.step)
+        for k in range(1, track.turns.size - 1):
+            u, y = (x[track.turns[k] : track.turns[k + 1] + 1] for x in (track.u, track.y))
+            if u.size <= DENSE:
+                continue
+            way = float(np.sign(u[-1] - u[0]))
+            travel, moved = way * (u - u[0]), scale.sign * way * (y - y[0])
+            once, twice = (_first_reach(travel, moved, limit * threshold) for limit in (1, 2))
+            if once is not None and twice is not None:
+                (upper if way < 0 else lower).append(max(0.0, 2 * once - twice))
+    return upper, lower
+
+
+def _first_reach(wanted: Array, x: Array, limit: float) -> float | None:
+    """Return ``wanted`` where ``x`` first reaches a limit, interpolated; None if it never does."""
+    i = int(np.argmax(x >= limit))
+    if not x[i] >= limit:
+        return None
+    if i == 0:
+        return float(wanted[0])
+    share = (limit - x[i - 1]) / (x[i] - x[i - 1])
+    return float(wanted[i - 1] + share * (wanted[i] - wanted[i - 1]))
 
 
 def creep(

@@ -306,7 +306,7 @@ def leaderboard(board: Leaderboard, keys: Sequence[str] = BOARD) -> list[Item]:
         chosen = "No model is fitted yet." if board.pending else "No model worked."
     items: list[Item] = [
         Text([chosen]) if chosen else None,
-        Text([f"{split}. Ordered by {by}; all models run free."]),
+        Text([f"{split}. Ordered by {by}. All errors are free-run simulation errors."]),
         board_table(board, ranked, keys) if ranked else None,
         Text(marks, "muted") if marks else None,
     ]

@@ -36,9 +36,9 @@ CHOICES = {
     "cross-validation": ("CV RMSE", "cross-validation on the training side"),
     "validation": (
         "validation RMSE",
-        "the last part of the training data, left out of a fit for it",
+        "the last part of the training data, held out of the fit",
     ),
-    "given": ("validation RMSE", "runs given for it, to which nothing is fitted"),
+    "given": ("validation RMSE", "validation recordings, which are not fitted"),
     "fit": ("fit RMSE", "the error on the fitted data, as there is no validation"),
 }
 """What a model may be chosen by: the heading of its figure, and in words. The test is not among them."""
@@ -162,6 +162,8 @@ QUANTITIES = (
     ("loop area", "loop_area", "{u} {y}", "enclosed by the largest cycles"),
     ("loop area share", "loop_area_share", "%", "of its bounding rectangle; 100 for a relay"),
     ("mean branch gap", "branch_gap", "{y}", "falling less rising output, free of steady drift"),
+    ("dead zone after upper reversals", "dead_zone_upper", "{u}", "before the output moves back"),
+    ("dead zone after lower reversals", "dead_zone_lower", "{u}", "before the output moves back"),
     ("gain", "gain", "{y}/{u}", "slope of the mean of both branches at mid input"),
     ("creep", "creep", "{y}", "in a hold of all inputs; positive: in the direction of motion"),
     ("creep time", "creep_time", "s", "time over which creep was measured"),

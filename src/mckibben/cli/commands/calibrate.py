@@ -1,7 +1,7 @@
-"""Find bands of a model on recordings that it was not fitted to.
+"""Calibrate a prediction band of a model on recordings that it was not fitted to.
 
-At a level of 0.9 they hold 90 % of the samples of a new run that is like these, on average.
-simulate model.json FILE --interval 0.9 writes lower and upper ends.
+On average, a band of level 0.9 contains 90 % of the samples of a similar new recording.
+simulate model.json FILE --interval 0.9 writes its lower and upper limits.
 """
 
 from __future__ import annotations

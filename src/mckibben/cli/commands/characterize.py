@@ -1,4 +1,4 @@
-"""Measure what a muscle does: loop width, asymmetry, dead zone, creep, rate dependence."""
+"""Measure loop width, asymmetry, dead zone, creep and rate dependence of a muscle."""
 
 from __future__ import annotations
 

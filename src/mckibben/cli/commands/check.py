@@ -1,8 +1,8 @@
-"""Test whether a saved model is right on recordings, and what it misses.
+"""Validate a saved model on recordings, and list the causes of its residual.
 
-The model runs free. Its residual is tested for following a lag, inputs, their branches (hysteresis),
-loads, time (drift), speed, holds (creep) and position. Use recordings that the model was not fitted
-to. A folder includes all recordings in it.
+The model is simulated in free run. Possible causes are lag, inputs, their direction (hysteresis), loads,
+time (drift), speed, holds (creep) and position. Use recordings that the model was not fitted to. A
+folder includes all recordings in it.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Fit models, choose by cross-validation, test on data used for neither; all free-running.
+"""Fit models, choose one by cross-validation, and test it on separate data. Errors are free-run.
 
 A folder includes all recordings in it. Recordings of several muscles (pressure_1 ...,
-displacement_1 ...) get models that couple them, and with --load force models are given the load.
-Ctrl-C stops at once; with -o, the same command goes on from there.
+displacement_1 ...) are fitted by models that couple them; with --load force, the load is an input.
+Ctrl-C stops; with -o, the same command resumes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Write the bundled recordings into a folder: a virtual muscle, one run to train, one to test."""
+"""Write example recordings of a virtual muscle into a folder: one to train, one to test."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Write a model as code for elsewhere: c, fmu, ros2, mjcf."""
+"""Export a model as C99 (c), FMU (fmu), ROS 2 package (ros2) or MuJoCo XML (mjcf)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Identify one model from recordings and save it as JSON.
 
-Models of several muscles (balance, coupled-memory, coupled-pi, sdchm, tsfnn) find their
-channels by name: pressure_1 ..., displacement_1 ..., and pressure_extensor where there is one.
+Models of several muscles (balance, coupled-memory, coupled-pi, sdchm, tsfnn) use the channels
+pressure_1 ..., displacement_1 ..., and pressure_extensor if present.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Show what files contain and what recordings cannot identify, list the models, or show versions."""
+"""Show the contents of files and their data gaps, list the models, or show versions."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Write the inverse of a saved model: desired output in, input out.
+"""Save the inverse of a model, with the desired output as input.
 
-Of a model of force, what is written gives the pressure by desired force and length. With
---for force, what is written gives the force by measured displacements and pressures: simulate it.
-With --adaptive, what is written also takes what is measured, and learns from it while it runs.
+The inverse of a force model computes the pressure from the desired force and the length. With --for
+force, the result estimates the force from measured displacements and pressures. With --adaptive, the
+inverse also has the measured outputs as inputs, and adapts its parameters while it runs.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Show the model, the channels and the state of a device on a serial port.
 
-This changes nothing on the device. Python drives one, by `mckibben.link.Link`.
+Nothing on the device is changed. To drive a device from Python, use `mckibben.link.Link`.
 """
 
 from __future__ import annotations

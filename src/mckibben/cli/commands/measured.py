@@ -1,4 +1,4 @@
-"""Compare all models on all sets of recordings in a folder, with fixed splits, in one report.
+"""Compare all models on all data sets in a folder, with fixed splits, in one report.
 
 The table [split] in a set's channels.toml defines the training and test data; without it the last
 quarter is tested. After Ctrl-C, the same command resumes.

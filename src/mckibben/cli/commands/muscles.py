@@ -1,4 +1,4 @@
-"""List and show identified muscles, from which others can be fitted (fit balance --prior)."""
+"""List and show the library of identified muscles, which are priors of fit balance --prior."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Write the motion to record next: random motion within limits, and what closes data gaps.
+"""Design the next experiment: random motion within limits, and segments that close data gaps.
 
-It starts and ends at rest.
+The motion starts and ends at rest.
 """
 
 from __future__ import annotations

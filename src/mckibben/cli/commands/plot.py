@@ -1,4 +1,4 @@
-"""Draw recordings, or a saved model against them, for print."""
+"""Plot recordings, or a saved model and recordings, for publication."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Run a paper's protocol on its rig: its methods as published, ours, and its tables beside.
+"""Run a paper's protocol on its rig, with its methods and ours, and compare the tables.
 
-Ctrl-C stops at once; with -o what is recorded and fitted is there, and the same command goes on.
+Ctrl-C stops it. With -o, recordings and fits are saved, and the same command resumes.
 """
 
 from __future__ import annotations

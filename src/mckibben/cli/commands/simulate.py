@@ -1,7 +1,7 @@
-"""Run a saved model free over a recording; adds channels named OUTPUT_model.
+"""Simulate a saved model in free run on a recording; adds channels named OUTPUT_model.
 
-A linear model whose start is fitted starts from the state that explains the measured output best,
-where the file has it; with --initial first_sample from inputs alone.
+A linear model with a fitted initial state starts from the state that fits the measured output best, if
+the file contains it; with --initial first_sample, from the inputs alone.
 """
 
 from __future__ import annotations

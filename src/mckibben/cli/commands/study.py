@@ -1,14 +1,14 @@
 """Characterize a muscle, choose a model by cross-validation, test and invert it, and write a report.
 
 A folder includes all recordings in it. Recordings of several muscles (pressure_1 ...,
-displacement_1 ...) get models that couple them, and a closed loop on a virtual rig. With --load
-force, models that are given the load are ranked against one model for every load.
+displacement_1 ...) are fitted by models that couple them; a virtual rig then simulates the closed loop.
+With --load force, models with the load as input are ranked.
 
 With --compensator or --model, recordings with a reference (reference_displacement, setpoint, ...)
-are logs of a loop: the report states the predicted and the achieved error, what part is due to model,
-actuator, delay, noise, drift and limits, and the same kind of model refitted (refit.json).
+are logs of a closed loop: the report shows the predicted and the measured error, its parts due to model,
+actuator, delay, noise, drift and limits, and a refit of the model (refit.json).
 
-Ctrl-C stops at once, and the same command goes on from there.
+Ctrl-C stops; the same command resumes.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Let a compensator, or a controller with it, follow a reference on a virtual rig, or on a model.
+"""Track a reference with a compensator, or a controller, on a virtual rig or a model.
 
-It is compared with no compensation: pressures read off one slow rise of the same plant.
+The result is compared with a static map: pressures read from one slow rise of the same plant.
 """
 
 from __future__ import annotations

@@ -130,7 +130,7 @@ def _of_loop(name: str, header: Header) -> str | None:
     unit = None if header.unit is None else find(header.unit)
     if _standard(rest):
         channel = channel_of(Header(rest, header.unit))
-    elif unit is not None:
+    elif unit is not None and not (len(rest) == 1 and rest.isalpha()):  # a letter names an axis
         channel = QUANTITIES.get(unit.target or "", "")
     elif not rest or rest.isdigit():
         channel = "pressure" if role == "command" else "displacement"

@@ -219,6 +219,8 @@ class DuhemOscillator(Oscillator):
 
     Parameters
     ----------
+    mass, damping, stiffness : float
+        As of `BoucWenOscillator` [kg, N s/mm, N/mm].
     rising, falling : sequence of float
         Slopes of the element's force by the displacement while that rises, or falls, at every knot
         [N/mm].

@@ -22,7 +22,7 @@ def main() -> None:
     """Run all scripts in turn; finished parts of the first are stored if it is interrupted."""
     folder, *peers = sys.argv[1:]
     command = Path(sys.executable).with_name("mckibben")
-    subprocess.run([command, "measured", folder, "-o", HERE], check=True)
+    subprocess.run([command, "measured", folder, "-o", HERE, "--force"], check=True)
     subprocess.run([sys.executable, HERE / "library.py", folder], check=True)
     for name in ("repeats", "priors"):
         with (HERE / f"{name}.txt").open("w", encoding="utf-8") as file:

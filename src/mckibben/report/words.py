@@ -497,8 +497,9 @@ def _how_far(study: Study) -> str:
     worst = min(best.band.coverage, key=best.band.coverage.__getitem__)
     of = f" for {worst}" if len(best.band.coverage) > 1 else ""
     half = numeral(best.band.width[worst] / 2, 2)
-    level, held = percent(best.band.level), percent(best.band.coverage[worst])
-    return f"The {level} band{of}, ±{half} {best.band.unit_of_width}, held {held} of the test."
+    level, inside = percent(best.band.level), percent(best.band.coverage[worst])
+    unit = best.band.unit_of_width
+    return f"The {level} band{of} (±{half} {unit}) contains {inside} of the test samples."
 
 
 def _record_next(study: Study) -> str:

@@ -88,9 +88,8 @@ class BlockController(Controller):
     def connect(self, offer: Offer) -> None:
         whole = self.block
         self._compensator, self._pid = whole, None
-        if isinstance(
-            whole, FeedforwardFeedback
-        ):  # both parts may take references of different times
+        if isinstance(whole, FeedforwardFeedback):
+            # both parts may take references of different times
             self._compensator, self._pid = whole.compensator, whole.feedback
         self._inputs = offer.inputs(self._compensator)
         self._commands = offer.commands(whole)
@@ -104,10 +103,8 @@ class BlockController(Controller):
         measures = any(channel.name.endswith(MEASURED) for channel in self._compensator.inputs)
         # measurements belong to the reference of the last step, or a dead time before it; predictive
         # compensators take the current scheduling inputs
-        self._uses_preview, self._predicts = (
-            self.preview > 0.0 or not measures,
-            self.samples_ahead > 0,
-        )
+        self._uses_preview = self.preview > 0.0 or not measures
+        self._predicts = self.samples_ahead > 0
 
     def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
         reference_ahead, schedule = ahead if self._uses_preview else (reference, scheduled)

@@ -108,9 +108,7 @@ def plain_meta(found: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(value, (int, float)):
             usable = math.isfinite(value)
         else:
-            usable = (
-                isinstance(value, str) and len(value) <= 2**16
-            )  # longer ones are not about the recording
+            usable = isinstance(value, str) and len(value) <= 2**16  # longer texts are other data
         if usable:
             meta[name] = value
     return meta

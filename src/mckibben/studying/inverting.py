@@ -95,10 +95,8 @@ def invert_best(board: Leaderboard, recording: Recording) -> InverseCheck | None
         return None
     judged = board.best.skill_least is not None
     for row in board.rows:
-        unknown = (
-            judged and row.skill_least is None
-        )  # only the test speaks for it, which is no choice
-        if row.block is None or unknown or not acceptable(row, board.constant):
+        unvalidated = judged and row.skill_least is None  # the test must not decide
+        if row.block is None or unvalidated or not acceptable(row, board.constant):
             continue
         try:
             return check_inverse(row.model, row.block, recording)

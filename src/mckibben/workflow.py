@@ -321,7 +321,7 @@ def track(
     """
     from mckibben.blocks.base import Block
     from mckibben.blocks.feedback import FeedforwardFeedback
-    from mckibben.blocks.inverse import drives
+    from mckibben.blocks.fields import drives
     from mckibben.control import BlockController, before, control_law, preview_time, tune_pid
     from mckibben.control import track as close
     from mckibben.control.identified import beyond_known
@@ -440,8 +440,8 @@ def _inverse(
 ) -> Inverse:
     from mckibben.blocks.adaptive import adaptive
     from mckibben.blocks.coupled.load_estimate import load_of
+    from mckibben.blocks.fields import drives
     from mckibben.blocks.force.feedforward import ForceFeedforward
-    from mckibben.blocks.inverse import drives
     from mckibben.blocks.predictive import Predictive
     from mckibben.estimators.coupled.sdchm import trained_inverse
 

@@ -68,7 +68,7 @@ DRAWN = 2000
 
 def made(workspace: Workspace, name: str, use: str, settings: Mapping[str, Any]) -> Block:
     """Return a model of the folder as one of `USES`; `ModelError` if it cannot be that."""
-    from mckibben.blocks.inverse import drives
+    from mckibben.blocks.fields import drives
     from mckibben.workflow import invert
 
     if use == "model":

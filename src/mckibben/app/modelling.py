@@ -14,6 +14,7 @@ from mckibben.app.jobs import Tell
 from mckibben.app.workspace import Workspace
 from mckibben.comparison.channels import Channels, with_dead_loads_scheduled, with_loads_scheduled
 from mckibben.comparison.choosing import recommended
+from mckibben.comparison.fitting import Candidate
 from mckibben.comparison.planning import objections, plan_of
 from mckibben.comparison.ranking import ranked
 from mckibben.comparison.splits import split_of, tested_from
@@ -116,8 +117,9 @@ def offered(workspace: Workspace, sides: Channels) -> Offered:
     with suppress(DataError):  # too little to hold anything out: the fit will say so
         split = split_of(train, test, sides)
         fitted, described = split.train, split.described
-    no = objections(names, [*train, *test], sides)
-    no = objections([name for name in names if name not in no], fitted, sides) | no
+    items = {name: Candidate(name) for name in names}
+    no = objections(items, [*train, *test], sides)
+    no |= objections({n: item for n, item in items.items() if n not in no}, fitted, sides)
     left = (replace(n, models=tuple(m for m in n.models if m not in no)) for n in needs())
     others = {full_name(name): why for name, why in no.items()}
     work = max(sum(map(len, train)), LEAST) * len(sides.inputs) * len(sides.outputs) * FOLDS

@@ -329,7 +329,9 @@ class Workspace:
 
         def place(row: dict[str, Any]) -> tuple[Any, ...]:
             errors = row.get("validation_rmse"), (row.get("train") or {}).get("rmse")
-            return (not row["current"], *order(row["model"], *errors, row.get("skill_least")))
+            doubted = bool(row.get("caution")) or row.get("validated") == "fit"
+            known = order(row["model"], *errors, row.get("skill_least"), doubted=doubted)
+            return not row["current"], *known
 
         now, found, known = self.digest(), [], self.names("models")
         for name in self.names("results"):

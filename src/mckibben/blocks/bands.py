@@ -202,7 +202,6 @@ class Banded(Composition):
     scheduling = same_as("forward.scheduling")
     outputs = same_as("band.outputs")
     start = same_as("forward.start")
-    start_on = same_as("forward.start_on")
 
     def __post_init__(self) -> None:
         self.check_parts()

@@ -25,6 +25,7 @@ from mckibben.blocks.fields import Channel, Initial
 from mckibben.blocks.kernels import Step, in_scratch
 from mckibben.blocks.parameters import Parametrised, gathered
 from mckibben.blocks.running import Stream, refuse_time, run_many
+from mckibben.blocks.starts import start_state
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 from mckibben.system.compiling import bound
@@ -36,10 +37,8 @@ if TYPE_CHECKING:
 Run = Callable[[], None]
 Start = Callable[..., None]
 
-VIRGIN = {"first_sample": False, "fitted": False, "virgin": True}
-"""Named start states, and whether a start kernel computes them without past inputs. "fitted" is
-"first_sample" where no outputs are known, see `mckibben.blocks.dynamics.starts`.
-"""
+VIRGIN = {"first_sample": False, "virgin": True}
+"""Named start states, and whether a start kernel computes them without past inputs."""
 
 SHORT = Repr()
 SHORT.maxother = 100  # characters of a part in the `repr` of a block
@@ -202,11 +201,6 @@ class Block(DrawsItself, Parametrised):
         return sum(part.n_states for part in getattr(self, "parts", ()))
 
     @property
-    def n_fitted(self) -> int:
-        """Number of leading states that are estimated if `initial` is "fitted"."""
-        return 0
-
-    @property
     def n_scratch(self) -> int:
         """Length of the working memory of a step, for code that cannot allocate."""
         return sum(part.n_scratch for part in getattr(self, "parts", ()))
@@ -253,10 +247,6 @@ class Block(DrawsItself, Parametrised):
     def state_at(self, first: Array, output: Array) -> Array | None:
         """Return the equilibrium state for a first input and output; None if outputs do not matter."""
         return None
-
-    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
-        """Return the start to use on a recording; by default unchanged."""
-        return initial
 
     # -- its kernel --------------------------------------------------------------------------
 
@@ -364,7 +354,8 @@ class Block(DrawsItself, Parametrised):
         data : Recording or array_like, shape (n,) or (n, n_inputs)
             A recording needs a channel for every input.
         initial : {"first_sample", "virgin"} or sequence of float, optional
-            Memory before the first sample; default is the block's own.
+            Memory before the first sample. Default: of a recording that has the outputs, what the first
+            of these determines, the rest at rest (see `mckibben.blocks.starts`); else the block's own.
         sample_time : float, optional
             Time between samples [s]; for arrays of a rate-dependent block only.
 
@@ -383,7 +374,9 @@ class Block(DrawsItself, Parametrised):
         """
         if isinstance(data, Recording):
             inputs = self._inputs_from(data)
-            outputs = self._run(inputs, data.sample_time, self.start_on(data, initial))
+            if initial is None:
+                initial = start_state(self, data).tolist()
+            outputs = self._run(inputs, data.sample_time, initial)
             if not np.isfinite(outputs).all():
                 raise ModelError(
                     f"the output of {self.kind!r} is not finite on {data.name}",
@@ -438,7 +431,9 @@ class Block(DrawsItself, Parametrised):
     def final_state(self, data: Recording, *, initial: Initial | None = None) -> Array:
         """Return the state after a recording, shape (n_states,), to start the next one from."""
         inputs = self._inputs_from(data)
-        state = self.initial_state(inputs[0], self.start_on(data, initial))
+        state = (
+            start_state(self, data) if initial is None else self.initial_state(inputs[0], initial)
+        )
         self.bind(data.sample_time, state, inputs, np.empty((len(inputs), len(self.outputs))))()
         return state
 

@@ -26,9 +26,6 @@ from mckibben.errors import ModelError
 from mckibben.registry import load
 from mckibben.system.compiling import in_turn
 
-AT_REST = ("first_sample", "fitted")
-"""Start rules by which a block is at rest at its first input if no output is known."""
-
 
 @plain_dataclass
 class Call:
@@ -267,7 +264,7 @@ class Series(Composition):
         by_name = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
         signals = list(taken)
         for number, part in enumerate(self.parts):
-            at_rest = not part.rate_dependent or part.start in AT_REST
+            at_rest = not part.rate_dependent or part.start == "first_sample"
             if board.from_rest and number < len(self.parts) - 1 and not at_rest:
                 raise ModelError(
                     f"{part.kind!r} has a saved start state and depends on the rate, so "

@@ -14,7 +14,7 @@ from pydantic.dataclasses import dataclass as validated_dataclass
 from mckibben.arrays import NARROWEST, Array
 from mckibben.errors import ModelError
 
-Rule = Literal["first_sample", "virgin", "fitted"]
+Rule = Literal["first_sample", "virgin"]
 """Name of a start state."""
 
 Initial = Rule | Sequence[float] | Array
@@ -86,12 +86,17 @@ def wide(ends: tuple[float, float]) -> tuple[float, float]:
 InputRange = Annotated[tuple[FiniteFloat, FiniteFloat], AfterValidator(wide)]
 """Lowest and highest input of an inverse."""
 
-StoredInitial = Literal["first_sample", "virgin"] | Vector
+
+def _retired_start(value: Any) -> Any:
+    """Return the start of a file of version 0.1 by today's name."""
+    return "first_sample" if value == "fitted" else plain_sequence(value)
+
+
+StoredInitial = Annotated[Rule | Vector, BeforeValidator(_retired_start)]
 """`Initial` as a field of a block."""
 
-
-FittedInitial = Literal["first_sample", "virgin", "fitted"] | Vector
-"""`StoredInitial` of linear models, whose start can be fitted to outputs too."""
+StartRule = Annotated[Rule, BeforeValidator(_retired_start)]
+"""Start of a block that has only named ones."""
 
 
 def vector(values: ArrayLike) -> tuple[float, ...]:
@@ -121,6 +126,15 @@ class Channel:
 
     name: str
     unit: str
+
+
+COMMANDS = ("pressure", "voltage")
+"""Names of channels that drive a muscle."""
+
+
+def drives(channel: Channel) -> bool:
+    """Return whether a channel drives a muscle, by its name or unit."""
+    return channel.name.startswith(COMMANDS) or channel.unit in ("bar", "V")
 
 
 def _channel(value: Any) -> Any:

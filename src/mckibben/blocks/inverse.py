@@ -15,7 +15,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Start, explicit_state
-from mckibben.blocks.fields import STRICT, Channel, Initial
+from mckibben.blocks.fields import STRICT, Channel, Initial, drives
 from mckibben.blocks.kernels import Step, kernel
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
@@ -24,9 +24,6 @@ from mckibben.registry import load
 
 if TYPE_CHECKING:
     from mckibben.blocks.learning import Learnable
-
-COMMANDS = ("pressure", "voltage")
-"""Names of channels that drive a muscle."""
 
 
 @kernel
@@ -244,11 +241,6 @@ class Inverse(Block):
     @classmethod
     def example(cls) -> Self:
         return cls(load("blocks", "pi").example())
-
-
-def drives(channel: Channel) -> bool:
-    """Return whether a channel drives a muscle, by its name or unit."""
-    return channel.name.startswith(COMMANDS) or channel.unit in ("bar", "V")
 
 
 def commands(block: Block) -> bool:

@@ -25,10 +25,10 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Run, Start, explicit_state, needs_sample_time
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.fields import STRICT, Initial
+from mckibben.blocks.fields import STRICT, Initial, drives
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.inverse import Inverse, drives
+from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.kernels import Step, fill, in_scratch, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as

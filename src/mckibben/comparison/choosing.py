@@ -8,14 +8,15 @@ from typing import Literal, Protocol, TypeVar
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.estimators.catalogue import caution
 from mckibben.statistics import RESAMPLES
 
 CONSTANT = "constant"
 """Name of the row that predicts the mean of the training output, whatever the input: never chosen."""
 
 CAUTION = 2.0
-"""Factor on the ranking error of a model that is reliable only near its training data."""
+"""Factor on the ranking error of a model that is reliable only near its training data, or whose error is
+that of the fit.
+"""
 
 USEFUL = 0.9
 """Test error, relative to that of the constant, above which no model is recommended."""
@@ -48,10 +49,12 @@ def order(
     validated: float | None,
     fitted: float | None,
     skill_least: float | None = None,
+    *,
+    doubted: bool = False,
 ) -> tuple[bool, bool, float, str]:
     """Return the sort key of models: validated ones first, by their error; independent of the test.
 
-    Those that are known to be no better than the constant come last. Blocks of the same motion cannot
+    Those that are known to be no better than the constant come last. Parts of the same motion cannot
     show how a model extrapolates, so the error of one with a caution counts `CAUTION` times.
 
     Parameters
@@ -60,9 +63,11 @@ def order(
         Error of the cross-validation, and on the data fitted, by which the others are sorted.
     skill_least : float or None
         Lower bound of the skill over the constant.
+    doubted : bool
+        Whether the error counts `CAUTION` times.
     """
     error = fitted if validated is None else validated
-    counted = float("inf") if error is None else error * (CAUTION if caution(model) else 1.0)
+    counted = float("inf") if error is None else error * (CAUTION if doubted else 1.0)
     idle = skill_least is not None and not skill_least > 0
     return validated is None, idle, counted, model
 

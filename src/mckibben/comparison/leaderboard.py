@@ -16,7 +16,6 @@ from mckibben.comparison.choosing import CONSTANT, Against, order, recommended
 from mckibben.comparison.memory_test import Memory
 from mckibben.diagnosis.bands import TestedBand
 from mckibben.errors import MckibbenError
-from mckibben.estimators.catalogue import caution
 from mckibben.metrics import Scores
 from mckibben.system.showing import DrawsItself
 
@@ -46,12 +45,19 @@ class Row:
     outputs : mapping of str to Scores
         Those on the test data, of every output.
     validation_rmse : float or None
-        Cross-validated RMSE, by which models are chosen, of several outputs their mean; None where that
-        failed or was not asked for.
+        Cross-validated RMSE, by which models are chosen: the geometric mean over parts that are left out
+        in turn, of several outputs their mean; None where that failed, or there are too few data.
     validation_by_output : mapping of str to float
         The same of every output.
+    validation_by_part : tuple of float
+        RMSE on every part, of several outputs their mean.
     validation_failed : str or None
-        Why a part of the cross-validation failed, or None.
+        Why the cross-validation failed, or None.
+    validated : {"step", "fit"}
+        How these errors were found: of the model as it would be without the part; or, of one with too
+        many parameters for that, of the model fitted to all, and counted `CAUTION` times.
+    caution : str or None
+        Why the model is reliable only near its training data, or None.
     skill, skill_least : float or None
         Share of the constant's squared error that the model removes in the cross-validation, and what
         99 % of resamples of its pieces exceed.
@@ -84,7 +90,10 @@ class Row:
     outputs: Mapping[str, Scores] = field(default_factory=dict)
     validation_rmse: float | None = None
     validation_by_output: Mapping[str, float] = field(default_factory=dict)
+    validation_by_part: tuple[float, ...] = ()
     validation_failed: str | None = None
+    validated: Literal["step", "fit"] = "step"
+    caution: str | None = None
     skill: float | None = None
     skill_least: float | None = None
     memory: Memory | None = None
@@ -118,7 +127,8 @@ class Row:
     def order(self) -> tuple[bool, bool, float, str]:
         """Sort key of the row."""
         fitted = None if self.train is None else self.train.rmse
-        return order(self.model, self.validation_rmse, fitted, self.skill_least)
+        doubted = self.caution is not None or self.validated == "fit"
+        return order(self.model, self.validation_rmse, fitted, self.skill_least, doubted=doubted)
 
     @cached_property
     def inverse(self) -> Block | None:
@@ -133,11 +143,6 @@ class Row:
         """Whether the interval of the difference to the chosen model contains 0."""
         ends = self.difference_interval
         return self.reason is None and ends is not None and ends[0] <= 0 <= ends[1]
-
-    @property
-    def caution(self) -> str | None:
-        """Why the model is reliable only near its training data, or None."""
-        return caution(self.model)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the row as in the leaderboard files."""
@@ -161,7 +166,9 @@ class Row:
             "train": None if self.train is None else asdict(self.train),
             "test": test,
             "validation_rmse": self.validation_rmse,
+            "validation_by_part": list(self.validation_by_part),
             "validation_failed": self.validation_failed,
+            "validated": self.validated,
             "outputs": {
                 name: asdict(scores) | {"validation_rmse": self.validation_by_output.get(name)}
                 for name, scores in self.outputs.items()

@@ -13,11 +13,12 @@ import numpy as np
 from mckibben import registry
 from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.channels import Channels, Names, channels_of
-from mckibben.comparison.fitting import Constant, Data, Item, constant_of
+from mckibben.comparison.fitting import Candidate, Constant, Data, constant_of
 from mckibben.comparison.leaderboard import Leaderboard, Row
+from mckibben.comparison.parts import parts_of
 from mckibben.comparison.shared_rows import check_shared
-from mckibben.comparison.splits import Split, split_of, validation_folds
-from mckibben.errors import DataError, ModelError, require
+from mckibben.comparison.splits import Split, split_of
+from mckibben.errors import DataError, ModelError
 from mckibben.estimators.catalogue import declared
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.numerals import counted
@@ -26,8 +27,8 @@ from mckibben.signals import made_manageable
 
 Settings = Mapping[str, Mapping[str, Any]]
 
-N_FOLDS = 4
-"""Number of folds of the cross-validation."""
+Models = str | Sequence[str] | Mapping[str, str | Estimator]
+"""Models of a comparison: "all", "quick", short names, or labels with short names or estimators."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Plan:
 
     Parameters
     ----------
-    items : mapping of str to Item
+    items : mapping of str to Candidate
         What every row is called, and what is fitted for it, cheapest first.
     empty : Leaderboard
         The leaderboard before any model is finished.
@@ -45,7 +46,7 @@ class Plan:
     """
 
     data: Data
-    items: Mapping[str, Item]
+    items: Mapping[str, Candidate]
     empty: Leaderboard
     refused: Mapping[str, str]
 
@@ -73,17 +74,14 @@ def plan_of(
     outputs: Names = None,
     load: str | None = None,
     validation: Sequence[Recording] = (),
-    models: str | Sequence[str] = "all",
+    models: Models = "all",
     settings: Settings | None = None,
-    n_folds: int = N_FOLDS,
     seed: int = 0,
     most_samples: int | None = None,
     allow_shared: bool = False,
 ) -> Plan:
     """Return the set-up of a comparison; see `compare`."""
     recordings, tests, checks = listed(train), listed(test), listed(validation)
-    whole = isinstance(n_folds, int) and n_folds >= 0
-    require(whole, "n_folds", n_folds, "0, 1, 2 or more")
     if not recordings:
         raise DataError("there are no recordings to fit", remedy="give at least one")
     every = [*recordings, *tests, *checks]
@@ -107,26 +105,28 @@ def plan_of(
             remedy="leave `most_samples` out, or resample them to a longer sample time",
         )
     split = split_of(recordings, tests, channels)
-    parts, chosen_by = validation_folds(split.train, channels, n_folds, checks)
+    parts = parts_of(checks or split.train, channels)
+    chosen_by = ("given" if checks else "cross-validation") if parts else "fit"
     described = split.described
     if chosen_by == "cross-validation":
-        described += (
-            f", cross-validated on {counted(len(parts), 'part')} within the range of the rest"
-        )
-    names, left_out = _chosen(models, every, channels)
-    unloaded = replace(channels, scheduling=None)
-    given = {model: {"seed": seed} | dict((settings or {}).get(model, {})) for model in names}
-    named = {*given, *(registry.names("estimators") if models in ("all", "quick") else ())}
-    if lost := sorted({*(settings or {})} - named):
+        described += f", cross-validated on {counted(len(parts), 'part')}"
+    items, left_out = _chosen(models, every, channels, seed)
+    given = dict(settings or {})
+    named = {*items, *(registry.names("estimators") if models in ("all", "quick") else ())}
+    if lost := sorted({*given} - named):
         raise ModelError(
             f"no model is compared that is named {', '.join(lost)}",
             parameter="settings",
             remedy="add it to `models`, or leave its settings out",
         )
     # that a model is not given the load is no reason against it
-    refused = objections(objections(names, split.train, channels), split.train, unloaded)
-    efforts = {model: registry.load("estimators", model).effort for model in names}
-    items = {model: Item(model, given[model]) for model in sorted(names, key=efforts.__getitem__)}
+    unloaded = replace(channels, scheduling=None)
+    refused = objections(items, split.train, channels)
+    refused = objections({name: items[name] for name in refused}, split.train, unloaded)
+    items = {
+        name: replace(items[name], settings={**items[name].settings, **given.get(name, {})})
+        for name in sorted(items, key=lambda name: items[name].made.effort)
+    }
     empty = Leaderboard(
         inputs=channels.inputs,
         outputs=channels.outputs,
@@ -144,7 +144,7 @@ def plan_of(
         ignored=channels.ignored(every),
         outside=_outside(split, channels.known(every)),
     )
-    return Plan(Data(split, parts, channels), items, empty, refused)
+    return Plan(Data(split, parts, channels, tuple(checks)), items, empty, refused)
 
 
 def _checked(some: Sequence[Sequence[Recording]], channels: Channels) -> str:
@@ -177,40 +177,54 @@ def _outside(split: Split, names: Sequence[str]) -> dict[str, float]:
 
 
 def _chosen(
-    models: str | Sequence[str], recordings: Sequence[Recording], channels: Channels
-) -> tuple[tuple[str, ...], dict[str, str]]:
+    models: Models, recordings: Sequence[Recording], channels: Channels, seed: int
+) -> tuple[dict[str, Candidate], dict[str, str]]:
     """Return the models to fit, and why others of "all" do not apply to these recordings."""
-    left_out: dict[str, str] = {}
+    seeded = {"seed": seed}
     if models in ("all", "quick"):
         every = registry.names("estimators")
         names = every if models == "all" else [name for name in every if declared(name).quick]
-        left_out = objections(names, recordings, channels)
-        names = [name for name in names if name not in left_out]
+        items = {name: Candidate(name, seeded) for name in names}
+        left_out = objections(items, recordings, channels)
+        return {name: item for name, item in items.items() if name not in left_out}, left_out
+    if isinstance(models, Mapping):
+        found = {str(label): _item(model, seeded) for label, model in models.items()}
     else:
         named = models.split(",") if isinstance(models, str) else models
         if not (isinstance(named, Iterable) and all(isinstance(name, str) for name in named)):
             raise ModelError(
                 f"models cannot be {models!r:.60}", remedy="give 'all', 'quick', or a list of names"
             )
-        names = list(dict.fromkeys(name.strip() for name in named))
-    if not names:
+        found = {name.strip(): _item(name.strip(), seeded) for name in named}
+    if not found:
         raise ModelError(
             "there are no models to compare",
             remedy=f"name some of {', '.join(registry.names('estimators'))}, or all",
         )
-    return tuple(names), left_out
+    return found, {}
+
+
+def _item(model: object, seeded: Mapping[str, Any]) -> Candidate:
+    """Return what is fitted for a short name, or for an estimator with its own settings."""
+    if isinstance(model, str):
+        registry.load("estimators", model)  # refuses unknown names
+        return Candidate(model, seeded)
+    if isinstance(model, Estimator):
+        return Candidate(model)
+    raise ModelError(
+        f"a model cannot be {model!r:.60}", remedy="give a short name, or an estimator"
+    )
 
 
 def objections(
-    models: Iterable[str], recordings: Sequence[Recording], channels: Channels
+    items: Mapping[str, Candidate], recordings: Sequence[Recording], channels: Channels
 ) -> dict[str, str]:
     """Return which models do not apply to recordings, and why."""
     asked = recordings, channels.inputs, channels.outputs, channels.scheduling
     found: dict[str, str] = {}
-    for name in models:
+    for name, item in items.items():
         try:
-            estimator = registry.load("estimators", name)
-            reason = estimator.objection(*asked) or _timeless(estimator, recordings)
+            reason = item.made.objection(*asked) or _timeless(item.made, recordings)
         except ModelError as error:  # a plug-in that is broken is not the end of all others
             reason = str(error)
         if reason is not None:

@@ -4,29 +4,28 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.checkpoints import Checkpoints, source
 from mckibben.comparison.channels import Names
 from mckibben.comparison.choosing import CONSTANT
 from mckibben.comparison.fitting import (
     FitResult,
+    Task,
     effort_of,
-    joined,
     outputs_of,
     processes_for,
     results,
     row_of,
-    tasks_of,
 )
 from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.comparison.planning import N_FOLDS, Plan, Settings, plan_of
+from mckibben.comparison.planning import Models, Plan, Settings, plan_of
 from mckibben.diagnosis.bands import tested_band
 from mckibben.errors import MckibbenError
 from mckibben.numerals import duration
@@ -87,11 +86,11 @@ def compare(
     outputs: Names = None,
     load: str | None = None,
     validation: Sequence[Recording] = (),
-    models: str | Sequence[str] = "all",
+    models: Models = "all",
     settings: Settings | None = None,
-    n_folds: int = N_FOLDS,
     seed: int = 0,
     jobs: int | None = None,
+    executor: Executor | None = None,
     most_samples: int | None = None,
     allow_shared: bool = False,
     folder: str | Path | None = None,
@@ -103,8 +102,9 @@ def compare(
     """Fit models to the same data, choose one by cross-validation, and test all.
 
     Every error is free-running. Models are fitted to the training recordings, and chosen by
-    cross-validation within them (over recordings, or over blocks of cycles of a single one); nothing is
-    chosen by the test. A model that fails is a row with its reason. The mean of the training output is
+    cross-validation within them: parts are left out in turn, and the error on each is that of the model
+    as it would be without the part (`mckibben.estimators.core.leaving_out`); nothing is chosen by the
+    test. A model that fails is a row with its reason. The mean of the training output is
     a row as well: if no model is significantly better, none is recommended. An interrupt ends the
     work at once; the leaderboard then holds what was finished, and names what is pending.
 
@@ -123,20 +123,20 @@ def compare(
         Channel of a varying load, an input of the models.
     validation : sequence of Recording
         To choose on; nothing is fitted to them.
-    models : "all", "quick", str or sequence of str
+    models : "all", "quick", str, sequence of str, or mapping
         Short names, in a text with commas between; "all" leaves out models that do not apply to the
-        channels, "quick" is a choice that takes seconds.
+        channels, "quick" is a choice that takes seconds. A mapping of labels to short names or
+        estimators compares one model with several settings.
     settings : mapping of str to mapping, optional
-        Model name to settings of its estimator.
-    n_folds : int
-        Parts of the cross-validation; those whose input goes beyond that of the rest are not used.
-        1, or too few cycles: one fit, validated on the last quarter of the training data.
-        0: none, and the choice is by the error on the fitted data.
+        Model name, or label, to settings of its estimator.
     seed : int
         Seed of all random numbers.
     jobs : int, optional
-        Processes, which share the models and their folds; default as many as there are cores, or none
-        for little work. Results are identical.
+        Processes, which share the models; default as many as there are cores, or none for little work.
+        Results are identical.
+    executor : concurrent.futures.Executor, optional
+        What fits the models instead of these processes: one over several machines, say, of Dask
+        (``client.get_executor()``) or MPI.
     most_samples : int
         Longer recordings are thinned to so many samples for fit and test, including turning points.
         Default: 100 000. Scores refer to these samples.
@@ -175,7 +175,6 @@ def compare(
         validation=validation,
         models=models,
         settings=settings,
-        n_folds=n_folds,
         seed=seed,
         most_samples=most_samples,
         allow_shared=allow_shared,
@@ -184,7 +183,9 @@ def compare(
     try:
         with (
             telling(progress, "comparing", lines=True) as tell,
-            closing(ranked(plan, jobs=jobs, kept=kept, progress=tell, watch=watch)) as rankings,
+            closing(
+                ranked(plan, jobs=jobs, executor=executor, kept=kept, progress=tell, watch=watch)
+            ) as rankings,
         ):
             for ranking in rankings:
                 board = ranking.board
@@ -212,16 +213,14 @@ def ranked(
     *,
     jobs: int | None,
     kept: Checkpoints,
+    executor: Executor | None = None,
     progress: Callable[[Standing], None] | None = None,
     watch: Watch | None = None,
 ) -> Generator[Ranking]:
     """Yield the ranking after every model, fast models first; the last ranking is complete."""
     checked(jobs)
     data, table = plan.data, _Table(plan)
-    keys = {
-        name: (item, source(registry.load("estimators", item.model)))
-        for name, item in plan.items.items()
-    }
+    keys = {name: (item, source(item.made)) for name, item in plan.items.items()}
     for name, reason in plan.refused.items():
         table.add(Row(name, reason=reason), ())
     for name in plan.items.keys() - plan.refused.keys():
@@ -229,23 +228,16 @@ def ranked(
         if row is not None and row.model == name and row.sound and row.block is not None:
             table.add(row, outputs_of(row.block, data))
     remaining = {name: item for name, item in plan.items.items() if name not in table.rows}
-    efforts = {
-        name: effort_of(item.model, data) * (1 + len(data.folds))
-        for name, item in remaining.items()
-    }
+    efforts = {name: effort_of(item, data) for name, item in remaining.items()}
     workers = jobs or processes_for(sum(efforts.values()))
-    large = sum(efforts.values()) / (4 * workers)
-    tasks = [
-        task
-        for name, item in remaining.items()
-        for task in tasks_of(name, item, len(data.folds), workers > 1 and efforts[name] > large)
-    ]
-    waiting = {name: [task for task in tasks if task.name == name] for name in remaining}
+    tasks = [Task(name, item) for name, item in remaining.items()]
+    tasks.sort(key=lambda task: -efforts[task.name] if workers > 1 else 0.0)
     begun: list[str] = []
     started = time.monotonic()
 
     def tell() -> None:
         if progress is not None:
+            waiting = [name for name in remaining if name not in table.rows]
             working = tuple(name for name in begun if name in waiting)
             best = plan.board(table.sorted()).best
             rest = sum(efforts[name] for name in waiting)
@@ -266,22 +258,16 @@ def ranked(
     tell()
     if table.rows:
         yield table.ranking()
-    found: dict[str, list[FitResult]] = {name: [] for name in remaining}
-    for outcome in results(data, tasks, workers, report):
-        name = tasks[outcome.index].name
-        what = outcome.value
-        if not isinstance(what, FitResult):
-            what = FitResult(reason=str(outcome.error or "its process gave no result"))
-        found[name].append(what)
-        if len(found[name]) == len(waiting[name]):
-            del waiting[name]
-            whole = joined(found.pop(name))
-            row = _row(plan, name, whole, table)
-            if row.sound:  # a failure may be the machine's, not the model's
-                kept.put(name, row, *keys[name])
-            table.add(row, whole.outputs)
-            tell()
-            yield table.ranking()
+    for outcome in results(data, tasks, workers, report, executor):
+        name, found = tasks[outcome.index].name, outcome.value
+        if not isinstance(found, FitResult):
+            found = FitResult(reason=str(outcome.error or "its process gave no result"))
+        row = _row(plan, name, found, table)
+        if row.sound:  # a failure may be the machine's, not the model's
+            kept.put(name, row, *keys[name])
+        table.add(row, found.outputs)
+        tell()
+        yield table.ranking()
 
 
 def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
@@ -293,7 +279,7 @@ def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
     better = any(other.sound and other.order < row.order for other in table.rows.values())
     if better or not row.sound or row.block is None or row.validation_rmse is None:
         return row
-    held = plan.data.held_out(found.predictions, row.block)
+    held = plan.data.held(found.predictions, row.block)
     banded = tested_band(row.block, held, found.outputs, plan.data)
     return row if banded is None else replace(row, banded=banded[0], band=banded[1])
 

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.free_run import Mask, predecessor
+from mckibben.blocks.free_run import Mask
 from mckibben.comparison.channels import Channels, held_at_levels
 from mckibben.errors import DataError
 from mckibben.numerals import counted
 from mckibben.recording import Recording
-from mckibben.signals import reversals, split_cycles
+from mckibben.signals import reversals
 
 FEWEST = 10
 """Smallest number of samples on either side of a split."""
@@ -25,19 +25,10 @@ HELD_OUT = 0.25
 EVERY = 3
 """Every how many runs one is held out, for several muscles or varying loads."""
 
-ENOUGH = 12
-"""Smallest number of runs of which a third can be held out."""
-
-PIECES = 4
-"""Number of pieces, spread over a recording, of a part."""
-
 HARDLY = 0.2
 """Standard deviation of an output in a part, relative to the whole, below which the part counts as
 at rest.
 """
-
-BEYOND = 0.05
-"""Share of an input's range by which a part may exceed it (noise) and count as inside."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +40,7 @@ class Split:
     train : tuple of Recording
         Used to fit and to choose.
     test : tuple of Recording
-        Run free from their own start or, where they continue a training recording, from its memory.
+        Each runs free from its own first sample.
     test_rows : tuple of array of bool
         For every test recording, the samples that are scored.
     described : str
@@ -62,29 +53,11 @@ class Split:
     described: str
 
 
-@dataclass(frozen=True)
-class Fold:
-    """Fold of a cross-validation: recordings to fit and to simulate, and their scored samples."""
-
-    train: tuple[Recording, ...]
-    train_rows: tuple[Mask, ...]
-    test: tuple[Recording, ...]
-    test_rows: tuple[Mask, ...]
-
-
 def given_split(train: Sequence[Recording], test: Sequence[Recording]) -> Split:
-    """Return the user's split.
-
-    The first sample of a test recording starts its memory, unless it continues a training recording,
-    and is not scored.
-    """
-    rows = []
-    for recording in test:
-        mask = np.ones(len(recording), dtype=bool)
-        mask[0] = predecessor(recording, train) is not None
-        rows.append(mask)
+    """Return the user's split."""
+    rows = tuple(~recording.bridged for recording in test)
     described = f"{counted(len(train), 'recording')} to fit, {len(test)} to test"
-    return Split(tuple(train), tuple(test), tuple(rows), described)
+    return Split(tuple(train), tuple(test), rows, described)
 
 
 def split_of(train: Sequence[Recording], test: Sequence[Recording], channels: Channels) -> Split:
@@ -94,8 +67,7 @@ def split_of(train: Sequence[Recording], test: Sequence[Recording], channels: Ch
 
 def tested_from(rows: Mask) -> int | None:
     """Return the first test sample of a recording whose beginning was fitted; else None."""
-    first = int(rows.argmax())
-    return first if first > 1 else None  # of others, the first sample may only start their memory
+    return int(rows.argmax()) or None
 
 
 def held_out(recordings: Sequence[Recording], channels: Channels) -> Split:
@@ -182,7 +154,7 @@ def _tail(recordings: Sequence[Recording], channel: str, travel: float, rest: st
         run, start = partly
         train.append(run.slice(0, start))
         tests.append(run)
-        rows.append(np.arange(len(run)) >= start)
+        rows.append((np.arange(len(run)) >= start) & ~run.bridged)
         described.append(f"last {len(run) - start} samples of {run.name}")
     elif not whole:
         raise DataError(
@@ -225,43 +197,6 @@ def _travel(u: Array) -> Array:
     return np.minimum(gone[branch] + own, gone[branch + 1])
 
 
-def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
-    """Yield cross-validation folds over recordings, or over blocks of cycles of a single one.
-
-    Of recordings that each hold the input, such as a length, every part has one of each level. Of a
-    recording of fewer cycles than parts, every part has pieces from all over it.
-
-    Parameters
-    ----------
-    channel : str
-        The input, whose cycles make the blocks.
-    n : int
-        Largest number of parts, at least 2.
-    """
-    if len(train) > 1:
-        for group in _repeats(train, channel, n) or np.array_split(
-            np.arange(len(train)), min(n, len(train))
-        ):
-            yield _left_out(train, [train[index] for index in group])
-        return
-    (recording,) = train
-    cycles = list(split_cycles(recording, channel, n))
-    place = np.zeros(len(recording), dtype=int)
-    for part, (start, stop) in enumerate(cycles):
-        place[start:stop] = part
-    if len(cycles) < n:
-        travel = _travel(recording[channel])
-        place = (travel / travel[-1] * PIECES * n).astype(int) % n
-    for part in range(place.max() + 1):
-        mask = place == part
-        yield Fold((recording,), (~mask,), (recording,), (mask,))
-
-
-def _left_out(train: Sequence[Recording], left: Sequence[Recording]) -> Fold:
-    kept = tuple(run for run in train if not any(run is other for other in left))
-    return Fold(kept, _all_rows(kept), tuple(left), _all_rows(left))
-
-
 def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]]:
     """Return repetitions of the levels of a common input: all first runs, all second ...; or none."""
     if any(np.ptp(recording[channel]) > 0 for recording in train):
@@ -270,86 +205,3 @@ def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]
     repeat = [levels[:place].count(level) for place, level in enumerate(levels)]
     groups = [[place for place, k in enumerate(repeat) if k % n == one] for one in range(n)]
     return [group for group in groups if group] if min(map(levels.count, levels)) > 1 else []
-
-
-def validation_folds(
-    train: Sequence[Recording], channels: Channels, n: int, given: Sequence[Recording] = ()
-) -> tuple[tuple[Fold, ...], str]:
-    """Return the folds within the training data, and a description of them.
-
-    A cross-validation in ``n`` parts; where there are too few cycles for one, or for ``n`` of 1, the
-    last part of the training data; where that is too little, or for 0, nothing. A part whose input
-    goes beyond that of the rest is left out, unless all do: extrapolation to it would decide, though
-    the model that is delivered has seen it.
-
-    Of several muscles, or of one under loads, every third run is left out in turn; of fewer than
-    `ENOUGH`, the last quarter of each is.
-
-    Parameters
-    ----------
-    n : int
-        Largest number of parts.
-    given : sequence of Recording
-        Runs to choose on, to which nothing is fitted: then there are no other parts.
-
-    Returns
-    -------
-    parts : tuple of Fold
-    chosen_by : {"cross-validation", "validation", "given", "fit"}
-    """
-    train = tuple(train)
-    if given:
-        return (Fold(train, _all_rows(train), tuple(given), _all_rows(given)),), "given"
-    if n >= 1 and not channels.single:
-        if len(train) >= ENOUGH and (found := tuple(_in_turn(train, channels))):
-            return found, "cross-validation"
-        starts = [len(run) - round(HELD_OUT * len(run)) for run in train]
-        tails = tuple(np.arange(len(run)) >= s for run, s in zip(train, starts, strict=True))
-        return (Fold(train, tuple(~tail for tail in tails), train, tails),), "validation"
-    channel = channels.inputs[0]
-    if n >= 2:
-        with suppress(DataError):  # of an input that never turns
-            parts = tuple(folds(train, channel, n))
-            sizes = [sum(map(np.sum, r)) for p in parts for r in (p.train_rows, p.test_rows)]
-            if min(sizes) >= FEWEST:
-                inside = tuple(part for part in parts if _interpolates(part, channel))
-                return inside or parts, "cross-validation"
-    if n >= 1:
-        with suppress(DataError):
-            tail = held_out_part(train, channels, HELD_OUT)
-            fold = Fold(tail.train, _all_rows(tail.train), tail.test, tail.test_rows)
-            return (fold,), "validation"
-    return (), "fit"
-
-
-def _in_turn(train: Sequence[Recording], channels: Channels) -> Iterator[Fold]:
-    names = (*channels.inputs, *channels.scheduled(train))
-    for first in range(EVERY):
-        kept = [run for place, run in enumerate(train) if place % EVERY != first]
-        seen = {name: np.concatenate([run[name] for run in kept]) for name in names}
-        left = [
-            run
-            for run in train[first::EVERY]
-            if all(_within(run[name], seen[name]) for name in names)
-        ]
-        if left:
-            yield Fold(tuple(kept), _all_rows(kept), tuple(left), _all_rows(left))
-
-
-def _within(values: Array, others: Array) -> bool:
-    """Return whether values stay nearly within the range of others."""
-    low, high = others.min(), others.max()
-    slack = BEYOND * (high - low)
-    return bool(values.min() >= low - slack and values.max() <= high + slack)
-
-
-def _interpolates(part: Fold, channel: str) -> bool:
-    tested, fitted = (
-        np.concatenate([r[channel][mask] for r, mask in zip(runs, rows, strict=True)])
-        for runs, rows in ((part.test, part.test_rows), (part.train, part.train_rows))
-    )
-    return _within(tested, fitted)
-
-
-def _all_rows(recordings: Sequence[Recording]) -> tuple[Mask, ...]:
-    return tuple(np.ones(len(recording), dtype=bool) for recording in recordings)

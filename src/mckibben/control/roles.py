@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.fields import Channel
-from mckibben.blocks.inverse import COMMANDS
+from mckibben.blocks.fields import COMMANDS, Channel
 from mckibben.control.connecting import Offer, find
 from mckibben.control.twin import Twin, plain
 from mckibben.errors import DataError

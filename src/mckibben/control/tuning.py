@@ -16,8 +16,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.feedback import PIDFeedback
-from mckibben.blocks.fields import Channel
-from mckibben.blocks.inverse import COMMANDS
+from mckibben.blocks.fields import COMMANDS, Channel
 from mckibben.control.connecting import match
 from mckibben.control.roles import MOVED, Plant, actuated, channels_of, rest_length_of, resting
 from mckibben.control.twin import Twin

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
-from mckibben.blocks.inverse import commands, drives
+from mckibben.blocks.fields import drives
+from mckibben.blocks.inverse import commands
 from mckibben.blocks.running import Stream
 from mckibben.control.identified import known_ranges
 from mckibben.errors import DataError, ModelError

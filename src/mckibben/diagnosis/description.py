@@ -16,11 +16,10 @@ from mckibben.blocks.equations import Quantity, quantities, written
 from mckibben.blocks.inverse import commands
 from mckibben.blocks.notation import Written
 from mckibben.errors import DataError, ModelWarning
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.core.uncertainty import (
     autoregressions,
     covariance_of,
-    simulate_started,
     unknown,
     vanishing,
 )
@@ -125,29 +124,22 @@ def describe(
 
 def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, float]:
     """Return the covariance of a model's parameters, and independent samples; NaN if unknown."""
-    outputs, inputs = ([c.name for c in some] for some in (block.outputs, block.inputs))
+    names = [channel.name for channel in (*block.inputs, *block.outputs)]
+    outputs = [channel.name for channel in block.outputs]
     share = min(1.0, MOST_OPERATIONS / max(_operations(block, recordings), 1.0))
-    kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
+    every = [recording.with_derived(names) for recording in recordings]
+    kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in every]
     share = sum(map(len, kept)) / sum(map(len, recordings))
-    runs = tuple(
-        Run(
-            *(r.name, r.matrix(inputs), r.matrix(outputs), np.empty((len(r), 0))),
-            *(np.ones(len(r), dtype=bool), r.sample_time),
-        )
-        for r in kept
-    )
     if _means_nothing(block):
         return unknown(block), np.nan
-    data = TrainingData(runs, block.inputs, block.outputs)
-    residual = data.target - simulate_started([block], data)[0]
-    if not np.isfinite(residual).all():
+    runs = FreeRuns(block, kept, [~recording.bridged for recording in kept])
+    if not np.isfinite(runs.residual).all():
         return unknown(block), np.nan
-    ends = np.cumsum([run.outputs.size for run in runs])[:-1]
-    left = [part.reshape(-1, len(outputs)) for part in np.split(residual, ends)]
-    n = sum(map(len, left))
+    pairs = zip(kept, runs.modelled, runs.rows, strict=True)
+    left = [np.where(own[:, None], r.matrix(outputs) - found, np.nan) for r, found, own in pairs]
+    n = sum(int(own.sum()) for own in runs.rows)
     n_effective = min(m.effective_sample_size(n) for m in autoregressions(left)) / share
-    places = np.flatnonzero(fixed(block)).tolist()
-    return share * covariance_of(block, data, residual, places, simulate_started)[1], n_effective
+    return share * covariance_of(runs, np.flatnonzero(fixed(block)).tolist())[1], n_effective
 
 
 def parameters(block: Block, covariance: Array, half_width: float) -> tuple[Parameter, ...]:

@@ -66,7 +66,7 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
     for recording in recordings:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore", RuntimeWarning)
-            modelled = run_free(block, recording, outputs, recordings)
+            modelled = run_free(block, recording, outputs)
         measured = recording.matrix(outputs)
         refuse_runaway(block, recording, modelled, measured)
         found.append(Run(recording, recording.matrix(inputs), measured, modelled))

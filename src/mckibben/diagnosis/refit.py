@@ -13,16 +13,15 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.free_run import Mask, run_free
+from mckibben.blocks.free_run import run_free
 from mckibben.blocks.inverse import Inverse
-from mckibben.comparison.splits import folds
+from mckibben.comparison.channels import Channels
+from mckibben.comparison.parts import parts_of
 from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.estimators.catalogue import declared
+from mckibben.estimators.core.leaving_out import held_out
 from mckibben.recording import Recording
 from mckibben.statistics import BlockBootstrap, correlation_length, interval
-
-N_FOLDS = 4
-"""Number of cross-validation folds of a log."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +32,11 @@ class Refit:
     ----------
     model : Block
     old, new : float
-        Root mean square error, running free, on parts held out, of the old model and of models fitted
-        to the rest; of several outputs that of each over its range, on the mean.
+        Root mean square error, running free, on parts held out, of the old model and of the new one as
+        it would be without the part; of several outputs that of each over its range, on the mean.
     ratio : (float, float)
         95 % interval of new over old, by a paired block bootstrap.
-    n_folds, older : int
+    n_parts, older : int
         Parts, and recordings of older data.
     """
 
@@ -45,7 +44,7 @@ class Refit:
     old: float
     new: float
     ratio: tuple[float, float]
-    n_folds: int
+    n_parts: int
     older: int
 
     @property
@@ -60,7 +59,7 @@ class Refit:
             "old_rmse": self.old,
             "new_rmse": self.new,
             "ratio_interval": list(self.ratio),
-            "n_folds": self.n_folds,
+            "n_parts": self.n_parts,
             "older_recordings": self.older,
             "recommended": self.recommended,
         }
@@ -89,28 +88,26 @@ def refitted(
         if thresholds is not None and "n_operators" in {one.name for one in fields(estimator)}:
             settings["n_operators"] = len(thresholds) - (thresholds[0] == 0)
 
-    def fitted(recordings: Sequence[Recording], rows: Sequence[Mask]) -> Block:
-        masks = [*rows, *(np.ones(len(one), dtype=bool) for one in older_runs)]
-        found: Block = estimator(**settings).fit([*recordings, *older_runs], rows=masks).model_
-        return found
-
     def missed(block: Block, log: Recording) -> Array:
         return np.asarray(run_free(block, log, outputs) - log.matrix(outputs))
 
+    parts = parts_of(whole, Channels(tuple(driving), tuple(outputs), tuple(old.scheduling) or None))
+    if not parts:
+        return "The log is too short to leave parts of it out."
+    kept = tuple(np.zeros(len(one), dtype=bool) for one in older_runs)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)
             before = [missed(old, log) for log in whole]
-            after = [errors.copy() for errors in before]
-            parts = list(folds(whole, driving[0], N_FOLDS))
-            for fold in parts:
-                other = fitted(fold.train, fold.train_rows)
-                for log, rows in zip(fold.test, fold.test_rows, strict=True):
-                    place = next(k for k, own in enumerate(whole) if own is log)
-                    after[place][rows] = missed(other, log)[rows]
-            new = fitted(whole, [np.ones(len(log), dtype=bool) for log in whole])
+            refit = estimator(**settings).fit([*whole, *older_runs])
+            found = held_out(refit, [*whole, *older_runs], [(*part, *kept) for part in parts])
     except MckibbenError as error:
         return f"No model could be fitted to the log: {error}"
+    if found is None:
+        return "The model has too many parameters to leave parts of the log out."
+    new = refit.fitted
+    pairs = zip(found, whole, strict=False)  # older recordings come last
+    after = [table - log.matrix(outputs) for table, log in pairs]
     if not any(errors.any() for errors in before):
         return "The model has no error on the log."
     spans = np.ptp(np.concatenate([log.matrix(outputs) for log in whole]), axis=0)

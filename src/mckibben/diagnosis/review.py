@@ -19,7 +19,7 @@ from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import MEASURED, FeedforwardFeedback
 from mckibben.blocks.fields import Channel
-from mckibben.blocks.free_run import measured_start
+from mckibben.blocks.starts import start_state
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.control.twin import COMMAND
 from mckibben.diagnosis.refit import Refit, refitted
@@ -253,12 +253,8 @@ def _link(log: Recording, model: Block, compensator: Block | None, inputs: Seque
     measured = [name for name in inputs if name in log]
     blind = {name: _shifted(log[COMMAND + name], 1.0) for name in inputs if name not in log}
     log = log.with_channels(**blind)
-    # the first measured output has noise, so its start counts where it leaves less of the log
-    first = log.matrix(channel.name for channel in model.inputs)[0]
-    starts = [model.initial_state(first), measured_start(model, log, names)]
-    runs = [(model.simulate(log, initial=start.tolist()), start.tolist()) for start in starts]
-    motion = log.matrix(names)
-    modelled, start = min(runs, key=lambda run: float(np.sum((run[0].matrix(names) - motion) ** 2)))
+    start = start_state(model, log).tolist()
+    modelled = model.simulate(log, initial=start)
     # all counts from time zero on; `track` begins before it
     scored = slice(int(np.argmax(log.time >= -ROUNDING)), len(log))
     commanded, pairs, clipped = None, {}, 0

@@ -124,7 +124,6 @@ def outcomes(
                 load=task.load,
                 models=task.models if models == "all" else models,
                 settings={m: own for m, own in task.settings.items() if not named or m in models},
-                n_folds=task.folds,
                 seed=seed,
                 jobs=jobs,
                 folder=Checkpoints(folder).inside(f"{one.name}-{place}"),

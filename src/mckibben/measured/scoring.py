@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from mckibben.arrays import Array
-from mckibben.blocks.free_run import Mask, predecessor
+from mckibben.blocks.free_run import Mask
 from mckibben.comparison.channels import Channels, channels_of
 from mckibben.comparison.memory_test import gap_ratio, paired_gaps
 from mckibben.comparison.splits import Split, split_of
@@ -86,10 +86,7 @@ def parts_of(one: Set, recordings: Sequence[Recording]) -> Iterator[Part]:
         train, test = parted(task, recordings, one.folder)
         channels = channels_of([*train, *test], task.inputs, task.outputs, task.load)
         split = split_of(train, test, channels)
-        rows = tuple(
-            mask & ((np.arange(len(mask)) >= START) | (predecessor(run, split.train) is not None))
-            for run, mask in zip(split.test, split.test_rows, strict=True)
-        )
+        rows = tuple(mask & (np.arange(len(mask)) >= START) for mask in split.test_rows)
         yield Part(task, split, channels, rows, span_of(task, train, test, channels.outputs))
 
 

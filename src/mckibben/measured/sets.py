@@ -15,7 +15,6 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from mckibben.blocks.free_run import PERIODIC
-from mckibben.comparison.planning import N_FOLDS
 from mckibben.comparison.splits import FEWEST
 from mckibben.errors import DataError
 from mckibben.files import read
@@ -55,7 +54,7 @@ class Task(_Strict):
         Patterns of those that are tested on, whole: all at once, or one pattern in turn.
     cut : float
         Instead: share of every recording, from its start, that is fitted; the rest is tested.
-    inputs, outputs, load, models, settings, folds
+    inputs, outputs, load, models, settings
         As of `mckibben.compare`.
     published : list of Published
     """
@@ -71,7 +70,6 @@ class Task(_Strict):
     load: str | None = None
     models: Literal["all", "quick"] | list[str] = "all"
     settings: dict[str, dict[str, Any]] = {}
-    folds: Annotated[int, Field(ge=0)] = N_FOLDS
     published: list[Published] = []
 
     @model_validator(mode="after")

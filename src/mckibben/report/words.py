@@ -455,7 +455,7 @@ def reviewed(found: Review) -> list[str]:
         low, high = (percent(end, 2) for end in found.refit.ratio)
         said.append(
             f"The model fitted again to the log has {percent(found.refit.new / found.refit.old, 2)} of "
-            f"the old one's error on {found.refit.n_folds} parts held out (95 %: {low} to {high})."
+            f"the old one's error on {found.refit.n_parts} parts held out (95 %: {low} to {high})."
         )
     return said
 

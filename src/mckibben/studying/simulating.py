@@ -6,13 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
 from mckibben.arrays import Array
 from mckibben.blocks.bands import Banded
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
-from mckibben.blocks.free_run import measured_start
 from mckibben.control.identified import beyond_known
 from mckibben.diagnosis.bands import outside
 from mckibben.errors import DataError, ModelError
@@ -58,7 +55,7 @@ def simulated(
     model: Block,
     read: Callable[[list[str]], list[Recording]],
     *,
-    initial: str = "model",
+    initial: str | None = None,
     interval: float | None = None,
 ) -> Simulation:
     """Run a model over a recording.
@@ -68,8 +65,8 @@ def simulated(
     model : Block
     read : callable
         Returns the recordings with some channels.
-    initial : str
-        Memory before the first sample: ``model``, ``first_sample``, ``virgin`` or ``measured``.
+    initial : str, optional
+        Memory before the first sample, ``first_sample`` or ``virgin``; default as of `Block.simulate`.
     interval : float, optional
         Level of the band of a calibrated model.
 
@@ -91,12 +88,10 @@ def simulated(
             file=recording.source,
             remedy="cut it first, or give `gaps=interpolate`",
         )
-    modelled = (banded or block).simulate(recording, initial=_start(initial, block, recording))
+    modelled = (banded or block).simulate(recording, initial=initial)
     notes = beyond_known(block, recording)
     beyond: tuple[tuple[Channel, float, Array, tuple[float, float]], ...] = ()
     if banded is not None:
-        if initial == "model" and all(name in recording for name in outputs):
-            notes += _other_start(block, recording, outputs)
         known = {one.name: one for one in (*banded.band.driving, *banded.band.given)}
         ranges = dict(zip(known, zip(*banded.band.ends, strict=True), strict=True))
         beyond = tuple(
@@ -132,19 +127,3 @@ def _with_band(block: Block, interval: float | None) -> tuple[Any, Any]:
         remedy = "calibrate it on recordings that it was not fitted to, with `calibrate()`"
         raise ModelError(problem, parameter="interval", remedy=remedy)
     return block.at(interval), block.forward
-
-
-def _start(rule: str, block: Block, recording: Recording) -> Any:
-    if rule == "measured":
-        return measured_start(block, recording, block.outputs[0].name).tolist()
-    return None if rule == "model" else rule
-
-
-def _other_start(block: Block, recording: Recording, outputs: list[str]) -> list[str]:
-    """Return a warning if a run starts in another state than the model with its band."""
-    own = block.initial_state(recording.matrix(c.name for c in block.inputs)[0])
-    if np.array_equal(measured_start(block, recording, outputs), own):
-        return []
-    return [
-        "the run does not begin in the model's initial state; the band is for `initial=measured`"
-    ]

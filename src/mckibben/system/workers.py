@@ -15,6 +15,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import connection, forkserver, resource_tracker, util
@@ -197,15 +198,56 @@ def checked(jobs: int | None) -> int | None:
 
 
 def outcomes(
-    work: Work, common: Any, items: Sequence[Any], n: int, report: Tell | None = None
+    work: Work,
+    common: Any,
+    items: Sequence[Any],
+    n: int,
+    report: Tell | None = None,
+    executor: Executor | None = None,
 ) -> Iterator[Outcome]:
-    """Yield the outcome of every item, from worker processes or this one; see `Workers.results`."""
-    if min(n, len(items)) <= 1 or multiprocessing.current_process().daemon:  # has no children
+    """Yield the outcome of every item as it finishes; see `Workers.results`.
+
+    From an executor if there is one, else from n worker processes, or from this one.
+    """
+    if executor is not None:
+        yield from _submitted(executor, work, common, items, report)
+    elif min(n, len(items)) <= 1 or multiprocessing.current_process().daemon:  # has no children
         with threads.one_blas_thread():
             yield from in_turn(work, common, items, report)
     else:
         with Workers(min(n, len(items)), common) as workers:
             yield from workers.results(work, items, report)
+
+
+def _submitted(
+    executor: Executor, work: Work, common: Any, items: Sequence[Any], report: Tell | None
+) -> Iterator[Outcome]:
+    """Yield the outcomes of an executor, which reports no progress within an item."""
+    futures = {executor.submit(_alone, work, common, item): k for k, item in enumerate(items)}
+    try:
+        if report is not None:
+            for index in futures.values():
+                report(index)
+        for future in as_completed(futures):
+            error = future.exception()
+            if error is not None and not isinstance(error, Exception):
+                raise error
+            value = None if error is not None else future.result()
+            yield Outcome(futures[future], value, error)
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def _alone(work: Work, common: Any, item: Any) -> Any:
+    """Do the work on one item, on one thread and without warnings, as a worker process does."""
+    with threads.one_blas_thread(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return work(common, item, _silent)
+
+
+def _silent(*progress: Any) -> None:
+    """Report nothing."""
 
 
 def all_of(work: Work, items: Sequence[Any], jobs: int | None = None) -> list[Any]:

@@ -309,7 +309,7 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
                 mark(widgets.plot_of(plot, height=HEIGHT), f"closer-{tab}")
         ui.label(typeset_within(" ".join(text))).classes("muted")
 
-    free = partial(run_free, block, run, outputs, train)
+    free = partial(run_free, block, run, outputs)
     later(("free", *key, run.name), free, show, height=HEIGHT)
 
 

@@ -8,14 +8,19 @@ a_k = exp(-T / tau_k), so the output answers at once and the inverse is in close
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import needs_sample_time, one_per
-from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, PositiveVector, Vector
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    STRICT,
+    ChannelField,
+    PositiveVector,
+    StartRule,
+    Vector,
+)
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
@@ -95,9 +100,8 @@ class Creep(Invertible):
         c_k: creep once it has ended, relative to the immediate response; not negative.
     time_constants : sequence of float, length K
         tau_k, how long each creep takes [s]; positive.
-    initial : {"first_sample", "virgin", "fitted"}
-        Where the elements are before the first sample: at rest at the first input, or at 0, or, on
-        recordings whose output is known, where that determines it (else at rest at the first input).
+    initial : {"first_sample", "virgin"}
+        Where the elements are before the first sample: at rest at the first input, or at 0.
     input, output : Channel
         Channel driven and channel given.
     """
@@ -112,7 +116,6 @@ class Creep(Invertible):
     counts_clipped = False
     parameters = ("compliances", "time_constants")
     n_states = one_per("compliances")  # one to every Kelvin-Voigt element
-    n_fitted = n_states
     typical = ((0.08, 0.05), (1.5, 40.0))
     notation = Notation(
         r"y = u + \sum_k c_k x_k,\quad \tau_k \dot{x}_k = u - x_k",
@@ -122,7 +125,7 @@ class Creep(Invertible):
 
     compliances: Vector
     time_constants: PositiveVector
-    initial: Literal["first_sample", "virgin", "fitted"] = "first_sample"
+    initial: StartRule = "first_sample"
     input: ChannelField = DISPLACEMENT
     output: ChannelField = DISPLACEMENT
 

@@ -22,7 +22,6 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block, needs_sample_time
-from mckibben.blocks.dynamics.starts import start_on
 from mckibben.blocks.kernels import kernel, remember, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -84,10 +83,8 @@ class ProcessModel(Block):
         The operating point.
     hold : {"first", "zero"}
         What the input does between samples: go on in a straight line, or stay.
-    initial : {"first_sample", "virgin", "fitted"} or sequence of float
-        Default memory before the first sample: at rest at the first input, or at the operating
-        point, or, on recordings that have the output, what explains it best (else at rest at the
-        first input).
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: at rest at the first input, or at the operating point.
     input, output : Channel
         Channel driven and channel given.
     """
@@ -98,7 +95,6 @@ class ProcessModel(Block):
     rate_dependent = True
     is_linear = True
     filters = True
-    start_on = start_on
     typical = (6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
     notation = Notation(
         gain="K [{y}/{u}]",
@@ -118,7 +114,7 @@ class ProcessModel(Block):
     input_offset: FiniteFloat = 0.0
     output_offset: FiniteFloat = 0.0
     hold: Literal["first", "zero"] = "first"
-    initial: fields.FittedInitial = "first_sample"
+    initial: fields.StoredInitial = "first_sample"
     input: fields.ChannelField = fields.PRESSURE
     output: fields.ChannelField = fields.DISPLACEMENT
 
@@ -147,8 +143,6 @@ class ProcessModel(Block):
         """MATLAB's name of the structure, P1 to P3 with U and Z; a delay adds D."""
         under = "U" if self.damping is not None else ""
         return f"P{self.order}{'D' * (self.delay > 0)}{under}{'Z' * (self.zero_time is not None)}"
-
-    n_fitted = order
 
     instead = "invert a hysteresis model (cpi, gpi, mpi), or a transfer-function with delay 0"
 

@@ -16,8 +16,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, one_per, own_sample_time
-from mckibben.blocks.dynamics.starts import start_on
+from mckibben.blocks.base import Block, own_sample_time
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -67,9 +66,8 @@ class TransferFunction(Block):
         Time between samples that it holds for [s]; positive.
     input_offset, output_offset : float
         u_0 and y_0, the operating point.
-    initial : {"first_sample", "virgin", "fitted"} or sequence of float
-        Default memory before the first sample: at rest at the first input, or at u_0, or, on recordings
-        that have the output, what explains it best (else at rest at the first input).
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: at rest at the first input, or at u_0.
     input, output : Channel
         Channel driven and channel given.
     noise_numerator, noise_denominator : sequence of float
@@ -84,14 +82,12 @@ class TransferFunction(Block):
     rate_dependent = True
     is_linear = True
     filters = True
-    start_on = start_on
     parameters = (
         "numerator",
         "denominator",
         "input_offset",
         "output_offset",
     )
-    n_fitted = one_per("denominator")  # as many states as there are poles
     typical = ((0.9, -0.85, 0.018), (-1.2, 0.21), 0.01, 1.0, 2.0)
     notation = Notation(
         r"y_t - y_0 = \frac{B(q)}{F(q)} (u_t - u_0) + \frac{C(q)}{D(q)} e_t",
@@ -111,7 +107,7 @@ class TransferFunction(Block):
     sample_time: fields.Positive
     input_offset: FiniteFloat = 0.0
     output_offset: FiniteFloat = 0.0
-    initial: fields.FittedInitial = "first_sample"
+    initial: fields.StoredInitial = "first_sample"
     input: fields.ChannelField = fields.PRESSURE
     output: fields.ChannelField = fields.DISPLACEMENT
     noise_numerator: fields.Coefficients = ()

@@ -1,7 +1,7 @@
 """Simulate a saved model in free run on a recording; adds channels named OUTPUT_model.
 
-A linear model with a fitted initial state starts from the state that fits the measured output best, if
-the file contains it; with --initial first_sample, from the inputs alone.
+The run begins from the first measured output for what that determines, and at rest for the rest; without
+measured outputs, or with --initial first_sample, at rest at the first input.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ def simulate(
     initial: Annotated[
         str,
         Option(
-            "Memory before the first sample: model (as saved), first_sample, virgin, or measured "
-            "(the one excursion that explains the first measured output)."
+            "Memory before the first sample: measured (from the first measured output), first_sample "
+            "(at rest at the first input), or virgin."
         ),
-    ] = "model",
+    ] = "measured",
     interval: Annotated[
         float | None,
         Option("With a calibrated model: add the band of this coverage, as 0.9.", "LEVEL"),
@@ -46,7 +46,7 @@ def simulate(
     found = simulated(
         saved(model, fields),
         lambda names: read_files(file, names, reading),
-        initial=initial,
+        initial=None if initial in ("measured", "model") else initial,
         interval=interval,
     )
     write(found.recording.with_meta(model=str(model)), out)

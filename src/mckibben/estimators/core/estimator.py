@@ -18,16 +18,13 @@ from numpy.typing import ArrayLike
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
+from mckibben.blocks.free_run import run_free
 from mckibben.errors import DataError, ModelWarning
 from mckibben.estimators.core.data import Mask, TrainingData, training_data
+from mckibben.estimators.core.free_runs import FreeRuns
+from mckibben.estimators.core.leaving_out import stepped
 from mckibben.estimators.core.settings import check_settings
-from mckibben.estimators.core.uncertainty import (
-    covariance_of,
-    simulate_all,
-    simulate_started,
-    unknown,
-    vanishing,
-)
+from mckibben.estimators.core.uncertainty import covariance_of, unknown, vanishing
 from mckibben.estimators.optimisers.tracker import Progress, Tracker
 from mckibben.recording import REST_LENGTH, Recording, conversion, is_frame, listed
 from mckibben.signals.checking import LARGEST_SEED
@@ -50,18 +47,22 @@ Grid = Mapping[str, tuple[Any, ...]]
 
 
 Start = Literal["first_sample", "virgin"]
-"""State before the first sample of every recording, if it is not estimated."""
+"""State before the first sample of every recording: what its first output determines, and at rest at
+the first input for the rest (see `mckibben.blocks.starts`); or as if nothing had ever happened.
+"""
 
-Initial = Literal[Start, "fitted"]
-"""The same, or "fitted": estimated with the parameters."""
+MOST_PASTS, MATTERS = 3, 0.1
+"""Maximum number of fits after pasts that the last fit shows; and the effect of these on outputs, or the
+reduction of the error, relative to the error, for another.
+"""
 
 
 @dataclass(frozen=True)
 class Diagnostics:
     """Diagnostics of a fit.
 
-    Errors are those of free runs on the samples fitted, in the unit of the output, each run started as
-    fitted; of several outputs the mean of theirs.
+    Errors are those of free runs on the samples fitted, in the unit of the output, which begin as those
+    of `simulate` on these recordings; of several outputs the mean of theirs.
     """
 
     rmse: float
@@ -176,12 +177,6 @@ class Estimator(ABC):
     input_settings: ClassVar[tuple[str, ...]] = ()
     """Settings that name further input channels, of the block as well."""
 
-    solves_starts: ClassVar[bool] = False
-    """Whether `initial="fitted"` estimates start states. If these states alone explain the
-    recordings, and the error from rest exceeds the range of the output, it is fitted from rest
-    instead.
-    """
-
     errors_known: ClassVar[bool] = True
     """Whether standard errors of the parameters are computed."""
 
@@ -265,7 +260,7 @@ class Estimator(ABC):
 
     @property
     def starting_rule(self) -> Start:
-        """Start rule of the block: `initial`, unless it is fitted."""
+        """Start rule of the block: `initial`, where that is a setting."""
         return "virgin" if self.get_params().get("initial") == "virgin" else "first_sample"
 
     def common_fields(self, data: TrainingData) -> dict[str, Any]:
@@ -387,21 +382,30 @@ class Estimator(ABC):
     ) -> Self:
         started = time.perf_counter()
         self.check_settings()
-        data = self.data(listed(recordings), rows)
         tracker = Tracker(progress=progress)
-        block, data = self.find(data, tracker)
-        diagnostics = self._diagnose(block, data, tracker, started)
+        self.model_ = self.find(self.data(recordings, rows), tracker)[0]
+        runs = self.free_runs(self.model_, listed(recordings), rows)
+        if any(map(len, runs.pasts)) and runs.apart(runs.from_rest) > MATTERS * runs.rmse:
+            runs = self._after_pasts(runs, tracker)
+        self.diagnostics_ = self._diagnose(runs, tracker, started)
         if progress is not None:
-            progress(1.0, diagnostics.rmse)
-        self.model_, self.diagnostics_ = block, diagnostics
-        settings = self.get_params()
-        fits_starts = self.solves_starts and settings["initial"] == "fitted"
-        missed = diagnostics.rmse_from_rest > np.ptp(data.target)
-        if fits_starts and missed:
-            at_rest = type(self)(**settings | {"initial": "first_sample"})
-            at_rest._fit(recordings, rows, progress)
-            vars(self).update(vars(at_rest) | settings)
+            progress(1.0, self.diagnostics_.rmse)
         return self
+
+    def _after_pasts(self, runs: FreeRuns, tracker: Tracker) -> FreeRuns:
+        """Fit again to recordings that begin after the pasts which the fit from rest shows."""
+        for _ in range(MOST_PASTS):
+            before = dict(vars(self))
+            self.model_ = self.find(self.data(*runs.preceded()), tracker)[0]
+            found = self.free_runs(self.model_, runs.recordings, runs.rows)
+            if not found.rmse < runs.rmse:
+                vars(self).clear()
+                vars(self).update(before)
+                break
+            helped, runs = found.rmse < (1.0 - MATTERS) * runs.rmse, found
+            if not helped:
+                break
+        return runs
 
     def check_settings(self) -> None:
         """Raise an error for settings that violate their declarations.
@@ -419,9 +423,9 @@ class Estimator(ABC):
         *,
         sample_time: float | None = None,
     ) -> Any:
-        """Return the model's free-running output.
+        """Return the model's free-running output, as `simulate` of the model does.
 
-        Every run starts as a stream would: no measured output is looked at.
+        A recording that has the output begins from its first sample, an array of inputs at rest.
 
         Parameters
         ----------
@@ -439,10 +443,8 @@ class Estimator(ABC):
         if isinstance(recordings, Recording) or is_frame(recordings):
             return self.predict(listed(recordings))[0]
         block = self.fitted
-        names = [channel.name for channel in block.inputs]
         given = [channel.name for channel in block.outputs]
-        every = listed(recordings)
-        found = [block.simulate(r.select(names)).matrix(given) for r in every]
+        found = [run_free(block, recording, given) for recording in listed(recordings)]
         return [outputs[:, 0] for outputs in found] if len(given) == 1 else found
 
     def score(self, recordings: Recording | Sequence[Recording], y: None = None) -> float:
@@ -472,28 +474,26 @@ class Estimator(ABC):
         block: Block = self.model_
         return block
 
-    def _diagnose(
-        self, block: Block, data: TrainingData, tracker: Tracker, started: float
-    ) -> Diagnostics:
+    def _diagnose(self, runs: FreeRuns, tracker: Tracker, started: float) -> Diagnostics:
+        block, n_outputs = runs.block, len(runs.names)
         at_bounds = self.at_bounds(block)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ModelWarning)
-            residual = data.target - self.free_runs([block], data)[0]
-            from_rest = data.target - simulate_all([block], data)[0]
+            by_output = _rms(runs.residual.reshape(-1, n_outputs))
+            from_rest = _rms(runs.from_rest.residual.reshape(-1, n_outputs))
         notes = dict.fromkeys([*tracker.notes, *sorted({str(one.message) for one in caught})])
-        by_output = _rms(residual.reshape(-1, len(data.outputs)))
         return Diagnostics(
             rmse=float(by_output.mean()),
             rmse_by_output=tuple(by_output.tolist()),
-            rmse_from_rest=float(_rms(from_rest.reshape(-1, len(data.outputs))).mean()),
-            n_samples=residual.size // len(data.outputs),
+            rmse_from_rest=float(from_rest.mean()),
+            n_samples=runs.residual.size // n_outputs,
             n_free=block.n_parameters - len(self.fixed(block)) + self.n_further,
             n_evaluations=tracker.evaluations,
             seconds=time.perf_counter() - started,
             at_bounds=at_bounds,
             notes=tuple(notes),
             # of the estimator as it is now: it may be changed or fitted again
-            uncertainty=partial(copy(self).uncertainty, block, data, residual, at_bounds),
+            uncertainty=partial(copy(self).uncertainty, runs, at_bounds),
         )
 
     def undetermined(self) -> tuple[int, ...]:
@@ -508,21 +508,49 @@ class Estimator(ABC):
         excluded = {*found.at_bounds, *self.fixed(self.fitted)}
         return tuple(place for place in unknown if place not in excluded)
 
-    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return free-running outputs of blocks at scored samples, with fitted starts.
+    def free_runs(
+        self,
+        block: Block,
+        recordings: Sequence[Recording],
+        rows: Sequence[Mask] | None = None,
+    ) -> FreeRuns:
+        """Return the free runs of a block over recordings; samples bridged in reading never count."""
+        names = [channel.name for channel in (*block.inputs, *block.outputs)]
+        every = [one.with_derived(names) for one in listed(recordings)]
+        measured = [~one.bridged for one in every]
+        counted = measured if rows is None else list(map(np.logical_and, rows, measured))
+        return FreeRuns(block, every, counted)
 
-        Shape (blocks, samples).
+    @property
+    def penalty(self) -> float:
+        """Ridge of the fit, relative to each parameter's own effect on the output."""
+        return 0.0
+
+    def left_out(self, runs: FreeRuns, parts: Sequence[Mask]) -> list[list[Array]] | None:
+        """Return the outputs of the model as it would be without each part of its data.
+
+        By a step from the fit (`mckibben.estimators.core.leaving_out`), or in closed form.
+
+        Parameters
+        ----------
+        runs : FreeRuns
+            Of its model on the data that it was fitted to.
+        parts : sequence of array of bool, shape (N,)
+            Which outputs that count are left out.
+
+        Returns
+        -------
+        list of list of array, shape (n, m), or None
+            For every part, the outputs over every recording; None of a model with more parameters than a
+            step is computed for.
         """
-        return simulate_started(blocks, data)
+        return stepped(self, runs, parts)
 
-    def uncertainty(
-        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
-    ) -> tuple[float, Array]:
+    def uncertainty(self, runs: FreeRuns, at_bounds: Sequence[int]) -> tuple[float, Array]:
         """Return the condition of the free parameters, and the covariance of all; see `Diagnostics`."""
         if not self.errors_known:
-            return np.nan, unknown(block)
-        fixed = sorted({*at_bounds, *self.fixed(block)})
-        return covariance_of(block, data, residual, fixed, self.free_runs)
+            return np.nan, unknown(runs.block)
+        return covariance_of(runs, sorted({*at_bounds, *self.fixed(runs.block)}))
 
     def at_bounds(self, block: Block) -> tuple[int, ...]:
         """Return the indices of parameters at a bound: by default those equal to zero."""

@@ -11,26 +11,20 @@ practitioner's guide to robust covariance matrix estimation", 1997.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.dynamics.starts import fitted_places, fitted_run
 from mckibben.blocks.running import run_many
-from mckibben.estimators.core.data import Run, TrainingData, stretches
+from mckibben.estimators.core.data import TrainingData, stretches
+from mckibben.estimators.core.free_runs import FreeRuns, relative_sizes
 from mckibben.statistics import Autoregression, autoregression
-
-Simulated = Callable[[Sequence[Block], TrainingData], Array]
-"""Returns the free-running outputs of blocks at the samples used, shape (blocks, n)."""
 
 LARGEST = 1e150
 """Largest sensitivity; its square is finite."""
-
-DIFFERENCE = 1e-6
-"""Step of finite differences, relative to the size of a parameter."""
 
 LEAST, DETERMINED = 1e-6, 0.99
 """Smallest singular value of the sensitivities, relative to the largest, that is used; share of a
@@ -42,25 +36,11 @@ NOTHING = 1e-9
 
 
 def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
-    """Return free-running outputs of blocks at the scored samples, as `TrainingData.target`."""
+    """Return outputs of blocks, from rest, at the scored samples, as `TrainingData.target`."""
     outputs = []
     for run in data.runs:
         many = run_many(blocks, run.inputs, sample_time=run.sample_time)
         outputs.append(many[:, run.counts].reshape(len(many), -1))
-    return np.concatenate(outputs, axis=1)
-
-
-def simulate_started(blocks: Sequence[Block], data: TrainingData) -> Array:
-    """Return the same with start states fitted to every run.
-
-    Models of several outputs have no such states.
-    """
-    if len(blocks[0].outputs) > 1 or not any(map(fitted_places, blocks)):
-        return simulate_all(blocks, data)
-    outputs = []
-    for run in data.runs:
-        known = (run.inputs, run.y, run.sample_time, run.counts)
-        outputs.append([fitted_run(block, *known)[run.counts] for block in blocks])
     return np.concatenate(outputs, axis=1)
 
 
@@ -69,54 +49,44 @@ def unknown(block: Block) -> Array:
     return np.full((block.n_parameters, block.n_parameters), np.nan)
 
 
-def covariance_of(
-    block: Block,
-    data: TrainingData,
-    residual: Array,
-    fixed: Sequence[int],
-    simulated: Simulated,
-) -> tuple[float, Array]:
-    """Return the condition of the free parameters, and the covariance of all.
+def covariance_of(runs: FreeRuns, fixed: Sequence[int]) -> tuple[float, Array]:
+    """Return the condition of the free parameters of a block, and the covariance of all.
 
     From finite differences of the free-running output. Parameters that are fixed, or that the data do
     not determine, have NaN; so have those at which the output overflows, and all of a model whose own
     output does.
     """
-    parameters = block.pack()
-    covariance = np.full((parameters.size, parameters.size), np.nan)
+    parameters, covariance = runs.block.pack(), unknown(runs.block)
     free = [index for index in range(parameters.size) if index not in fixed]
     if not free:
         return np.inf, covariance
-    sizes = relative_sizes(parameters)
     with np.errstate(over="ignore", invalid="ignore"):
-        slopes = sensitivities(block, free, sizes[free], lambda blocks: simulated(blocks, data))
+        slopes = runs.slopes(free)
+        residual = runs.residual
         power = float(residual @ residual)
     finite = np.isfinite(slopes).all(axis=0) & (np.abs(slopes).max(axis=0, initial=0.0) < LARGEST)
     if not finite.any() or not np.isfinite(power):
         return np.inf, covariance
-    condition, own = covariance_by_runs(slopes[:, finite], residual, data.runs)
-    places = np.array(free)[finite]
+    condition, own = covariance_by_runs(slopes[:, finite], residual, runs)
+    places, sizes = np.array(free)[finite], relative_sizes(parameters)
     covariance[np.ix_(places, places)] = own * np.outer(sizes[places], sizes[places])
     return condition if finite.all() else np.inf, covariance
 
 
-def covariance_by_runs(slopes: Array, residual: Array, runs: Sequence[Run]) -> tuple[float, Array]:
-    """Return the condition of sensitivities, (n, k), and the covariance for residuals, (n,).
-
-    Both at the samples that count, as `TrainingData.target`.
-    """
+def covariance_by_runs(slopes: Array, residual: Array, runs: FreeRuns) -> tuple[float, Array]:
+    """Return the condition of sensitivities, (N, k), and the covariance for residuals, (N,)."""
     if not (np.isfinite(slopes).all() and np.isfinite(residual).all()):
         return np.inf, np.full(2 * slopes.shape[1:], np.nan)
-    ends = np.cumsum([run.outputs[run.counts].size for run in runs])[:-1]
+    m = len(runs.names)
+    ends = np.cumsum([m * int(rows.sum()) for rows in runs.rows])[:-1]
     moves, left = [], []
-    for run, by_run, own in zip(
-        runs, np.split(slopes, ends), np.split(residual, ends), strict=True
+    for rows, by_run, own in zip(
+        runs.rows, np.split(slopes, ends), np.split(residual, ends), strict=True
     ):
-        shape = run.outputs.shape
-        moves.append(np.zeros((*shape, slopes.shape[1])))
-        moves[-1][run.counts] = by_run.reshape(-1, *moves[-1].shape[1:])
-        left.append(np.full(shape, np.nan))
-        left[-1][run.counts] = own.reshape(-1, shape[1])
+        moves.append(np.zeros((rows.size, m, slopes.shape[1])))
+        moves[-1][rows] = by_run.reshape(-1, *moves[-1].shape[1:])
+        left.append(np.full((rows.size, m), np.nan))
+        left[-1][rows] = own.reshape(-1, m)
     models = autoregressions(left)
     condition, covariance, determined = sandwich(moves, left, models)
     return condition, blanked(covariance, determined)
@@ -171,31 +141,9 @@ def _pieces(series: Array) -> list[Array]:
     return [series[start:stop] for start, stop in stretches(np.isfinite(series))]
 
 
-def relative_sizes(parameters: Array) -> Array:
-    """Return the scales of parameters, with a lower bound."""
-    return np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))
-
-
 def vanishing(parameters: Array) -> Array:
     """Return which parameters are 0 to rounding, relative to the others."""
     return np.asarray(np.abs(parameters) <= NOTHING * relative_sizes(parameters))
-
-
-def sensitivities(
-    block: Block, places: Sequence[int], sizes: Array, run: Callable[[list[Block]], Array]
-) -> Array:
-    """Return sensitivities of outputs by k parameters, in units of their scales, shape (n, k).
-
-    ``run`` gives the outputs of blocks, shape (blocks, n).
-    """
-    parameters = block.pack()
-    perturbed: list[Block] = [block]
-    for place, size in zip(places, sizes, strict=True):
-        moved = parameters.copy()
-        moved[place] += DIFFERENCE * size
-        perturbed.append(block.unpack(moved))
-    base, *others = run(perturbed)
-    return np.column_stack([other - base for other in others]) / DIFFERENCE
 
 
 def inverted(slopes: Array) -> tuple[float, Array]:

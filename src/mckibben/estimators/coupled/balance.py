@@ -19,12 +19,13 @@ from annotated_types import Gt, Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance import Balance, balance_in
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import rows, vector
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.estimator import Grid
+from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.coupled.balance_bench import (
     bench_of,
     check_numbers,
@@ -279,7 +280,6 @@ class BalanceEstimator(CoupledEstimator):
             )
         structure = self.widest(bench, timed=not still or self.lags is not None)
         search, z = self._found(data, structure, prior_errors, tracker)
-        self._search, self._z = search, z
         structure = search.structure
         values = structure.expanded(z[: len(structure.terms)])
         balance = in_newtons(structure.block(values, final=True))
@@ -407,15 +407,11 @@ class BalanceEstimator(CoupledEstimator):
         return search, z
 
     def _long_held(self, search: Search, z: Array) -> tuple[Search, Array]:
-        """Return the search with settled starts, if that explains the beginning of runs.
-
-        Their first parts count then, which they do not where what came before is unknown.
-        """
+        """Return the search with settled starts, if that explains the runs considerably better."""
         settled = replace(search, structure=replace(search.structure, settled=True))
         found = settled.descended(z, STEPS_BETWEEN, Tracker())
-        whole = replace(search, problem=replace(search.problem, whole=True))
-        most = min(EXPLAINED * search.cost(z), (1.0 - OWN_HELPS) * whole.cost(z))
-        return (settled, found) if settled.cost(found) < most else (search, z)
+        helps = settled.cost(found) < (1.0 - OWN_HELPS) * search.cost(z)
+        return (settled, found) if helps else (search, z)
 
     def _balanced(self, search: Search, tracker: Tracker) -> Array:
         """Return the best linear force balance at measured positions, over several friction offsets."""
@@ -484,9 +480,21 @@ class BalanceEstimator(CoupledEstimator):
         given = re.compile(rf"gain|offset|hysteresis|dead time|side of obstacle .*|{unit}")
         return tuple(place for place, name in enumerate(names) if given.fullmatch(name))
 
-    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return free-running outputs of blocks, each run under its own load."""
-        return self._search.problem.simulated(blocks, data, self._search.structure, self._z)
+    def free_runs(
+        self,
+        block: Block,
+        recordings: Sequence[Recording],
+        rows: Sequence[Mask] | None = None,
+    ) -> FreeRuns:
+        """Return the free runs of a block, each under its own load where one was found."""
+        every = listed(recordings)
+        scheduling = schedules(every) if self.scheduling is None else self.scheduling
+        if self.unknown_load is not False:
+            every = with_loads(every, scheduling)[0]
+        runs = super().free_runs(block, every, rows)
+        if not self.loads_.any():
+            return runs
+        return replace(runs, changed=lambda own, place: under_load(own, self.loads_[place]))
 
 
 FIRST_OFFSET, TOWARDS, REFINED = 0.1, 60, 3
@@ -500,15 +508,21 @@ OF_TRAITS = ("elasticity", "areas", "friction", "relaxation")
 OWN_HELPS = 0.1
 """Smallest relative reduction of errors by loads of recordings, or by settled starts."""
 
-EXPLAINED = 1.5
-"""Largest ratio of the error of whole runs to that without their first parts, for start states to
-explain the runs.
-"""
-
 
 def _within(given_range: tuple[float, float] | None, block: Block) -> Block:
     """Return a front block whose inverse stays within a pressure range."""
     return replace(block, input_range=given_range) if isinstance(block, Air) else block
+
+
+def under_load(model: Block, load: Array) -> Block:
+    """Return a model of a balance under a constant load on every coordinate, in its unit of forces."""
+    placed = balance_in(model)
+    assert placed is not None
+    springs = np.array(placed.balance.springs)
+    springs[:, 0] += load
+    balance = replace(placed.balance, springs=rows(springs))
+    parts = (*placed.before, balance.inverse(), *placed.behind)
+    return Series(parts) if len(parts) > 1 else parts[0]
 
 
 def in_newtons(balance: Balance) -> Balance:

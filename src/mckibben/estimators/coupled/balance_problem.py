@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.compose import Series
-from mckibben.blocks.coupled.balance import balance_in
 from mckibben.blocks.coupled.balance_law import coordinate_at
 from mckibben.blocks.dynamics.air import Air
-from mckibben.blocks.fields import Channel, rows
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Contact, PiecewiseLinear
 from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import Mask, Run, TrainingData
@@ -34,9 +32,6 @@ EXACT, OF_AIR = (
 """Nonlinear parameters with exact derivatives, in the order of `balance_slopes`; and those of the
 air.
 """
-
-WARMING = 0.2
-"""Initial share of a run that starts away from rest in which errors are ignored."""
 
 STEP, FIRST_STEP = 1e-4, 0.5
 """Relative step for finite differences of nonlinear parameters, and of new ones."""
@@ -104,14 +99,11 @@ class Problem:
         One sample of so many is compared; all are run through.
     of_force : bool
         Whether forces count in all runs.
-    whole : bool
-        Whether all samples count, whatever is known of the start.
     """
 
     data: TrainingData
     every: int = 1
     of_force: bool = False
-    whole: bool = False
     _fronts: dict[tuple[object, ...], Array] = field(default_factory=dict, repr=False)
 
     @property
@@ -126,17 +118,9 @@ class Problem:
         still = self.data.once(("held", run.place), lambda: np.array(held(self.data, run)))
         return not still.item()
 
-    def counting(self, run: Run, structure: Structure) -> Mask:
-        """Return which of the compared samples are scored.
-
-        The first part of a run that begins in an unknown state is not.
-        """
-        places = self.places(run)
-        still = held(self.data, run) or structure.settled or self.whole
-        known = still or at_rest(self.data, run)
-        return run.counts[places] & (
-            np.arange(places.size) >= (0.0 if known else WARMING) * places.size
-        )
+    def counting(self, run: Run) -> Mask:
+        """Return which of the compared samples are scored."""
+        return run.counts[self.places(run)]
 
     def places(self, run: Run) -> NDArray[np.intp]:
         """Return the indices of the compared samples."""
@@ -216,7 +200,7 @@ class Problem:
         """
         still = self.still(run)
         found, slopes = self.followed(structure, z, run, held=still, sloped=sloped, by_air=by_air)
-        counts, bench = self.counting(run, structure)[:, np.newaxis], structure.bench
+        counts, bench = self.counting(run)[:, np.newaxis], structure.bench
         scale = counts / (bench.highest * bench.unit if still else bench.travel)
         errors = (found if still else found - run.outputs[self.places(run)]) * scale
         return errors, slopes * scale[..., np.newaxis]
@@ -302,32 +286,6 @@ class Problem:
             most = max(most, -float((pulled + loads @ np.array(balance.loads).T).min()))
         return most
 
-    def simulated(
-        self, blocks: Sequence[Block], data: TrainingData, structure: Structure, z: Array
-    ) -> Array:
-        """Return free-running outputs of blocks at scored samples, shape (blocks, n).
-
-        Every run is under its own load.
-        """
-        outputs = []
-        for run in data.runs:
-            loads = z[self.loads_at(structure, run)]
-            given = []
-            for model in blocks:
-                if loads.any():
-                    placed = balance_in(model)
-                    assert placed is not None
-                    balance = placed.balance
-                    springs = np.array(balance.springs)
-                    springs[:, 0] += loads * balance.areas[0][0]
-                    balance = replace(balance, springs=rows(springs))
-                    parts = (*placed.before, balance.inverse(), *placed.behind)
-                    model = Series(parts) if len(parts) > 1 else parts[0]
-                found = run_many([model], run.inputs, sample_time=run.sample_time)
-                given.append(found[0][run.counts].ravel())
-            outputs.append(np.array(given))
-        return np.concatenate(outputs, axis=1)
-
     # -- the linear stage ------------------------------------------------------------------------
 
     def balanced(self, structure: Structure, z: Array, active: Mask) -> Array:
@@ -354,7 +312,7 @@ class Problem:
             own = np.zeros((*lacking.shape, self.size(structure) - len(terms)))
             for j in range(loads.stop - loads.start):
                 own[:, j, loads.start - len(terms) + j] = 1.0
-            counts = self.counting(run, structure)[:, np.newaxis]
+            counts = self.counting(run)[:, np.newaxis]
             targets.append(-lacking * counts)
             found = np.concatenate([slopes @ structure.mix[:, chosen], own], axis=2)
             rows.append(found * counts[..., np.newaxis])

@@ -12,6 +12,7 @@ cross-validatory method for dependent data", Biometrika, 1994.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from typing import Annotated, ClassVar
@@ -23,7 +24,9 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
 from mckibben.blocks.fields import Channel, rows, vector
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.blocks.free_run import Mask
+from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
@@ -101,56 +104,93 @@ class PlayRidgeEstimator(CoupledEstimator):
         blocks = []
         for place, run in enumerate(data.runs):
             tracker.reached(place / len(data.runs))
-            whole = np.hstack([features(template, run), run.outputs])[run.counts]
-            blocks += [one.T @ one for one in np.array_split(whole, -(-N_BLOCKS // len(data.runs)))]
-        readout, self.penalties_ = solved(np.array(blocks), width, self.ridge)
-        return template.unpack(readout.ravel())
+            whole = np.hstack([features(template, run.inputs, run.sample_time), run.outputs])
+            n_blocks = -(-N_BLOCKS // len(data.runs))
+            blocks += [one.T @ one for one in np.array_split(whole[run.counts], n_blocks)]
+        sums = np.array(blocks)
+        given = None if self.ridge is None else (self.ridge,) * len(data.outputs)
+        self.penalties_ = given or chosen(sums, width)
+        return template.unpack(readout_of(sums.sum(axis=0), width, self.penalties_).ravel())
+
+    def left_out(self, runs: FreeRuns, parts: Sequence[Mask]) -> list[list[Array]]:
+        """Return the outputs of the readout without each part, in closed form."""
+        block, m = runs.block, len(runs.names)
+        assert isinstance(block, CoupledMemory)
+        names, width, tables = [c.name for c in block.inputs], len(block.readout[0]), []
+        for recording, past in zip(runs.recordings, runs.pasts, strict=True):
+            inputs = np.vstack([past, recording.matrix(names)])
+            tables.append(features(block, inputs, recording.sample_time)[len(past) :])
+        pairs = zip(tables, runs.recordings, strict=True)
+        whole = [np.hstack([table, recording.matrix(runs.names)]) for table, recording in pairs]
+        rows = np.concatenate([one[kept] for one, kept in zip(whole, runs.rows, strict=True)])
+        total, found = rows.T @ rows, []
+        for part in parts:
+            out = rows[part[::m]]
+            readout = readout_of(total - out.T @ out, width, self.penalties_, np.diag(total))
+            found.append([table @ readout.T for table in tables])
+        return found
 
 
-def solved(blocks: Array, width: int, ridge: float | None) -> tuple[Array, tuple[float, ...]]:
-    """Return the readout of every output, shape (m, width), and its penalty.
+def readout_of(
+    sums: Array, width: int, penalties: Sequence[float], powers: Array | None = None
+) -> Array:
+    """Return the readout of every output, shape (m, width).
+
+    Parameters
+    ----------
+    sums : array, shape (width + m, width + m)
+        Sums of products of what is read out, a constant first, and of the outputs.
+    width : int
+    penalties : sequence of m float
+        Relative to ``powers``, by default the diagonal of ``sums``.
+    """
+    size = np.sqrt(np.maximum(np.diag(sums) if powers is None else powers, 1e-300))
+    scaled = sums / np.outer(size, size)
+    readout = [
+        np.linalg.solve(scaled[:width, :width] + np.diag(_damping(width, one)), scaled[:width, k])
+        for k, one in enumerate(penalties, start=width)
+    ]
+    return np.array(readout) * size[width:, np.newaxis] / size[:width]
+
+
+def _damping(width: int, penalty: float) -> Array:
+    """Return the penalty of everything read out, its constant excepted."""
+    damping = np.full(width, penalty + LEAST)
+    damping[0] = LEAST
+    return damping
+
+
+def chosen(blocks: Array, width: int) -> tuple[float, ...]:
+    """Return the penalty of every output: the largest within a standard error of the least error.
 
     Parameters
     ----------
     blocks : array, shape (n_blocks, width + m, width + m)
-        Sums of products of what is read out, a constant first, and of the outputs, of every block.
+        Sums as of `readout_of`, of every block, which are left out in turn.
     width : int
-    ridge : float or None
-        Penalty, None to choose it.
     """
     size = np.sqrt(np.maximum(np.diag(blocks.sum(axis=0)), 1e-300))
     blocks = blocks / np.outer(size, size)
     total = blocks.sum(axis=0)
-    given, m = slice(width), total.shape[0] - width
-
-    def fit(sums: Array, penalty: float) -> Array:
-        damping = np.full(width, penalty + LEAST)
-        damping[0] = LEAST
-        return np.asarray(
-            np.linalg.solve(sums[given, given] + np.diag(damping), sums[given, width:])
-        )
+    m = total.shape[0] - width
 
     def missed(block: Array, penalty: float) -> Array:
         """Return the squared error of every output on a held-out block, relative to its own."""
-        w = np.vstack([fit(total - block, penalty), -np.eye(m)])
+        rest = total - block
+        gram = rest[:width, :width] + np.diag(_damping(width, penalty))
+        w = np.vstack([np.linalg.solve(gram, rest[:width, width:]), -np.eye(m)])
         return np.asarray(np.einsum("ij,ik,kj->j", w, block, w))
 
-    if ridge is not None:
-        penalties = [ridge] * m
-    else:
-        errors = np.array([[missed(block, one) for one in PENALTIES] for block in blocks])
-        least = errors.sum(axis=0).argmin(axis=0)
-        more = errors - errors[:, least, range(m)][:, np.newaxis]
-        spread = more.std(axis=0, ddof=1) * np.sqrt(len(blocks))
-        within = more.sum(axis=0) <= spread
-        penalties = [float(PENALTIES[within[:, j]].max()) for j in range(m)]
-    readout = [fit(total, one)[:, j] * size[width + j] for j, one in enumerate(penalties)]
-    return np.array(readout) / size[given], tuple(penalties)
+    errors = np.array([[missed(block, one) for one in PENALTIES] for block in blocks])
+    least = errors.sum(axis=0).argmin(axis=0)
+    more = errors - errors[:, least, range(m)][:, np.newaxis]
+    spread = more.std(axis=0, ddof=1) * np.sqrt(len(blocks))
+    within = more.sum(axis=0) <= spread
+    return tuple(float(PENALTIES[within[:, j]].max()) for j in range(m))
 
 
-def features(block: CoupledMemory, run: Run) -> Array:
-    """Return the features over a run, shape (n, width)."""
-    inputs = run.inputs
+def features(block: CoupledMemory, inputs: Array, sample_time: float | None) -> Array:
+    """Return the features over inputs, shape (n, width)."""
     n, width = inputs.shape[1], len(block.readout[0])
     many = CoupledMemory(
         block.lags,
@@ -162,7 +202,7 @@ def features(block: CoupledMemory, run: Run) -> Array:
         tuple(Channel(f"feature_{k}", "") for k in range(block.n_states + 1)),
         block.crossed,
     )
-    linear = many.simulate(inputs, sample_time=run.sample_time)
+    linear = many.simulate(np.ascontiguousarray(inputs), sample_time=sample_time)
     first = linear[:, 1 : 1 + n]
     products = [
         np.prod(first[:, list(chosen)], axis=1)

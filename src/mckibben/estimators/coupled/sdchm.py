@@ -127,6 +127,10 @@ class SDCHMEstimator(CoupledEstimator):
         """Whether these settings need one output per input, for the hysteresis of every muscle."""
         return self.memory is not None
 
+    @property
+    def penalty(self) -> float:
+        return self.ridge
+
     def fixed(self, block: Block) -> tuple[int, ...]:
         """Return the indices of the unit gains, and of parameters fixed by the hysteresis fits."""
         places = [

@@ -16,12 +16,12 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.parameters import Parametrised
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Mask, Run, TrainingData
-from mckibben.estimators.core.estimator import Estimator, Grid, Initial, resting
+from mckibben.estimators.core.estimator import Estimator, Grid, Start, resting
 from mckibben.estimators.coupled.base import schedules
 from mckibben.estimators.dynamics.prediction_error import (
+    Beginning,
     Orders,
     Polynomials,
-    Start,
     arx,
     evaluate,
     minimise,
@@ -63,15 +63,14 @@ class PredictionErrorEstimator(Estimator):
         Starting points.
     input, output : str or sequence of str
         Channels to learn from. Of several inputs, A is common to all, and every input has an F of its
-        own; several outputs are identified one after another. Runs then start at rest at their first
-        inputs, where `initial` is "fitted" too.
+        own; several outputs are identified one after another.
     scheduling : sequence of str, optional
         Further inputs, such as a load. Default: of several inputs or outputs ``pressure_extensor`` and
         ``force``, where there are any.
-    initial : {"fitted", "first_sample", "virgin"}
-        State before the first sample of every recording: with the least squared error; at rest at the
-        first input; at rest at the operating point. A model with a fitted start that from rest is
-        further off than the output ever moves is identified from rest instead, and its block says so.
+    initial : {"first_sample", "virgin"}
+        State before the first sample of every recording: at rest where the first output is explained (at
+        the first inputs, if there are several); at rest at the operating point. One-step predictions of
+        models with noise begin with an estimated state.
     """
 
     purpose = "rate"
@@ -81,11 +80,10 @@ class PredictionErrorEstimator(Estimator):
         "n_zeros": (1, 2, 3),
     }
     needs_time: ClassVar[bool] = True
-    solves_starts: ClassVar[bool] = True
 
     input: str | tuple[str, ...] = "pressure"
     output: str | tuple[str, ...] = "displacement"
-    initial: Initial = "fitted"
+    initial: Start = "first_sample"
     scheduling: tuple[str, ...] | None = None
     n_zeros: Annotated[int, Interval(ge=1, le=20)] = 2
     n_poles: Order = 2
@@ -186,7 +184,7 @@ class PredictionErrorEstimator(Estimator):
         """Return the transfer functions from every input to the output."""
         step = data.timed(instead=", or use gpi")
         orders = replace(self.orders, inputs=len(data.inputs))
-        start = self.starting
+        start: Beginning = "estimated" if orders.a or orders.c or orders.d else self.initial
         if data.target.size <= orders.size + orders.poles * len(data.runs):
             raise DataError(
                 f"{data.target.size} samples are too few for {orders.size} parameters",
@@ -244,7 +242,7 @@ class PredictionErrorEstimator(Estimator):
                 step,
                 float(centre[place]),
                 0.0 if place else middle + constant,
-                start,
+                self.initial,
                 channel,
                 data.outputs[0],
                 *(() if place else noise),
@@ -257,11 +255,6 @@ class PredictionErrorEstimator(Estimator):
                 )
             found.append(block)
         return tuple(found)
-
-    @property
-    def starting(self) -> Start:
-        """The start state; not fitted for several inputs."""
-        return "first_sample" if self.initial == "fitted" and not self.single else self.initial
 
     def fixed(self, block: Block) -> tuple[int, ...]:
         """Return the indices of input offsets, skipped lags, and parameters shared by inputs."""

@@ -36,7 +36,7 @@ from mckibben.blocks.kernels import kernel
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, SearchEstimator
-from mckibben.estimators.core.uncertainty import relative_sizes
+from mckibben.estimators.core.free_runs import relative_sizes
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker

@@ -2,9 +2,8 @@
 
 A(q) y = B(q) / F(q) u + C(q) / D(q) e; of several inputs, the sum of B_i / F_i u_i. Residuals are
 one-step prediction errors e = D / C (A y - B / F u - start), where the start is what the state before
-the first sample adds: nothing, a rest at the first input, or, as a rule, a free response estimated with
-the rest, one to each run. The input is taken to have been at its first value before. The noise starts
-from nothing.
+the first sample adds: a rest at the first input (of a free run, C = D = 1), nothing, or, with a noise
+model or with A, a free response estimated with the rest, one to each run. The noise starts from nothing.
 
 The start of every run is linear in the errors and solved for in each evaluation, so the search runs in
 the polynomials alone; a step to unstable poles is refused. Starts are the ARX model improved by
@@ -25,8 +24,7 @@ from typing import Literal
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.dynamics.starts import known_starts
-from mckibben.estimators.core.data import Run
+from mckibben.estimators.core.data import Mask, Run
 from mckibben.estimators.optimisers.multi_start import follow_best, trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
@@ -51,7 +49,7 @@ LEAST_RESPONSE = 1e-13
 LEAST_GAIN = 2e-9
 """Smallest relative reduction of the squared error for another step."""
 
-Start = Literal["fitted", "first_sample", "virgin"]
+Beginning = Literal["estimated", "first_sample", "virgin"]
 """State before the first sample: estimated; at rest at the first input; at rest at an input of zero.
 
 Equation errors (of models with A) need no state: outputs before are measured, and the first few
@@ -134,7 +132,7 @@ def errors(
     theta: Array,
     orders: Orders,
     run: Run,
-    start: Start = "fitted",
+    start: Beginning = "estimated",
     state: Array | None = None,
     *,
     only_starts: bool = False,
@@ -161,7 +159,7 @@ def errors(
     p = Polynomials.of(theta, orders)
     c, d = np.array([1.0, *p.c]), np.array([1.0, *p.d])
     n = run.u.size
-    estimated = start == "fitted" or orders.a > 0
+    estimated = start == "estimated" or orders.a > 0
 
     def later(x: Array, samples: int) -> Array:
         moved = np.zeros_like(x)
@@ -265,7 +263,7 @@ def admissible(theta: Array, orders: Orders) -> bool:
 
 
 def evaluate(
-    theta: Array, orders: Orders, runs: Sequence[Run], start: Start = "fitted"
+    theta: Array, orders: Orders, runs: Sequence[Run], start: Beginning = "estimated"
 ) -> tuple[Array, Array, float]:
     """Return errors, derivatives with optimal starts, and the RMSE at scored samples."""
     found, slopes = [], []
@@ -276,7 +274,7 @@ def evaluate(
             e, jacobian = errors(theta, orders, run, start)
             e, own = e[run.counts], jacobian[run.counts]
         else:
-            states, responses = known_starts(starts, run.counts, LEAST_RESPONSE)
+            states, responses = known_starts(starts, run.counts)
             e, jacobian = errors(theta, orders, run, start, -states @ (responses.T @ e[run.counts]))
             e, own = e[run.counts], jacobian[run.counts, : orders.size]
             e = e - responses @ (responses.T @ e)
@@ -287,12 +285,41 @@ def evaluate(
     return e, np.concatenate(slopes), float(np.sqrt(np.mean(e**2)))
 
 
+def known_starts(free: Array, counts: Mask, least: float = LEAST_RESPONSE) -> tuple[Array, Array]:
+    """Return the start responses that scored samples determine, each with its values at these.
+
+    Parameters
+    ----------
+    free : array, shape (n, k)
+        What a unit of every state adds to the errors.
+    counts : array of bool, shape (n,)
+        Samples that are scored.
+    least : float
+        Norm there of a start's response whose norm is 1, from which it is determined.
+
+    Returns
+    -------
+    states : array, shape (k, r)
+    responses : array, shape (number of samples scored, r)
+        Orthonormal.
+    """
+    size = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
+    responses, spread, turned = np.linalg.svd(free / size, full_matrices=False)
+    moved = spread > 1e-12 * spread[0]
+    left, norms, right = np.linalg.svd(responses[np.ix_(counts, moved)], full_matrices=False)
+    determined = norms > least
+    states = (
+        turned[moved].T @ (right[determined] / spread[moved]).T / norms[determined] / size[:, None]
+    )
+    return np.asarray(states), np.asarray(left[:, determined])
+
+
 def minimise(
     runs: Sequence[Run],
     orders: Orders,
     starts: Sequence[Array],
     tracker: Tracker,
-    start: Start = "fitted",
+    start: Beginning = "estimated",
 ) -> Array:
     """Return the best parameters found from all starts."""
     tracker.budget = len(starts) * FIRST_STEPS + FOLLOWED * STEPS
@@ -316,7 +343,9 @@ def minimise(
 class At:
     """Errors at parameters, with derivatives computed together."""
 
-    def __init__(self, orders: Orders, runs: Sequence[Run], start: Start, tracker: Tracker) -> None:
+    def __init__(
+        self, orders: Orders, runs: Sequence[Run], start: Beginning, tracker: Tracker
+    ) -> None:
         self.orders, self.runs, self.start, self.tracker = orders, runs, start, tracker
 
     def errors(self, theta: Array) -> Array:

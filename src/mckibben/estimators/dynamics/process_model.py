@@ -11,9 +11,7 @@ from annotated_types import Ge
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import ProcessModel
-from mckibben.blocks.dynamics.starts import free_responses
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.estimator import Initial
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import Preset, preset
@@ -31,20 +29,17 @@ class ProcessModelEstimator(SeparableEstimator):
     ----------
     structure : {"P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"}
         MATLAB's name: how many poles, whether two of them may oscillate (U), and a zero (Z).
-    initial : {"fitted", "first_sample", "virgin"}
-        State before the first sample of every recording: with the least squared error; at rest at the
-        first input; at rest at the operating point. A model with a fitted start that from rest is
-        further off than the output ever moves is identified from rest instead, and its block says so.
+    initial : {"first_sample", "virgin"}
+        State before the first sample of every recording: at rest where the first output is explained; at
+        rest at the operating point.
     """
 
     purpose = "rate"
     cannot = "No hysteresis; no inverse."
     needs_time: ClassVar[bool] = True
-    solves_starts: ClassVar[bool] = True
 
     effort: ClassVar[float] = 0.3
 
-    initial: Initial = "fitted"  # type: ignore[assignment]
     structure: Structure = "P1"
     nonnegative: bool = False
     n_starts: Annotated[int, Ge(1)] = 16
@@ -110,21 +105,6 @@ class ProcessModelEstimator(SeparableEstimator):
             whole = zero.simulate(run.u, sample_time=run.sample_time)
             columns.append(whole - columns[0])
         return np.column_stack(columns)
-
-    def matrix(self, theta: Array, data: TrainingData) -> Array:
-        """Return the regressors and, if starts are fitted, the responses to start states."""
-        from scipy.linalg import block_diag
-
-        columns = super().matrix(theta, data)
-        if self.initial != "fitted":
-            return columns
-        unit = data.latest("unit", theta, lambda: self.unit(theta, data))
-        places = range(unit.n_fitted)
-        starts = [
-            free_responses(unit, run.inputs, run.sample_time, places)[run.counts]
-            for run in data.runs
-        ]
-        return np.column_stack([columns, block_diag(*starts)])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> ProcessModel:
         gain, zero = float(linear[0]), None

@@ -7,9 +7,8 @@ left to the descent, whose derivatives are exact.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, cast
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from annotated_types import Interval
@@ -243,13 +242,6 @@ class StateNetworkEstimator(SearchEstimator):
     def search(self, template: StateNetwork, data: TrainingData, tracker: Tracker) -> NetworkRuns:
         """Return the errors of networks of one structure on all runs."""
         return NetworkRuns(template, data, self._warm if self.periodic else None, tracker)
-
-    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the outputs of blocks at scored samples: in steady state for periodic recordings."""
-        if not self.periodic:
-            return super().free_runs(blocks, data)
-        networks = [cast("StateNetwork", block) for block in blocks]
-        return np.array([self.search(n, data, Tracker()).outputs(n.pack()) for n in networks])
 
 
 class NetworkRuns:

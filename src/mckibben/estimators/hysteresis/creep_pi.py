@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Ge, Interval
@@ -25,7 +25,6 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, Operators
 from mckibben.estimators.core.separable import (
     LEAST_REVERSIBLE,
-    SEARCH_SAMPLES,
     SeparableEstimator,
     counting,
 )
@@ -41,12 +40,6 @@ MOST_ADDED = 20.0
 
 FASTEST, SLOWEST = 3.0, 3.0
 """Bounds of the time constants: in samples, and in durations of the longest run."""
-
-HELPS = 0.9
-"""Ratio of errors below which an initial creep state is estimated."""
-
-FEWEST = 20
-"""Smallest number of samples for testing that choice on later parts of runs."""
 
 MOST_CREEP = 0.3
 """Largest compliance of an element, relative to the immediate response."""
@@ -65,10 +58,6 @@ class CreepPIEstimator(SeparableEstimator):
         Play operators, the one without dead zone included.
     n_creep : int
         Visco-elastic elements.
-    settled : bool, optional
-        Whether creep had ended before every recording, at its first input; otherwise its state there is
-        estimated. Default: estimated where this reduces the error by more than a tenth, and predicts
-        later parts of the recordings better.
     map_size : int
         Degree of the increasing polynomial behind them.
     threshold_share : float
@@ -92,7 +81,6 @@ class CreepPIEstimator(SeparableEstimator):
 
     n_operators: Operators = 10
     n_creep: Annotated[int, Interval(ge=0, le=5)] = 2
-    settled: bool | None = None
     map_size: Annotated[int, Interval(ge=1, le=12)] = 6
     threshold_share: Annotated[float, Interval(gt=0, le=1)] = 1.0
     n_starts: Annotated[int, Ge(1)] = 8
@@ -108,40 +96,7 @@ class CreepPIEstimator(SeparableEstimator):
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         if self.n_creep > 0:
             data.timed("creep depends on it", ", or use n_creep=0")
-        if self.settled is not None or self.n_creep == 0:
-            return super().identify(data, tracker)
-        first, second = tracker.part(0.0, 0.5), tracker.part(0.5, 0.9)
-        settled = self._with(settled=True).identify(data, first)
-        tracker.update_from(first)
-        tracker.best, tracker.best_cost = first.best, first.best_cost
-        estimated = self._with(settled=False).identify(data, second)
-        helps = second.best_cost < HELPS * first.best_cost and self._foresees(data, second)
-        tracker.update_from(second)
-        if not helps:
-            return settled
-        tracker.best, tracker.best_cost = second.best, second.best_cost
-        return estimated
-
-    def _foresees(self, data: TrainingData, tracker: Tracker) -> bool:
-        """Return whether estimated initial creep improves the prediction of later parts of runs."""
-        missed = {True: 0.0, False: 0.0}
-        for end in (0.5, 0.75):
-            known = data.between(0.0, end).thinned(SEARCH_SAMPLES)
-            later = data.between(end, end + 0.25).thinned(SEARCH_SAMPLES)
-            if min(known.target.size, later.target.size) < FEWEST:
-                return False
-            for settled in missed:
-                tried, part = self._with(settled=settled), tracker.part(0.9, 0.9)
-                theta = tried._search(known, part)
-                tracker.update_from(part)
-                linear, offset = tried.solve(tried.matrix(theta, known), known)
-                errors = tried.matrix(theta, later) @ linear + offset - later.target
-                missed[settled] += float(errors @ errors)
-        return missed[False] < missed[True]
-
-    def _with(self, **settings: bool) -> Self:
-        """Return the same estimator with other settings."""
-        return type(self)(**self.get_params() | settings)
+        return super().identify(data, tracker)
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [weights, log addition, log time constants, compliances]."""
@@ -157,33 +112,6 @@ class CreepPIEstimator(SeparableEstimator):
         lower[0] = LEAST_REVERSIBLE
         return np.array(lower), np.array(upper)
 
-    def n_initial(self, data: TrainingData) -> int:
-        """Return the number of regressors of initial creep."""
-        if self.settled is not False:
-            return 0
-        return self.n_creep * (1 + max(run.place for run in data.runs))
-
-    def initial_creep(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the decay of initial creep over a run, (n, n_initial).
-
-        What an element was behind by, times its compliance, is one number an element and a run.
-        """
-        columns = np.zeros((run.u.size, self.n_initial(data)))
-        if columns.size:
-            taus, _ = self.tail(theta)
-            own = slice(run.place * self.n_creep, (1 + run.place) * self.n_creep)
-            columns[:, own] = np.exp(-elapsed(run)[:, np.newaxis] / taus)
-        return columns
-
-    def initial_creep_slopes(
-        self, theta: Array, left: Array, run: Run, data: TrainingData
-    ) -> Array:
-        """Return its derivatives by the logarithms of the time constants, (n, n_creep)."""
-        taus, _ = self.tail(theta)
-        columns = self.initial_creep(theta, run, data) * left
-        by_element = columns.reshape(len(columns), -1, self.n_creep).sum(axis=1)
-        return np.asarray(by_element * elapsed(run)[:, np.newaxis] / taus)
-
     def tail(self, theta: Array) -> tuple[Array, Array]:
         """Return time constants and compliances in the order of the search."""
         taus, compliances = np.split(theta[theta.size - 2 * self.n_creep :], 2)
@@ -198,12 +126,9 @@ class CreepPIEstimator(SeparableEstimator):
     def creep_parts(self, theta: Array, channel: Channel) -> tuple[Block, ...]:
         """Return the creep block, if there is any."""
         taus, compliances = self.creep(theta)
-        rule: Literal["first_sample", "fitted"] = (
-            "fitted" if self.settled is False else "first_sample"
-        )
         if not taus.size:
             return ()
-        return (Creep(vector(compliances), vector(taus), rule, channel, channel),)
+        return (Creep(vector(compliances), vector(taus), "first_sample", channel, channel),)
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return decreasing weights, on the logarithm and nearly on the input, with some creep."""
@@ -230,10 +155,9 @@ class CreepPIEstimator(SeparableEstimator):
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the pieces of the map over the run, with their creep."""
         x, _ = self.argument(theta, run, data)
-        crept = with_creep(
+        return with_creep(
             PolynomialMap(self.map_size).pieces(x), *self.creep(theta), run.sample_time
         )
-        return np.hstack([crept, self.initial_creep(theta, run, data)])
 
     def argument(self, theta: Array, run: Run, data: TrainingData) -> tuple[Array, Array]:
         """Return the argument of the map, 0 to 1, and its derivatives by the relative weights."""
@@ -248,7 +172,6 @@ class CreepPIEstimator(SeparableEstimator):
         pieces = PolynomialMap(self.map_size)
         step = RAISED * (np.arange(theta.size) == self.n_operators)
         taus, compliances = self.tail(theta)
-        linear, left = np.split(linear, [self.map_size])
 
         def of(run: Run) -> Array:
             x, by_weights = self.argument(theta, run, data)
@@ -259,8 +182,6 @@ class CreepPIEstimator(SeparableEstimator):
             crept = with_creep(at_once, taus, compliances, run.sample_time)
             given = pieces.pieces(x) @ linear
             moved = creep_moves(given, taus, compliances, run.sample_time)
-            if left.size:
-                moved[:, : taus.size] += self.initial_creep_slopes(theta, left, run, data)
             return np.column_stack([crept, moved])
 
         return counting(data, of)
@@ -268,9 +189,7 @@ class CreepPIEstimator(SeparableEstimator):
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every piece, so that the map increases."""
         low, high = data.output_range
-        floor = np.full(matrix.shape[1], 1e-6 * (high - low))
-        floor[self.map_size :] = -np.inf  # what is left of creep
-        return floor
+        return np.full(matrix.shape[1], 1e-6 * (high - low))
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Series:
         """Return the series: logarithm, memory, map and creep."""
@@ -288,15 +207,9 @@ class CreepPIEstimator(SeparableEstimator):
         )
         settled = offset / (1.0 + self.creep(theta)[1].sum())
         output_map = PolynomialMap(self.map_size)
-        increasing = output_map.build(linear[: self.map_size], settled, 0.0, 1.0, result)
+        increasing = output_map.build(linear, settled, 0.0, 1.0, result)
         creep = self.creep_parts(theta, result)
         return Series((Logarithm(added, given, given), memory, increasing, *creep))
-
-
-def elapsed(run: Run) -> Array:
-    """Return the time since the start of a run, for its creep elements [s]."""
-    assert run.sample_time is not None
-    return np.asarray(run.sample_time * np.arange(1.0, 1.0 + run.u.size))
 
 
 def with_creep(

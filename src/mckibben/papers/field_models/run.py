@@ -29,9 +29,6 @@ SEEDS, QUICK_SEEDS = 10, 3
 QUICK = ("balance", "bj", "cpi", "duhem", "gpi", "mpi", "oe", "p2uz", "pi", "preisach")
 """Models of the quick run."""
 
-N_FOLDS = 4
-"""Of the cross-validation that chooses a model of the field; the quick run has none."""
-
 PRINTED_PI, PRINTED_P2UZ = "field-models-pi", "field-models-p2uz"
 NARX, BJ, P2UZ, SLOPES = PAPERS = ("NARX", "BJ", "P2UZ", "PI")
 LEAST_SQUARES = "PI by least squares, ours"
@@ -95,7 +92,6 @@ def run(experiment: Experiment) -> None:
         train,
         test,
         models=QUICK if experiment.quick else "all",
-        n_folds=0 if experiment.quick else N_FOLDS,
         seed=experiment.seed,
         jobs=experiment.jobs,
         folder=experiment.kept.inside("field"),

@@ -1,0 +1,179 @@
+"""Free runs of a fitted block, and of the same block with other parameters, over its recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Initial
+from mckibben.blocks.free_run import PERIODIC, Mask, run_free
+from mckibben.blocks.running import run_many
+from mckibben.blocks.starts import history, start_state
+from mckibben.recording import Recording
+
+DIFFERENCE = 1e-6
+"""Step of finite differences, relative to the size of a parameter."""
+
+AT_ONCE = 2_000_000
+"""Numbers of outputs of several blocks that are held in memory at once."""
+
+Changed = Callable[[Block, int], Block]
+"""Returns a block as it runs over a recording, by the recording's index."""
+
+
+def as_it_is(block: Block, place: int) -> Block:
+    """Return the block itself, for every recording."""
+    del place
+    return block
+
+
+def relative_sizes(parameters: Array) -> Array:
+    """Return the scales of parameters, with a lower bound."""
+    return np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRuns:
+    """Runs of a block over recordings, at the samples that count.
+
+    Blocks with other parameters begin after the same past as the block itself, so that outputs differ by
+    the parameters alone.
+
+    Parameters
+    ----------
+    block : Block
+    recordings : sequence of Recording
+        With all channels of the block.
+    rows : sequence of array of bool, shape (n,)
+        Samples of every recording that count. Outputs elsewhere are never looked at: a recording whose
+        first sample does not count begins at rest.
+    changed : callable, optional
+        What runs over a recording instead of a block: the block under a load of the recording's own.
+    at_rest : bool
+        Whether all runs begin at rest at their first inputs, whatever was measured.
+    """
+
+    block: Block
+    recordings: Sequence[Recording]
+    rows: Sequence[Mask]
+    changed: Changed = as_it_is
+    at_rest: bool = False
+
+    @cached_property
+    def starts(self) -> list[tuple[Array, Initial | None]]:
+        """Inputs before every recording, shape (k, inputs), and the state before these."""
+        inputs = [channel.name for channel in self.block.inputs]
+        found: list[tuple[Array, Initial | None]] = []
+        for place, (recording, rows) in enumerate(zip(self.recordings, self.rows, strict=True)):
+            block, known = self.changed(self.block, place), recording
+            if self.at_rest or not rows[0] or recording.meta.get(PERIODIC):
+                known = recording.select(inputs)
+            before = history(block, known)
+            state = None if len(before) else start_state(block, known).tolist()
+            found.append((before, state))
+        return found
+
+    @property
+    def pasts(self) -> list[Array]:
+        """Inputs before the first sample of every recording, shape (k, inputs) each."""
+        return [before for before, _ in self.starts]
+
+    @cached_property
+    def from_rest(self) -> FreeRuns:
+        """The same runs, begun at rest at their first inputs."""
+        return replace(self, at_rest=True)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the outputs."""
+        return [channel.name for channel in self.block.outputs]
+
+    def preceded(self) -> tuple[list[Recording], list[Mask]]:
+        """Return the recordings with their pasts before them, and the samples that count."""
+        names, found, counted = [channel.name for channel in self.block.inputs], [], []
+        for recording, past, rows in zip(self.recordings, self.pasts, self.rows, strict=True):
+            columns = dict(zip(names, past.T, strict=True))
+            channels = {
+                name: np.concatenate([columns.get(name, np.full(len(past), samples[0])), samples])
+                for name, samples in recording.channels.items()
+            }
+            step = 1.0 if recording.sample_time is None else recording.sample_time
+            begun = recording.start_time - len(past) * step
+            found.append(replace(recording, channels=channels, start_time=begun))
+            counted.append(np.concatenate([np.zeros(len(past), dtype=bool), rows]))
+        return found, counted
+
+    @cached_property
+    def modelled(self) -> list[Array]:
+        """Outputs of the block over every recording, shape (n, m) each."""
+        return [table[0] for table in self.simulated([self.block])]
+
+    @cached_property
+    def residual(self) -> Array:
+        """Measured less modelled outputs that count, sample by sample, shape (N,)."""
+        measured = [recording.matrix(self.names) for recording in self.recordings]
+        return self.scored(measured) - self.scored(self.modelled)
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square of the residual."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(np.sqrt(np.mean(self.residual**2)))
+
+    def apart(self, other: FreeRuns) -> float:
+        """Return the root mean square by which outputs differ from those of other runs."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            differences = self.scored(self.modelled) - self.scored(other.modelled)
+            return float(np.sqrt(np.mean(differences**2)))
+
+    def scored(self, outputs: Sequence[Array]) -> Array:
+        """Return the outputs of all recordings, (n, m) each, at the samples that count, (N,)."""
+        pairs = zip(outputs, self.rows, strict=True)
+        return np.concatenate([table[rows].ravel() for table, rows in pairs])
+
+    def simulated(self, blocks: Sequence[Block]) -> list[Array]:
+        """Return the outputs of blocks over every recording, shape (blocks, n, m) each."""
+        found = []
+        for place, (recording, (before, start)) in enumerate(
+            zip(self.recordings, self.starts, strict=True)
+        ):
+            own = [self.changed(block, place) for block in blocks]
+            if recording.meta.get(PERIODIC):
+                found.append(np.array([run_free(block, recording, self.names) for block in own]))
+                continue
+            inputs = recording.matrix(channel.name for channel in self.block.inputs)
+            whole = np.ascontiguousarray(np.vstack([before, inputs]))
+            many = run_many(own, whole, sample_time=recording.sample_time, initial=start)
+            found.append(many[:, len(before) :])
+        return found
+
+    def outputs(self, blocks: Sequence[Block]) -> Array:
+        """Return the outputs of blocks at the samples that count, shape (blocks, N)."""
+        tables = self.simulated(blocks)
+        return np.array([self.scored([table[k] for table in tables]) for k in range(len(blocks))])
+
+    def slopes(self, places: Sequence[int], kept: Array | slice = slice(None)) -> Array:
+        """Return derivatives of the outputs by parameters in units of their sizes, shape (n, k).
+
+        By finite differences, at the outputs ``kept`` of the N that count.
+        """
+        parameters = self.block.pack()
+        sizes = relative_sizes(parameters)
+        base = self.scored(self.modelled)[kept]
+        found = np.empty((base.size, len(places)))
+        many = max(1, AT_ONCE // max(sum(map(len, self.recordings)) * len(self.names), 1))
+        for first in range(0, len(places), many):
+            some = places[first : first + many]
+            blocks = []
+            for place in some:
+                moved = parameters.copy()
+                moved[place] += DIFFERENCE * sizes[place]
+                blocks.append(self.block.unpack(moved))
+            moved_by = self.outputs(blocks)[:, kept] - base
+            found[:, first : first + len(some)] = moved_by.T / DIFFERENCE
+        return found

@@ -286,7 +286,7 @@ def measured(folder: Path | None) -> Iterator[Row]:
             train, test = parted(task, one.recordings(), one.folder)
             span = max(float(np.ptp(run["displacement"])) for run in test)
             others = ("coupled-memory",) if task.load else ("cpi", "gpi", "preisach")
-            board = compare(train, test, models=(*others, BALANCE), load=task.load, n_folds=0)
+            board = compare(train, test, models=(*others, BALANCE), load=task.load)
             figures = {
                 row.model: [100 * row.test_error / span]
                 for row in board.rows

@@ -25,6 +25,7 @@ from tests.plants import PLANTS, Plant
 from mckibben import Recording, registry
 from mckibben.blocks.bands import Banded
 from mckibben.comparison.channels import Channels
+from mckibben.comparison.fitting import Candidate
 from mckibben.comparison.planning import objections
 from mckibben.diagnosis.bands import calibration, held_of
 from mckibben.errors import MckibbenError
@@ -53,7 +54,7 @@ def arranged(name: str, plant: Plant) -> Channels | None:
         Channels(given + loads, moved),
         Channels(given, moved),
     )
-    return next((way for way in ways if not objections([name], plant.train, way)), None)
+    return next((way for way in ways if not objections({name: Candidate(name)}, plant.train, way)), None)
 
 
 def share(banded: Banded, runs: Sequence[Recording]) -> float:

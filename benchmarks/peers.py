@@ -32,7 +32,7 @@ import numpy as np
 import pandas as pd
 
 from mckibben import compare
-from mckibben.blocks.free_run import predecessor, run_free
+from mckibben.blocks.free_run import run_free
 from mckibben.comparison.channels import Channels
 from mckibben.errors import MckibbenError
 from mckibben.measured.scoring import START, Part, entries, parts_of
@@ -103,12 +103,7 @@ def data_of(part: Part) -> Data:
         return (u - middle) / spread, (y - offset) / scale
 
     def trial(one: Recording) -> Trial:
-        before = predecessor(one, train)
-        u, y = scaled(one)
-        if before is None:
-            return Trial(u, y, START)
-        first_u, first_y = scaled(before)
-        return Trial(np.vstack([first_u, u]), np.vstack([first_y, y]), len(first_y))
+        return Trial(*scaled(one), START)
 
     runs = [scaled(one) for one in train]
     fitted, held = held_back(runs)
@@ -258,7 +253,6 @@ def own_results(part: Part, models: Sequence[str]) -> Iterator[Result]:
                 split.test,
                 models=[name],
                 settings=settings,
-                n_folds=0,
                 jobs=1,
                 **about,
             )
@@ -269,7 +263,7 @@ def own_results(part: Part, models: Sequence[str]) -> Iterator[Result]:
             yield replace(row, reason=board.rows[0].reason or "")
             continue
         outputs = part.channels.outputs
-        yield replace(row, found=[run_free(block, run, outputs, split.train) for run in split.test])
+        yield replace(row, found=[run_free(block, run, outputs) for run in split.test])
 
 
 def frame_of(one: Set, part: Part, result: Result) -> pd.DataFrame:
@@ -284,9 +278,8 @@ def frame_of(one: Set, part: Part, result: Result) -> pd.DataFrame:
 
 def takes_part(peer: Peer, one: Set, part: Part) -> bool:
     """Return whether a peer takes part: not where models use a data sheet."""
-    return part.task.folds != 0 and (
-        one.name in peer.sets if peer.sets else not part.task.leave_out
-    )
+    sheet = any("prior" in own for own in part.task.settings.values())
+    return not sheet and (one.name in peer.sets if peer.sets else not part.task.leave_out)
 
 
 def main() -> None:

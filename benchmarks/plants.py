@@ -33,6 +33,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.free_run import run_free
 from mckibben.comparison.channels import Channels
+from mckibben.comparison.fitting import Candidate
 from mckibben.comparison.planning import objections
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.numerals import numeral
@@ -70,7 +71,7 @@ def arranged(name: str, plant: Plant) -> Channels | None:
     given, loads, moved = plant.bench.pressures, plant.bench.loads, plant.bench.outputs
     told = (given, moved, loads or None), (given + loads, moved, None), (given, moved, None)
     ways = (Channels(*one) for one in told)
-    return next((way for way in ways if not objections([name], plant.train, way)), None)
+    return next((way for way in ways if not objections({name: Candidate(name)}, plant.train, way)), None)
 
 
 def begun(name: str, channels: Channels, seed: int) -> Estimator:
@@ -96,10 +97,9 @@ def tried(name: str, channels: Channels, plant: Plant, seed: int) -> Found:
 
 
 def tested(block: Block, plant: Plant, runs: Sequence[Recording]) -> float:
-    """Return the error of free runs; their first samples only start the memory."""
+    """Return the error of free runs."""
     names = plant.bench.outputs
-    errors = [run_free(block, run, names, plant.train) - run.matrix(names) for run in runs]
-    return missed(np.vstack([one[1:] for one in errors]))
+    return missed(np.vstack([run_free(block, run, names) - run.matrix(names) for run in runs]))
 
 
 def missed(errors: Array) -> float:

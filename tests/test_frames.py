@@ -94,8 +94,12 @@ def test_frames_and_arrays_are_fitted_like_recordings() -> None:
     assert estimator.fit(U[:, None], Y[:, None], sample_time=0.07).model_ == model
     predicted = estimator.predict(one)
     assert predicted.shape == (400,)
-    for other in (one.to_frame(), U, U[:, None], [one]):
+    assert np.array_equal(predicted, model.simulate(one)["displacement"])
+    for other in (one.to_frame(), [one]):
         assert np.array_equal(np.ravel(estimator.predict(other)), predicted)
+    for inputs in (U, U[:, None], one.select(["pressure"])):
+        at_rest = model.simulate(U, sample_time=0.07)
+        assert np.array_equal(np.ravel(estimator.predict(inputs)), at_rest)
     with pytest.raises(DataError):
         estimator.fit(np.column_stack([U, U]), Y, sample_time=0.07)
     with pytest.raises(DataError):

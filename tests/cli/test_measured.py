@@ -209,16 +209,17 @@ def test_an_error_is_over_the_scored_rows_of_all_that_is_left_out(
     assert width == pytest.approx(100.0)
 
 
-def test_a_cut_recording_is_scored_from_its_first_row(folder: Path, tmp_path: Path) -> None:
+def test_a_cut_recording_begins_anew_and_is_scored_as_others(folder: Path, tmp_path: Path) -> None:
     given = predictions(folder, "cut", ["run2"], first=900)
-    given.loc[given["row"] == 0, "displacement"] += 3.0
+    given.loc[given["row"] == START - 1, "displacement"] += 3.0
+    given.loc[given["row"] == START, "displacement"] += 1.0
     ((_, rmse, _),) = scored(folder, tmp_path, given)
-    assert rmse == pytest.approx(3.0 / np.sqrt(600))
+    assert rmse == pytest.approx(1.0 / np.sqrt(600 - START))
 
 
 def test_the_metrics_are_those_of_the_comparison(folder: Path, tmp_path: Path) -> None:
     runs = [recorded(seed) for seed in (2, 3, 4)]
-    row = compare(runs[:2], [runs[2]], models=["gpi"], n_folds=0, jobs=1).rows[0]
+    row = compare(runs[:2], [runs[2]], models=["gpi"], jobs=1).rows[0]
     assert row.block is not None
     assert row.test is not None
     assert row.memory is not None

@@ -8,7 +8,7 @@ import pytest
 from mckibben import GPI, DataError, Recording, compare
 from mckibben.comparison.channels import Channels, channels_of, with_dead_loads_scheduled
 from mckibben.comparison.planning import plan_of
-from mckibben.comparison.splits import ENOUGH, held_out, validation_folds
+from mckibben.comparison.splits import held_out
 from mckibben.signals import triangle
 
 TIME = np.arange(0, 20, 0.05)
@@ -89,35 +89,6 @@ def test_only_what_is_held_at_a_level_of_each_recording_is_a_dead_load() -> None
     assert with_dead_loads_scheduled([varied, hung(20.0)], one) == one
 
 
-def test_given_runs_are_scored_and_nothing_is_fitted_to_them() -> None:
-    given = [run(3.0), run(4.0)]
-    train = (run(5.0),)
-    ((fold,), chosen_by) = validation_folds(train, CHANNELS, 4, given)
-    assert chosen_by == "given"
-    assert fold.train is train
-    assert fold.test == tuple(given)
-    assert all(rows.all() for rows in fold.test_rows)
-
-
-def test_many_runs_are_left_out_in_turn_but_for_those_beyond_the_rest() -> None:
-    runs = [run(peak) for peak in (*np.linspace(2.0, 4.0, ENOUGH - 1), 9.0)]
-    parts, chosen_by = validation_folds(runs, CHANNELS, 4)
-    assert chosen_by == "cross-validation"
-    scored = [one for part in parts for one in part.test]
-    assert len(scored) == ENOUGH - 1
-    assert not any(one is runs[-1] for one in scored)
-    for part in parts:
-        assert not {id(one) for one in part.train} & {id(one) for one in part.test}
-
-
-def test_of_few_runs_the_end_of_each_is_left_out() -> None:
-    ((part,), chosen_by) = validation_folds([run(3.0), run(4.0)], CHANNELS, 4)
-    assert chosen_by == "validation"
-    for fitted, scored in zip(part.train_rows, part.test_rows, strict=True):
-        assert not (fitted & scored).any()
-        assert fitted[: round(0.75 * fitted.size)].all()
-
-
 def test_levels_of_what_schedules_are_held_out() -> None:
     levels = (0.0, 0.5, 1.0, 2.0)
     runs = [
@@ -149,16 +120,16 @@ def test_of_runs_that_each_hold_the_input_the_last_at_each_level_are_held_out() 
 
 def test_models_without_a_place_are_left_out_and_said() -> None:
     runs = [run(5.0), run(4.0)]
-    several = plan_of(runs, run(3.0, 4), models="all", settings=None, n_folds=0, seed=0)
+    several = plan_of(runs, run(3.0, 4), models="all", settings=None, seed=0)
     assert {"balance", "tsfnn"} <= set(several.items)
     assert "pressure_1" in several.empty.left_out["sdchm"]
     alone = [run(5.0).with_channels(**{name: np.zeros(TIME.size)}) for name in INPUTS]
-    told = plan_of([*runs, *alone], run(3.0, 4), models="all", settings=None, n_folds=0, seed=0)
+    told = plan_of([*runs, *alone], run(3.0, 4), models="all", settings=None, seed=0)
     assert {"sdchm", "balance", "tsfnn"} <= set(told.items)
     assert "gpi" in several.empty.left_out
     assert "mpi-narmax" in several.empty.left_out
     one = run(5.0).select(["pressure_1", "displacement_1"])
-    single = plan_of([one], (), models="all", settings=None, n_folds=0, seed=0)
+    single = plan_of([one], (), models="all", settings=None, seed=0)
     assert "gpi" in single.items
     assert "sdchm" in single.empty.left_out
 

@@ -55,7 +55,7 @@ def recorded(
         Orders(b=2, f=2, c=1, d=1, inputs=2),
     ],
 )
-@pytest.mark.parametrize("start", ["fitted", "first_sample"])
+@pytest.mark.parametrize("start", ["estimated", "first_sample"])
 def test_derivatives_of_prediction_errors(orders: Orders, start: Any) -> None:
     run = training_data(recorded(1, 200), "pressure", "displacement").runs[0]
     run = replace(run, driven=np.column_stack([run.u, 0.5 * run.u[::-1] ** 2])[:, : orders.inputs])
@@ -177,7 +177,7 @@ def test_a_model_is_matched_by_ranges() -> None:
     recording = recorded(10, 400, noise=0.0)
     model = TransferFunction((0.5, 0.3), F, STEP)
     twisted = recording.with_channels(
-        displacement=3.0 * model.simulate(recording)["displacement"] - 7
+        displacement=3.0 * model.simulate(recording["pressure"], sample_time=STEP) - 7
     )
     left = matched(model, twisted).simulate(twisted)["displacement"] - twisted["displacement"]
     assert np.abs(left).max() < 1e-9
@@ -199,35 +199,26 @@ def test_a_run_that_starts_warm_gives_the_truth_within_its_errors() -> None:
     assert np.all(off < 3 * np.array(fit.diagnostics_.standard_errors)[:4])
 
 
-@pytest.mark.parametrize("initial", ["fitted", "first_sample"])
-def test_what_is_delivered_is_what_was_optimised(initial: Any) -> None:
-    recording = warm(1)
-    fits: list[Any] = [load("estimators", name)(initial=initial) for name in ("p2uz", "oe")]
-    for fit in fits:
-        model = fit.fit(recording).model_
-        for modelled in (
-            model.simulate(recording)["displacement"],
-            *([run_free(model, recording, "displacement", (recording,))] * (initial == "fitted")),
-        ):
-            delivered = np.sqrt(np.mean((modelled - recording["displacement"]) ** 2))
-            assert delivered == pytest.approx(fit.diagnostics_.rmse, rel=1e-9)
-    assert fits[1].diagnostics_.rmse <= fits[1].model_.noise_deviation * (1 + 1e-9)
+@pytest.mark.parametrize("name", ["p1", "p2", "p2uz", "oe"])
+def test_a_run_that_begins_elsewhere_is_fitted_from_its_first_output(name: str) -> None:
+    """Case 15: a pure lag whose recordings begin in motion."""
+    truth = ProcessModel(3.0, (40.0,), output_offset=2.0)
 
+    def moved(start: float, seed: int) -> Recording:
+        rng = np.random.default_rng(seed)
+        u = np.interp(np.arange(1000), np.arange(0, 1040, 40), rng.uniform(1, 5, 26))
+        before = Recording({"pressure": u, "displacement": np.full(1000, start)}, 0.5)
+        y = truth.simulate(before)["displacement"] + 0.02 * rng.standard_normal(1000)
+        return Recording({"pressure": u, "displacement": y}, 0.5)
 
-def test_starts_that_explain_everything_are_not_believed() -> None:
-    """A drift that no input made: a slow pole with a free start takes it, and leads nowhere."""
-    rng = np.random.default_rng(4)
-    u = np.repeat(rng.uniform(0.0, 1.0, 30), 20)
-    drift = np.linspace(0.0, 10.0, 600) + 0.5 * rng.standard_normal(600)
-    y = lfilter([0.1], [1.0, -0.9], u) + drift
-    recording = Recording({"pressure": u, "displacement": y}, STEP)
-    for fit in (load("estimators", "p2uz")(), load("estimators", "oe")()):
-        found = fit.fit(recording).diagnostics_
-        assert found.rmse == found.rmse_from_rest < np.ptp(y)
-        assert fit.model_.to_dict()["initial"] == "first_sample"
+    train, test = moved(8.0, 1), moved(16.0, 2)
+    fit = load("estimators", name)().fit(train)
+    assert fit.diagnostics_.rmse < 0.06
+    error = fit.model_.simulate(test)["displacement"] - test["displacement"]
+    assert np.sqrt(np.mean(error**2)) < 0.06
 
 
 def test_poles_that_oscillate_are_found_beside_lags() -> None:
-    found = load("estimators", "oe")(n_poles=4, n_zeros=2).fit(runs("muscle"))
-    assert found.diagnostics_.rmse < 1.52
+    lags, found = (load("estimators", "oe")(n_poles=n).fit(runs("muscle")) for n in (3, 4))
+    assert found.diagnostics_.rmse < 0.95 * lags.diagnostics_.rmse
     assert np.abs(found.model_.poles.imag).max() > 0.1

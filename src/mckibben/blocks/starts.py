@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 SETTLING = 256
 """Samples at the first input after a peak, in which rates decay in a rate-dependent block."""
 
-PRECISE = 1e-6
+PRECISE = 1e-12
 """Precision of a peak, relative to the way down from the highest."""
 
 EXPLAINED = 1e-9
@@ -76,7 +76,11 @@ def first_outputs(block: Block, recording: Recording) -> Array | None:
     """Return the first measured value of every output of a block, or None where one is missing."""
     recording = recording.with_derived(channel.name for channel in block.outputs)
     commands = drives(block.outputs[0]) and not drives(block.inputs[0])
-    if commands or any(recording.units.get(c.name) != c.unit for c in block.outputs):
+    given = {channel.name for channel in block.inputs}
+    if commands or any(
+        channel.name in given or recording.units.get(channel.name) != channel.unit
+        for channel in block.outputs
+    ):
         return None
     return np.array([recording[channel.name][0] for channel in block.outputs])
 
@@ -140,21 +144,20 @@ def _excursion(block: Block, inputs: Array, outputs: Array, sample_time: float |
         return _first_output(block, np.vstack([way(peak), first]), sample_time)
 
     lowest = float(first[0])
-    at_rest, at_highest = _first_output(block, first[np.newaxis], sample_time), after(highest)
-    direction = at_highest - at_rest
+    ends = after(lowest), after(highest)
+    direction = ends[1] - ends[0]
 
-    def above(found: Array) -> float:
-        """Return how far an output is above the measured one, along the way from rest to the highest."""
-        return float(direction @ (found - outputs))
+    def above(peak: float) -> float:
+        """Return how far the output is above the measured one, along the way to that of the highest."""
+        return float(direction @ (after(peak) - outputs))
 
-    ends = above(at_rest), above(at_highest)
-    if not np.isfinite(ends).all() or ends[0] >= 0:
+    low, high = (float(direction @ (end - outputs)) for end in ends)
+    if not np.isfinite([low, high]).all() or low >= 0:
         return np.empty((0, first.size))
-    if ends[1] <= 0:
+    if high <= 0:
         return way(highest)
     tolerance = PRECISE * (highest - lowest)
-    peak = brentq(lambda one: above(after(one)), lowest, highest, xtol=tolerance, disp=False)
-    return way(float(peak))
+    return way(float(brentq(above, lowest, highest, xtol=tolerance, disp=False)))
 
 
 def _first_part(block: Block) -> Block:

@@ -84,13 +84,12 @@ def black_box(folder: Path) -> Tree:
             found.append(content[key][0, :4096].astype(float))
         channels = {"force": found[0], "displacement": 1000.0 * found[1]}
         parts.append(Recording(channels, 1 / 750))
-    return _chosen(parts[0], parts[1], n_folds=1, n_units=5)
+    return _chosen(parts[0], parts[1], n_units=5)
 
 
 def _chosen(
     train: Recording | Sequence[Recording],
     test: Recording | Sequence[Recording] = (),
-    n_folds: int = 5,
     n_units: int = 2,
 ) -> Tree:
     """Return which of a network and a linear model is better where they are validated, and chosen."""
@@ -101,7 +100,6 @@ def _chosen(
         outputs="displacement",
         models=("state-network", "p2uz"),
         settings={"state-network": {"n_units": n_units, "n_steps": 60, "substeps": 1}},
-        n_folds=n_folds,
         jobs=1,
     ).to_dict()
     errors = {row["model"]: row["validation_rmse"] for row in board["rows"]}

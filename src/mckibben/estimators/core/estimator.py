@@ -177,6 +177,11 @@ class Estimator(ABC):
     input_settings: ClassVar[tuple[str, ...]] = ()
     """Settings that name further input channels, of the block as well."""
 
+    begins_measured: ClassVar[bool] = False
+    """Whether the fit itself begins every run from its first output, as the model does; others are fitted
+    from rest, and again after the pasts that this fit shows.
+    """
+
     errors_known: ClassVar[bool] = True
     """Whether standard errors of the parameters are computed."""
 
@@ -385,7 +390,8 @@ class Estimator(ABC):
         tracker = Tracker(progress=progress)
         self.model_ = self.find(self.data(recordings, rows), tracker)[0]
         runs = self.free_runs(self.model_, listed(recordings), rows)
-        if any(map(len, runs.pasts)) and runs.apart(runs.from_rest) > MATTERS * runs.rmse:
+        elsewhere = not self.begins_measured and any(map(len, runs.pasts))
+        if elsewhere and runs.apart(runs.from_rest) > MATTERS * runs.rmse:
             runs = self._after_pasts(runs, tracker)
         self.diagnostics_ = self._diagnose(runs, tracker, started)
         if progress is not None:

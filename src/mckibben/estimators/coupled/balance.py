@@ -473,12 +473,7 @@ class BalanceEstimator(CoupledEstimator):
         return (own, found) if search.improved(z, own, found, by=OWN_HELPS) else (search, z)
 
     def fixed(self, block: Block) -> tuple[int, ...]:
-        """Return the indices of sides, of a front's gain, and of the unit of force."""
-        names = block.parameter_names
-        shares = [name for name in names if name.startswith("share of ")]
-        unit = shares[0] if len(shares) == 1 else r"area( of muscle 1)? at rest"
-        given = re.compile(rf"gain|offset|hysteresis|dead time|side of obstacle .*|{unit}")
-        return tuple(place for place, name in enumerate(names) if given.fullmatch(name))
+        return fixed_in(block)
 
     def free_runs(
         self,
@@ -512,6 +507,15 @@ OWN_HELPS = 0.1
 def _within(given_range: tuple[float, float] | None, block: Block) -> Block:
     """Return a front block whose inverse stays within a pressure range."""
     return replace(block, input_range=given_range) if isinstance(block, Air) else block
+
+
+def fixed_in(block: Block) -> tuple[int, ...]:
+    """Return the indices of sides, of a front's gain, and of the unit of force."""
+    names = block.parameter_names
+    shares = [name for name in names if name.startswith("share of ")]
+    unit = shares[0] if len(shares) == 1 else r"area( of muscle 1)? at rest"
+    given = re.compile(rf"gain|offset|hysteresis|dead time|side of obstacle .*|{unit}")
+    return tuple(place for place, name in enumerate(names) if given.fullmatch(name))
 
 
 def under_load(model: Block, load: Array) -> Block:

@@ -19,7 +19,7 @@ from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Affine
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
-from mckibben.estimators.coupled.balance import BalanceEstimator
+from mckibben.estimators.coupled.balance import BalanceEstimator, fixed_in
 from mckibben.estimators.coupled.balance_prior import PriorLike, as_prior
 from mckibben.estimators.coupled.base import FEWEST_SAMPLES
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -86,6 +86,9 @@ class BalanceForceEstimator(SearchEstimator):
         if kinds not in (["length", "force"], ["displacement", "force"]):
             return "it maps length, or displacement, to force"
         return super().objection(recordings, inputs, outputs, scheduling)
+
+    def fixed(self, block: Block) -> tuple[int, ...]:
+        return fixed_in(block)
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         place, (pressure,) = data.inputs[0], data.scheduled

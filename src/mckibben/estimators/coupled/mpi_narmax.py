@@ -135,7 +135,8 @@ class MPINarmaxEstimator(CoupledEstimator):
         if self.memory == "rdpi":
             settings["rate_time_constant"] = 5.0 * (data.runs[0].sample_time or 0.0)
         estimator = registry.load("estimators", self.memory)(**settings)
-        block: Block = estimator.fit(recordings).model_
+        counted = [run.counts for run in data.runs]
+        block: Block = estimator.find(estimator.data(recordings, counted), Tracker())[0]
         return block
 
 

@@ -256,7 +256,9 @@ class SDCHMEstimator(CoupledEstimator):
                 parameter="memory_settings",
                 remedy="give settings of the estimator in memory",
             ) from None
-        block: Block = estimator.fit(recording).model_
+        estimator.check_settings()
+        # from rest, as the whole model of several muscles begins
+        block: Block = estimator.find(estimator.data(recording, [run.counts]), Tracker())[0]
         return block
 
 

@@ -80,6 +80,7 @@ class PredictionErrorEstimator(Estimator):
         "n_zeros": (1, 2, 3),
     }
     needs_time: ClassVar[bool] = True
+    begins_measured: ClassVar[bool] = True
 
     input: str | tuple[str, ...] = "pressure"
     output: str | tuple[str, ...] = "displacement"

@@ -135,6 +135,7 @@ def errors(
     start: Beginning = "estimated",
     state: Array | None = None,
     *,
+    before: float = 0.0,
     only_starts: bool = False,
 ) -> tuple[Array, Array]:
     """Return the prediction errors of a run, and derivatives by theta and by its start.
@@ -144,6 +145,8 @@ def errors(
     state : array, shape (poles,), optional
         The start, where it is estimated: what the recursion from input to output is given, beside the
         input, at the first samples. Default is nothing.
+    before : float
+        Input at which the model was at rest before a start at rest, above the first one.
     only_starts : bool
         Leave out the derivatives by theta.
 
@@ -189,7 +192,7 @@ def errors(
     for place, b in enumerate(p.b):
         poles = np.array([1.0, *p.poles[min(place, len(p.poles) - 1)]])
         whole = run.driven[:, place]
-        rest = 0.0 if start == "virgin" else float(whole[0])
+        rest = 0.0 if start == "virgin" else float(whole[0]) + before
         u = whole - rest
         driven = sum((one * later(u, lag) for lag, one in zip(lags, b, strict=True)), np.zeros(n))
         held = float(b.sum()) * rest
@@ -271,8 +274,8 @@ def evaluate(
         # how the start's own response moves with theta counts too: slopes are taken at the start found
         e, starts = errors(theta, orders, run, start, only_starts=True)
         if not starts.shape[1]:
-            e, jacobian = errors(theta, orders, run, start)
-            e, own = e[run.counts], jacobian[run.counts]
+            e, own = from_rest(theta, orders, run, start)
+            e, own = e[run.counts], own[run.counts]
         else:
             states, responses = known_starts(starts, run.counts)
             e, jacobian = errors(theta, orders, run, start, -states @ (responses.T @ e[run.counts]))
@@ -283,6 +286,22 @@ def evaluate(
         slopes.append(own)
     e = np.concatenate(found)
     return e, np.concatenate(slopes), float(np.sqrt(np.mean(e**2)))
+
+
+def from_rest(theta: Array, orders: Orders, run: Run, start: Beginning) -> tuple[Array, Array]:
+    """Return the errors of a free run that begins at rest, and derivatives by theta.
+
+    Where the first output is known, it was at rest at the input that explains it (of several inputs, at
+    the first ones): then that error is 0.
+    """
+    e, slopes = errors(theta, orders, run, start)
+    if start == "virgin" or orders.inputs > 1 or not run.counts[0]:
+        return e, slopes
+    by_rest = errors(theta, orders, run, start, before=1.0)[0] - e
+    if by_rest[0] == 0.0:
+        return e, slopes
+    e, slopes = errors(theta, orders, run, start, before=-e[0] / by_rest[0])
+    return e, slopes - np.outer(by_rest / by_rest[0], slopes[0])
 
 
 def known_starts(free: Array, counts: Mask, least: float = LEAST_RESPONSE) -> tuple[Array, Array]:

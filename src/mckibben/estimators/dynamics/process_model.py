@@ -37,6 +37,7 @@ class ProcessModelEstimator(SeparableEstimator):
     purpose = "rate"
     cannot = "No hysteresis; no inverse."
     needs_time: ClassVar[bool] = True
+    begins_measured: ClassVar[bool] = True
 
     effort: ClassVar[float] = 0.3
 
@@ -97,17 +98,46 @@ class ProcessModelEstimator(SeparableEstimator):
         )
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the response to the input, and, with a zero, to its derivative."""
+        """Return responses to the input, with a zero to its derivative, 1, and to the first output.
+
+        The model was at rest where that output is explained, of which the share that is left decays as
+        the lags do.
+        """
         unit = data.latest("unit", theta, lambda: self.unit(theta, data))
         columns = [unit.simulate(run.u, sample_time=run.sample_time)]
         if "Z" in self.structure:
             zero = data.latest("zero", theta, lambda: replace(unit, zero_time=1.0))
             whole = zero.simulate(run.u, sample_time=run.sample_time)
             columns.append(whole - columns[0])
-        return np.column_stack(columns)
+        columns.append(np.ones(run.u.size))
+        responses, left = np.column_stack(columns), np.zeros(run.u.size)
+        if self.initial == "first_sample" and run.counts[0]:
+            ones = np.ones(run.u.size)
+            at_zero = unit.initial_state(np.array([0.0])).tolist()
+            left = 1.0 - replace(unit, input_offset=0.0).simulate(
+                ones, initial=at_zero, sample_time=run.sample_time
+            )
+            left /= left[0]
+        known = responses - np.outer(left, responses[0])
+        return np.column_stack([known, left * float(run.y[0])])
+
+    @property
+    def solves_offset(self) -> bool:
+        """False: the offset is one of the responses."""
+        return False
+
+    def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
+        """Return gain, zero and offset, and 1 for the share of the first output."""
+        known = data.target - matrix[:, -1]
+        found = np.linalg.lstsq(matrix[:, :-1], known, rcond=1e-12)[0]
+        return np.append(found, 1.0), 0.0
+
+    def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
+        """Return the responses whose gains are solved for."""
+        return matrix[:, :-1]
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> ProcessModel:
-        gain, zero = float(linear[0]), None
+        gain, offset, zero = float(linear[0]), float(linear[-2]), None
         if "Z" in self.structure:
             zero = float(linear[1] / gain) if gain != 0 else 0.0
         return replace(self.unit(theta, data, gain), zero_time=zero, output_offset=offset)

@@ -54,7 +54,9 @@ def arranged(name: str, plant: Plant) -> Channels | None:
         Channels(given + loads, moved),
         Channels(given, moved),
     )
-    return next((way for way in ways if not objections({name: Candidate(name)}, plant.train, way)), None)
+    return next(
+        (way for way in ways if not objections({name: Candidate(name)}, plant.train, way)), None
+    )
 
 
 def share(banded: Banded, runs: Sequence[Recording]) -> float:

@@ -71,7 +71,9 @@ def arranged(name: str, plant: Plant) -> Channels | None:
     given, loads, moved = plant.bench.pressures, plant.bench.loads, plant.bench.outputs
     told = (given, moved, loads or None), (given + loads, moved, None), (given, moved, None)
     ways = (Channels(*one) for one in told)
-    return next((way for way in ways if not objections({name: Candidate(name)}, plant.train, way)), None)
+    return next(
+        (way for way in ways if not objections({name: Candidate(name)}, plant.train, way)), None
+    )
 
 
 def begun(name: str, channels: Channels, seed: int) -> Estimator:

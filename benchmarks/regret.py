@@ -1,12 +1,12 @@
 """How much worse the chosen model is than the best one on the table, on many tasks.
 
-    python benchmarks/regret.py [--data FOLDER] [--only TEXT] [--without MODEL ...] [--jobs N] [--json FILE]
+    python benchmarks/regret.py [--data FOLDER] [--only TEXT] [--without MODEL ...] [--json FILE]
 
-A task is a comparison of the quick models on training recordings, and separate test recordings: README's
-example, virtual rigs, the plants of tests/plants (which know no model), and, with ``--data``, the sets of
-a folder as of `mckibben measured`. Regret is the test error of the model chosen by cross-validation over
-the least test error of any model; 1 where the best is chosen. Where no model is recommended, nothing is
-chosen, and the task is listed without. Means are geometric.
+A task is a comparison of the quick models on training recordings, and separate test recordings:
+README's example, virtual rigs, the plants of tests/plants (which know no model), and, with ``--data``,
+the sets of a folder as of `mckibben measured`. Regret is the test error of the model chosen by
+cross-validation over the least test error of any model; 1 where the best is chosen. Where no model is
+recommended, nothing is chosen, and the task is listed without. Means are geometric.
 """
 
 from __future__ import annotations
@@ -191,7 +191,9 @@ def main() -> None:
         seconds, boards[task.name] = time.perf_counter() - started, board.to_dict()
         outcome = regret_of(board)
         if outcome is None:
-            print(f"| {task.name} | none ({board.not_recommended}) ||||| {seconds:.0f} |", flush=True)
+            print(
+                f"| {task.name} | none ({board.not_recommended}) ||||| {seconds:.0f} |", flush=True
+            )
             continue
         chosen, own, best, least = outcome
         found[task.name] = own / least

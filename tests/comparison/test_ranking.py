@@ -88,9 +88,7 @@ def test_test_outputs_are_never_looked_at_while_fitting(
     spoilt[1:] += 50 * np.sin(np.arange(spoilt.size - 1))
     models = ["gpi"]
     clean = compare(train, test_set, models=models, jobs=1)
-    other = compare(
-        train, test_set.with_channels(displacement=spoilt), models=models, jobs=1
-    )
+    other = compare(train, test_set.with_channels(displacement=spoilt), models=models, jobs=1)
     assert clean.rows[0].block == other.rows[0].block
 
 

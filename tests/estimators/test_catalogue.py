@@ -15,8 +15,8 @@ import mckibben
 from mckibben import ModelError, Recording, registry
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.comparison.channels import Channels
-from mckibben.comparison.leaderboard import inverse_of
 from mckibben.comparison.fitting import Candidate
+from mckibben.comparison.leaderboard import inverse_of
 from mckibben.comparison.planning import objections
 from mckibben.errors import MckibbenError
 from mckibben.estimators.catalogue import (
@@ -89,7 +89,9 @@ def test_a_load_that_some_recordings_lack_is_an_objection_of_those_that_are_told
     channels = dict.fromkeys(("pressure", "displacement", "force"), wave)
     known = Recording(channels, 0.1, meta={"name": "a"})
     runs = [known, known.select(["pressure", "displacement"]).with_meta(name="b")]
-    found = objections({name: Candidate(name) for name in MODELS}, runs, Channels(("pressure",), ("displacement",)))
+    found = objections(
+        {name: Candidate(name) for name in MODELS}, runs, Channels(("pressure",), ("displacement",))
+    )
     assert {"pi", "balance"}.isdisjoint(found)
     assert "force" in found["coupled-memory"]
 

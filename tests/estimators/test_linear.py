@@ -14,7 +14,6 @@ from scipy.signal import lfilter
 from mckibben import DataError, ModelError, Recording
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.blocks.free_run import run_free
 from mckibben.estimators.core.data import training_data
 from mckibben.estimators.dynamics.prediction_error import Orders, errors
 from mckibben.papers.field_models.run import matched

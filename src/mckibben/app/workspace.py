@@ -329,7 +329,7 @@ class Workspace:
 
         def place(row: dict[str, Any]) -> tuple[Any, ...]:
             errors = row.get("validation_rmse"), (row.get("train") or {}).get("rmse")
-            doubted = bool(row.get("caution")) or row.get("validated") == "fit"
+            doubted = bool(row.get("doubted"))
             known = order(row["model"], *errors, row.get("skill_least"), doubted=doubted)
             return not row["current"], *known
 

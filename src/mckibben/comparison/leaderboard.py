@@ -13,6 +13,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.inverse import Inverse
 from mckibben.comparison.choosing import CONSTANT, Against, order, recommended
+from mckibben.comparison.doubts import Doubt, Span, doubts_of
 from mckibben.comparison.memory_test import Memory
 from mckibben.diagnosis.bands import TestedBand
 from mckibben.errors import MckibbenError
@@ -127,8 +128,14 @@ class Row:
     def order(self) -> tuple[bool, bool, float, str]:
         """Sort key of the row."""
         fitted = None if self.train is None else self.train.rmse
-        doubted = self.caution is not None or self.validated == "fit"
-        return order(self.model, self.validation_rmse, fitted, self.skill_least, doubted=doubted)
+        return order(
+            self.model, self.validation_rmse, fitted, self.skill_least, doubted=self.doubted
+        )
+
+    @property
+    def doubted(self) -> bool:
+        """Whether the error counts `CAUTION` times in the choice."""
+        return self.caution is not None or self.validated == "fit"
 
     @cached_property
     def inverse(self) -> Block | None:
@@ -181,6 +188,7 @@ class Row:
             "invertible": self.inverse is not None,
             "inverse": inverse_of(self.inverse),
             "caution": self.caution,
+            "doubted": self.doubted,
         }
 
 
@@ -248,6 +256,8 @@ class Leaderboard(DrawsItself):
         Loads that vary in the recordings and that no model is given.
     outside : mapping of str to float
         Channel to the share of the samples tested on that are outside of its range in training.
+    parts : tuple of tuple of Span
+        What is left out in turn to choose, in the order of ``validation_by_part``.
     """
 
     face: ClassVar[str] = "leaderboard"
@@ -270,6 +280,7 @@ class Leaderboard(DrawsItself):
     loads: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
     outside: Mapping[str, float] = field(default_factory=dict)
+    parts: tuple[tuple[Span, ...], ...] = ()
 
     def __repr__(self) -> str:
         return str(self)
@@ -298,6 +309,14 @@ class Leaderboard(DrawsItself):
     def not_recommended(self) -> Against | None:
         """The data on which no model is better than the constant, so that none is recommended."""
         return recommended(self.rows, self.constant)[1]
+
+    @cached_property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """What is doubtful about the choice, most important first; empty without a choice."""
+        best = self.best
+        if best is None:
+            return ()
+        return doubts_of(best, [row for row in self.rows if row is not best], self.parts)
 
     @property
     def level(self) -> tuple[str, ...]:
@@ -347,6 +366,7 @@ class Leaderboard(DrawsItself):
             "chosen_by": self.chosen_by,
             "chosen": None if best is None else best.model,
             "not_recommended": self.not_recommended,
+            "doubts": [doubt.to_dict() for doubt in self.doubts],
             "lowest_on_test": None if lowest is None else lowest.model,
             "left_out": dict(self.left_out),
             "pending": list(self.pending),
@@ -364,5 +384,8 @@ class Leaderboard(DrawsItself):
         """
         import pandas as pd
 
-        table = pd.json_normalize([row.to_dict() for row in self.ranking])
+        rows = [row.to_dict() for row in self.ranking]
+        table = pd.json_normalize(
+            [{key: row[key] for key in row if key != "validation_by_part"} for row in rows]
+        )
         return table.assign(shared=" ".join(self.shared)) if self.shared else table

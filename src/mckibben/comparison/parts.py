@@ -8,6 +8,7 @@ import numpy as np
 
 from mckibben.blocks.free_run import Mask
 from mckibben.comparison.channels import Channels, held_at_levels
+from mckibben.comparison.doubts import Span
 from mckibben.recording import Recording
 
 N_PARTS = 8
@@ -45,6 +46,16 @@ def parts_of(recordings: Sequence[Recording], channels: Channels) -> tuple[Part,
         if any(kept.any() for kept in rows):
             parts.append(tuple(rows))
     return tuple(parts)
+
+
+def spans_of(part: Part, recordings: Sequence[Recording]) -> tuple[Span, ...]:
+    """Return what a part has of each recording."""
+    found = []
+    for recording, rows in zip(recordings, part, strict=True):
+        times, unit = recording.time[rows], "" if recording.sample_time is None else "s"
+        if times.size:
+            found.append(Span(recording.name, float(times[0]), float(times[-1]), unit))
+    return tuple(found)
 
 
 def _by_level(recordings: Sequence[Recording], channels: Channels) -> list[int]:

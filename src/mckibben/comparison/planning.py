@@ -15,7 +15,7 @@ from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.channels import Channels, Names, channels_of
 from mckibben.comparison.fitting import Candidate, Constant, Data, constant_of
 from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.comparison.parts import parts_of
+from mckibben.comparison.parts import parts_of, spans_of
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.comparison.splits import Split, split_of
 from mckibben.errors import DataError, ModelError
@@ -143,6 +143,7 @@ def plan_of(
         loads=channels.scheduled(every),
         ignored=channels.ignored(every),
         outside=_outside(split, channels.known(every)),
+        parts=tuple(spans_of(part, checks or split.train) for part in parts),
     )
     return Plan(Data(split, parts, channels, tuple(checks)), items, empty, refused)
 

@@ -273,7 +273,7 @@ def board_table(board: Leaderboard, rows: Sequence[Row], keys: Sequence[str] = B
     """Return rows of a leaderboard as a table, those of each output among its columns."""
     columns = [one for one in columns_of_board(board) if one.key in (*keys, *board.outputs)]
     given = [row.to_dict() for row in rows]
-    named = [r.model + " ≈" * (r.model in board.level) + "*" * bool(r.caution) for r in rows]
+    named = [r.model + " ≈" * (r.model in board.level) + "*" * r.doubted for r in rows]
     return Table(
         ["Model", *(one.label for one in columns)],
         [[name, *(one.text(each) for one in columns)] for name, each in zip(named, given, strict=True)],
@@ -305,7 +305,7 @@ def leaderboard(board: Leaderboard, keys: Sequence[str] = BOARD) -> list[Item]:
     if not ranked:
         chosen = "No model is fitted yet." if board.pending else "No model worked."
     items: list[Item] = [
-        Text([chosen]) if chosen else None,
+        Text(list(filter(None, [chosen, words.doubtful(board)]))) if chosen else None,
         Text([f"{split}. Ordered by {by}. All errors are free-run simulation errors."]),
         board_table(board, ranked, keys) if ranked else None,
         Text(marks, "muted") if marks else None,

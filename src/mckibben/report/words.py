@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mckibben.arrays import Array
     from mckibben.blocks.fields import Channel
     from mckibben.comparison.choosing import Against
+    from mckibben.comparison.doubts import Span
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.diagnosis.bands import Calibration
     from mckibben.diagnosis.causes import Cause
@@ -34,10 +35,6 @@ if TYPE_CHECKING:
 
 CHOICES = {
     "cross-validation": ("CV RMSE", "cross-validation on the training side"),
-    "validation": (
-        "validation RMSE",
-        "the last part of the training data, held out of the fit",
-    ),
     "given": ("validation RMSE", "validation recordings, which are not fitted"),
     "fit": ("fit RMSE", "the error on the fitted data, as there is no validation"),
 }
@@ -46,8 +43,11 @@ CHOICES = {
 LEVEL = "not distinguished from the chosen model by this test: the interval of the difference contains 0"
 """Of a model that is `level`."""
 
-CAREFUL = "reliable only near the fitted motions, so its error is doubled in the ranking"
-"""Of a model with a caution."""
+CAREFUL = (
+    "reliable only near the fitted motions, or with too many parameters to leave parts of the data out, "
+    "so its error is doubled in the ranking"
+)
+"""Of a model whose error is `doubted`."""
 
 
 def chosen(board: Leaderboard) -> str:
@@ -66,6 +66,38 @@ def chosen(board: Leaderboard) -> str:
     )
     end = ", the lowest" if lowest is best else f"; the lowest is {lowest.model}'s, {least}"
     return f"Chosen by {by}: {best.model}, {heading} {error}. Its test RMSE is {own}{end}."
+
+
+def doubtful(board: Leaderboard) -> str:
+    """Return what is most doubtful about the choice, and what would decide; empty where nothing is."""
+    if not board.doubts or board.best is None:
+        return ""
+    doubt, chosen_model = board.doubts[0], board.best.model
+    ratio = numeral(doubt.ratio, 2)
+    if doubt.kind == "test":
+        return (
+            f"The choice is doubtful: on the test {chosen_model} has {ratio} times the error of "
+            f"{doubt.model}. Fit to these recordings as well, and test on another one."
+        )
+    where = " and ".join(map(spanned, doubt.spans[:2])) + " …" * (len(doubt.spans) > 2)
+    if doubt.kind == "part":
+        return (
+            f"The choice is doubtful: on {where}, {doubt.model} fitted without it has {ratio} times its "
+            "error elsewhere. Another recording of that motion would decide."
+        )
+    assert doubt.interval is not None
+    low, high = (numeral(end, 2) for end in doubt.interval)
+    return (
+        f"The choice is doubtful: {doubt.model} has {numeral(1 / doubt.ratio, 2)} times the error of "
+        f"{chosen_model} in the cross-validation (95 % interval {low} to {high}). They differ most on "
+        f"{where}: another recording of that motion would decide."
+    )
+
+
+def spanned(span: Span) -> str:
+    """Return which samples of a recording are meant."""
+    start, stop = (numeral(end, 3) for end in (span.start, span.stop))
+    return f"{span.recording} from {start} to {stop} {span.unit}".rstrip()
 
 
 def not_recommended(
@@ -115,7 +147,7 @@ def comparison(board: Leaderboard) -> list[str]:
 
 def marks(board: Leaderboard) -> list[str]:
     """Return the meaning of the marks after names of models."""
-    careful = any(row.reason is None and row.caution for row in board.rows)
+    careful = any(row.reason is None and row.doubted for row in board.rows)
     return [f"≈ {LEVEL}."] * bool(board.level) + [f"* {CAREFUL}."] * careful
 
 

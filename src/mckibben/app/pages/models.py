@@ -21,7 +21,7 @@ from mckibben.blocks.free_run import run_free
 from mckibben.comparison.channels import Channels
 from mckibben.diagnosis.coupling import coupling
 from mckibben.diagnosis.description import ModelDescription, describe
-from mckibben.estimators.catalogue import caution, full_name
+from mckibben.estimators.catalogue import full_name
 from mckibben.numerals import number, typeset, typeset_within
 from mckibben.report import interactive, results, subjects
 from mckibben.report.builder import Figure, Table
@@ -177,7 +177,7 @@ def _choosable(state: State, heads: list[str], lines: list[list[Any]], names: li
 
 def _title(row: Json) -> None:
     with ui.element("div"):
-        ui.label(full_name(row["model"]) + "*" * bool(caution(row["model"])))
+        ui.label(full_name(row["model"]) + "*" * bool(row.get("doubted")))
         ui.label(row["name"] + " · other data" * (not row["current"])).classes("muted")
 
 
@@ -195,7 +195,7 @@ def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:
     notes = [f"Ordered by {by[0]} ({by[1]}), as the test is to judge, not to choose."]
     notes += [f"{first['split'][:1].upper()}{first['split'][1:]}."]
     notes += dict.fromkeys(why for row in rows for why in row.get("shared", ()))
-    notes += [f"* {CAREFUL}."] * any(caution(row["model"]) for row in rows)
+    notes += [f"* {CAREFUL}."] * any(row.get("doubted") for row in rows)
     notes += [OTHER_DATA] * (not all(row["current"] for row in rows))
     ui.label(typeset_within(message_of(" ".join(notes)))).classes("muted")
 

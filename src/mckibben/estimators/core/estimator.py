@@ -178,8 +178,8 @@ class Estimator(ABC):
     """Settings that name further input channels, of the block as well."""
 
     begins_measured: ClassVar[bool] = False
-    """Whether the fit itself begins every run from its first output, as the model does; others are fitted
-    from rest, and again after the pasts that this fit shows.
+    """Whether the fit itself begins every run from its first output, as the model does; others are
+    fitted from rest, and again after the pasts that this fit shows.
     """
 
     errors_known: ClassVar[bool] = True

@@ -6,7 +6,8 @@ A task is a comparison of the quick models on training recordings, and separate 
 README's example, virtual rigs, the plants of tests/plants (which know no model), and, with ``--data``,
 the sets of a folder as of `mckibben measured`. Regret is the test error of the model chosen by
 cross-validation over the least test error of any model; 1 where the best is chosen. Where no model is
-recommended, nothing is chosen, and the task is listed without. Means are geometric.
+recommended, nothing is chosen, and the task is listed without. Means are geometric; recordings that a
+set leaves out in turn are one task.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -133,7 +135,7 @@ def tasks(data: Path | None) -> Iterator[Task]:
     for one in chosen_in(data) if data is not None else ():
         for place, task in enumerate(one.tasks()):
             yield Task(
-                f"measured {one.name} {place}",
+                f"measured {one.name} {task.name or place}",
                 lambda task=task, one=one: parted(task, one.recordings(), one.folder),  # type: ignore[misc]
                 task.inputs,
                 task.outputs,
@@ -167,8 +169,8 @@ def main() -> None:
     warnings.simplefilter("ignore")
     names = [name for name in registry.names("estimators") if declared(name).quick]
     models = [name for name in names if name not in given.without]
-    found: dict[str, float] = {}
-    boards = {}
+    found: dict[str, list[float]] = {}
+    boards: dict[str, Any] = {}
     print("| task | chosen | test | best | test | regret | s |\n|---|---|---:|---|---:|---:|---:|")
     for task in tasks(given.data):
         if given.only not in task.name:
@@ -188,7 +190,8 @@ def main() -> None:
         except MckibbenError as error:
             print(f"| {task.name} | {' '.join(str(error).split())} ||||||", flush=True)
             continue
-        seconds, boards[task.name] = time.perf_counter() - started, board.to_dict()
+        seconds = time.perf_counter() - started
+        boards.setdefault(task.name, []).append(board.to_dict())
         outcome = regret_of(board)
         if outcome is None:
             print(
@@ -196,14 +199,15 @@ def main() -> None:
             )
             continue
         chosen, own, best, least = outcome
-        found[task.name] = own / least
+        found.setdefault(task.name, []).append(own / least)
         row = f"{chosen} | {own:.3g} | {best} | {least:.3g} | {own / least:.2f} | {seconds:.0f}"
         print(f"| {task.name} | {row} |", flush=True)
     if found:
-        worst = max(found, key=found.__getitem__)
+        means = {name: geometric(each) for name, each in found.items()}
+        worst = max(means, key=means.__getitem__)
         print(
-            f"\n{len(found)} tasks: regret {geometric(list(found.values())):.3f}, "
-            f"worst {found[worst]:.2f} ({worst})"
+            f"\n{len(means)} tasks: regret {geometric(list(means.values())):.3f}, "
+            f"worst {means[worst]:.2f} ({worst})"
         )
     if given.json:
         given.json.write_text(json.dumps(boards, indent=1), encoding="utf-8")

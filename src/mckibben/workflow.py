@@ -57,6 +57,8 @@ from mckibben.studying.results import Exported, Fit, Inverse, Price, Tracking
 from mckibben.system.progress import Tell, telling
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from mckibben.blocks.base import Block
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.diagnosis.check import Validation
@@ -176,6 +178,7 @@ def compare(
     reading: ReadOptions | None = None,
     out: str | Path | None = None,
     force: bool = False,
+    executor: Executor | None = None,
     progress: Progress = None,
     **given: Any,
 ) -> Leaderboard:
@@ -183,7 +186,7 @@ def compare(
 
     Recordings in a folder with a ``protocol.json`` have the roles stated there; ``validation``
     replaces cross-validation in the choice. An interrupted comparison returns the finished models;
-    with ``out``, the same call resumes it.
+    with ``out``, the same call resumes it. An ``executor`` fits the models instead of own processes.
     """
     from mckibben.comparison.ranking import compare as rank
     from mckibben.report.results_folder import LEADERBOARD, write_leaderboard
@@ -193,7 +196,7 @@ def compare(
         arguments,
         results,
     ):
-        board = rank(**arguments, progress=_standing(progress))
+        board = rank(**arguments, executor=executor, progress=_standing(progress))
         if results is not None:
             write_leaderboard(board, results)
             if not board.stopped:
@@ -211,6 +214,7 @@ def study(
     out: str | Path | None = None,
     force: bool = False,
     command: str = "",
+    executor: Executor | None = None,
     progress: Progress = None,
     found: Callable[[Study], None] | None = None,
     **given: Any,
@@ -218,7 +222,7 @@ def study(
     """Characterize a muscle, choose a model as `compare` does, check and invert it, and write a report.
 
     ``command`` is how the study is repeated, for the report. ``found`` is called with the study so far:
-    once the muscle is characterized, then after every model.
+    once the muscle is characterized, then after every model. ``executor`` as of `compare`.
     """
     from mckibben.report.results_folder import StudyFolder, study_files
     from mckibben.studying.study import study as run
@@ -241,6 +245,7 @@ def study(
             rig=chosen.rig,
             model=saved(chosen.model),
             compensator=saved(chosen.compensator),
+            executor=executor,
             progress=_standing(progress),
             found=pass_on,
         )
@@ -287,7 +292,7 @@ def _compared(
         workers.prepare()
     arguments = {one.name: getattr(chosen, one.name) for one in fields(CompareOptions)}
     whole = chosen.models in ("all", "quick")
-    names = list(registry.names("estimators") if whole else chosen.models)
+    names = registry.names("estimators") if whole else list(chosen.models)
     arguments["settings"] = settings_of_all(names, chosen.settings) if chosen.settings else {}
     files = expanded(files_of(train), files_of(test))
     runs: tuple[list[Recording], ...] = (loaded(train), [], loaded(test))

@@ -11,6 +11,7 @@ block, or where a start was stated, the block begins as it states: by default at
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from mckibben.recording import Recording
 
 SETTLING = 256
-"""Samples at the first input after a peak, in which rates decay in a rate-dependent block."""
+"""Most samples at the first input before a recording, in which rates decay in a rate-dependent block."""
 
 PRECISE = 1e-12
 """Precision of a peak, relative to the way down from the highest."""
@@ -54,7 +55,7 @@ def history(block: Block, recording: Recording) -> Array:
     if outputs is None or block.n_states == 0 or block.n_driven != 1 or not unstated(block):
         return np.empty((0, inputs.shape[1]))
     step = recording.sample_time
-    missed = outputs - _first_output(block, first[np.newaxis], step)
+    missed = outputs - _outputs(block, first[np.newaxis], step)[-1]
     if np.abs(missed).max() <= EXPLAINED * np.abs(outputs).max():
         return np.empty((0, inputs.shape[1]))
     if block.is_linear:
@@ -90,18 +91,18 @@ def unstated(block: Block) -> bool:
     return block.start == "first_sample" and all(map(unstated, getattr(block, "parts", ())))
 
 
-def _first_output(block: Block, before: Array, sample_time: float | None) -> Array:
-    """Return the output at the last of some inputs, (k, n_inputs), of a run from rest."""
-    state = block.initial_state(before[0], "first_sample")
-    outputs = np.empty((len(before), len(block.outputs)))
-    block.bind(sample_time, state, before, outputs)()
+def _outputs(block: Block, inputs: Array, sample_time: float | None) -> Array:
+    """Return the outputs over inputs, (k, n_inputs), of a run from rest; infinite after a warning."""
+    state = block.initial_state(inputs[0], "first_sample")
+    outputs = np.empty((len(inputs), len(block.outputs)))
+    block.bind(sample_time, state, np.ascontiguousarray(inputs), outputs)()
     with warnings.catch_warnings():
         warnings.simplefilter("error", ModelWarning)
         try:
             block.report(state)
         except ModelWarning:  # a past that the model itself warns of is none
-            return np.full(len(block.outputs), np.inf)
-    return outputs[-1]
+            outputs[:] = np.inf
+    return outputs
 
 
 def _rest_elsewhere(block: Block, first: Array, missed: Array, sample_time: float | None) -> Array:
@@ -111,9 +112,8 @@ def _rest_elsewhere(block: Block, first: Array, missed: Array, sample_time: floa
     """
     before = np.tile(first, (2, 1))
     before[0, 0] += 1.0
-    slope = _first_output(block, before, sample_time) - _first_output(
-        block, before[1:], sample_time
-    )
+    at_rest = _outputs(block, before[1:], sample_time)[-1]
+    slope = _outputs(block, before, sample_time)[-1] - at_rest
     power = float(slope @ slope)
     if not power > 0:
         return before[:0]
@@ -122,42 +122,63 @@ def _rest_elsewhere(block: Block, first: Array, missed: Array, sample_time: floa
 
 
 def _excursion(block: Block, inputs: Array, outputs: Array, sample_time: float | None) -> Array:
-    """Return the inputs from a past peak to the first input that explain the first outputs.
+    """Return the past of a block with memory that explains the first outputs, shape (k, n_inputs).
 
-    The peak is between the first input and the highest of the block's range or the recording. Where none
-    explains the outputs, it is the end that explains them better.
+    Pasts are tried in the order of what they leave in the output: the input has just come from lower;
+    has been held for a while (both make a difference where the block depends on the rate); or has come
+    down from a peak and been held since. Inputs are those of the block's range and the recording. Where
+    none explains the outputs, it is the end that explains them better.
     """
-    from scipy.optimize import brentq
+    first, given = inputs[0], inputs[:, 0]
+    low, high = getattr(_first_part(block), "input_range", None) or (first[0], first[0])
+    low, high = min(low, float(given.min())), max(high, float(given.max()))
+    held = np.tile(first, (SETTLING if block.rate_dependent else 0, 1))
 
-    first, highest = inputs[0], float(inputs[:, 0].max())
-    limits = getattr(_first_part(block), "input_range", None)
-    if limits is not None:
-        highest = max(highest, limits[1])
-    settling = SETTLING if block.rate_dependent else 0
+    def come_from(level: float) -> Array:
+        return np.vstack([np.append(level, first[1:]), np.empty((0, first.size))])
 
-    def way(peak: float) -> Array:
-        before = np.tile(first, (settling + 1, 1))
-        before[0, 0] = peak
-        return before
+    def down_from(peak: float) -> Array:
+        return np.vstack([come_from(peak), held])
 
-    def after(peak: float) -> Array:
-        return _first_output(block, np.vstack([way(peak), first]), sample_time)
+    def last(before: Array) -> Array:
+        return _outputs(block, np.vstack([before, first]), sample_time)[-1]
 
-    lowest = float(first[0])
-    ends = after(lowest), after(highest)
+    ends = last(come_from(low)), last(down_from(high))
     direction = ends[1] - ends[0]
 
-    def above(peak: float) -> float:
-        """Return how far the output is above the measured one, along the way to that of the highest."""
-        return float(direction @ (after(peak) - outputs))
+    def above(found: Array) -> Array:
+        """Return how far outputs are above the measured ones, along the way between the ends."""
+        return np.asarray((found - outputs) @ direction)
 
-    low, high = (float(direction @ (end - outputs)) for end in ends)
-    if not np.isfinite([low, high]).all() or low >= 0:
-        return np.empty((0, first.size))
-    if high <= 0:
-        return way(highest)
-    tolerance = PRECISE * (highest - lowest)
-    return way(float(brentq(above, lowest, highest, xtol=tolerance, disp=False)))
+    if not np.isfinite(direction).all():
+        return held[:0]
+    while_held = above(_outputs(block, np.vstack([held, first]), sample_time))
+    if while_held[0] >= 0:
+        return _where(above, last, come_from, low, float(first[0])) if len(held) else held[:0]
+    if while_held[-1] >= 0:
+        return held[: int(np.argmax(while_held >= 0))]
+    return _where(above, last, down_from, float(first[0]), high)
+
+
+def _where(
+    above: Callable[[Array], Array],
+    last: Callable[[Array], Array],
+    way: Callable[[float], Array],
+    low: float,
+    high: float,
+) -> Array:
+    """Return the past of a family at which the first outputs are explained, or the nearer end."""
+    from scipy.optimize import brentq
+
+    def missed(level: float) -> float:
+        return float(above(last(way(level))))
+
+    if not missed(low) < 0:
+        return way(low)
+    if not missed(high) > 0:
+        return way(high)
+    tolerance = PRECISE * (high - low)
+    return way(float(brentq(missed, low, high, xtol=tolerance, disp=False)))
 
 
 def _first_part(block: Block) -> Block:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -175,6 +176,7 @@ def measure(
     models: str | Sequence[str] = "all",
     seed: int = 0,
     jobs: int | None = None,
+    executor: Executor | None = None,
     force: bool = False,
     command: str = "",
     progress: Callable[[float, str], None] | None = None,
@@ -188,7 +190,7 @@ def measure(
         With a folder for every set; where to write, outside of it.
     only : sequence of str
         Names of sets; default all.
-    models, seed, jobs
+    models, seed, jobs, executor
         As for `outcomes`.
     force : bool
         Whether files of the user's may be replaced.
@@ -214,7 +216,15 @@ def measure(
     inputs = [one.folder for one in chosen]
     with results_in(out, FILES, inputs=inputs, force=force, kind="measured") as results:
         every: list[Outcome] = []
-        for one in outcomes(chosen, models=models, seed=seed, jobs=jobs, folder=out, tell=progress):
+        for one in outcomes(
+            chosen,
+            models=models,
+            seed=seed,
+            jobs=jobs,
+            executor=executor,
+            folder=out,
+            tell=progress,
+        ):
             every.append(one)
             if found is not None:
                 found(one)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -84,6 +85,7 @@ def outcomes(
     models: str | Sequence[str] = "all",
     seed: int = 0,
     jobs: int | None = None,
+    executor: Executor | None = None,
     folder: Path | None = None,
     tell: Callable[[float, str], None] | None = None,
 ) -> Iterator[Outcome]:
@@ -94,7 +96,7 @@ def outcomes(
     sets : sequence of Set
     models : "all", "quick" or sequence of str
         Instead of those that a task asks for, unless "all".
-    seed, jobs
+    seed, jobs, executor
         As of `mckibben.compare`.
     folder : path, optional
         Where finished models are kept, so that what was stopped goes on from there.
@@ -126,6 +128,7 @@ def outcomes(
                 settings={m: own for m, own in task.settings.items() if not named or m in models},
                 seed=seed,
                 jobs=jobs,
+                executor=executor,
                 folder=Checkpoints(folder).inside(f"{one.name}-{place}"),
                 clear=False,
                 progress=progress,

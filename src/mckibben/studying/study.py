@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -120,6 +121,7 @@ def study(
     rig: str | None = None,
     seed: int = 0,
     jobs: int | None = None,
+    executor: Executor | None = None,
     folder: str | Path | None = None,
     clear: bool = True,
     progress: bool | Callable[[Standing], None] | None = None,
@@ -139,7 +141,7 @@ def study(
 
     Parameters
     ----------
-    train, test, seed, jobs, folder, clear, progress
+    train, test, seed, jobs, executor, folder, clear, progress
         As for `compare`.
     rig : str, optional
         Virtual rig to close loops on; by default the rig of the recordings, with its changed
@@ -199,7 +201,9 @@ def study(
     try:
         with (
             telling(progress, "studying", lines=True) as tell,
-            closing(ranked(plan, jobs=jobs, kept=kept, progress=tell)) as rankings,
+            closing(
+                ranked(plan, jobs=jobs, executor=executor, kept=kept, progress=tell)
+            ) as rankings,
         ):
             for ranking in rankings:
                 so_far = replace(so_far, leaderboard=ranking.board, predictions=ranking.outputs)

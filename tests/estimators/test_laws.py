@@ -11,11 +11,12 @@ import pytest
 from sklearn.base import clone, is_classifier, is_regressor
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from mckibben import GPI, DataError, ModelError, RateDependentPI, Recording
+from mckibben import GPI, DataError, ModelError, RateDependentPI, Recording, compare
 from mckibben.blocks.base import Block
 from mckibben.blocks.notation import meanings
 from mckibben.estimators.catalogue import defaults
 from mckibben.estimators.core.settings import check_settings
+from mckibben.metrics import rmse
 from mckibben.registry import load, names
 from tests.estimators.examples import CASES, KINDS, example_for, kinds_for, quick, recorded
 from tests.estimators.examples import few_steps as few_steps  # a fixture
@@ -106,6 +107,30 @@ def test_a_fit_does_not_depend_on_the_unit_of_the_output(name: str, kind: str) -
     found = relative_errors(name, kind)
     # in the flat valley of cpi rounding decides where the search ends
     assert found == pytest.approx([found[0]] * 4, rel=1e-5 if name == "cpi" else 1e-6)
+
+
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_a_fit_a_comparison_and_a_simulation_have_the_same_errors(name: str, kind: str) -> None:
+    made, runs = KINDS[kind], recorded(kind)
+    board = compare(
+        runs,
+        runs[:1],
+        inputs=made.inputs,
+        outputs=made.outputs,
+        load=made.scheduling[0] if kind == "loaded" else None,
+        models={"one": quick(name, kind)},
+        allow_shared=True,
+        jobs=1,
+    )
+    (row,) = board.rows
+    assert row.reason is None
+    assert row.block is not None
+    assert row.train is not None
+    assert row.test is not None
+    assert row.diagnostics["rmse"] == row.train.rmse
+    modelled = row.block.simulate(runs[0]).matrix(made.outputs)
+    errors = [rmse(*pair) for pair in zip(runs[0].matrix(made.outputs).T, modelled.T, strict=True)]
+    assert row.test.rmse == float(np.mean(errors))
 
 
 PRINTED_START = "it starts from N(0, 1) in the inputs' own units, as its paper prints"

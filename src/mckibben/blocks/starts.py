@@ -38,10 +38,9 @@ def start_state(block: Block, recording: Recording) -> Array:
     """Return the state before the first sample of a recording, shape (n_states,)."""
     inputs = np.ascontiguousarray(recording.matrix(channel.name for channel in block.inputs))
     outputs = first_outputs(block, recording)
-    if outputs is not None and unstated(block):
-        known = block.state_at(inputs[0], outputs)
-        if known is not None:
-            return known
+    known = None if outputs is None else block.state_at(inputs[0], outputs)
+    if known is not None:
+        return known
     return state_after(block, history(block, recording), inputs[0], recording.sample_time)
 
 
@@ -52,7 +51,7 @@ def history(block: Block, recording: Recording) -> Array:
     """
     inputs = recording.matrix(channel.name for channel in block.inputs)
     outputs, first = first_outputs(block, recording), inputs[0]
-    if outputs is None or block.n_states == 0 or block.n_driven != 1 or not unstated(block):
+    if outputs is None or block.n_driven != 1 or block.state_at(first, outputs) is not None:
         return np.empty((0, inputs.shape[1]))
     step = recording.sample_time
     missed = outputs - _outputs(block, first[np.newaxis], step)[-1]
@@ -74,11 +73,17 @@ def state_after(block: Block, before: Array, first: Array, sample_time: float | 
 
 
 def first_outputs(block: Block, recording: Recording) -> Array | None:
-    """Return the first measured value of every output of a block, or None where one is missing."""
+    """Return the first measured value of every output of a block; None where they have no say.
+
+    That is where one is missing or also an input, where the block has no state or states its start, and
+    where it is a compensator, whose outputs are commands.
+    """
     recording = recording.with_derived(channel.name for channel in block.outputs)
     commands = drives(block.outputs[0]) and not drives(block.inputs[0])
     given = {channel.name for channel in block.inputs}
-    if commands or any(
+    if commands or block.n_states == 0 or not unstated(block):
+        return None
+    if any(
         channel.name in given or recording.units.get(channel.name) != channel.unit
         for channel in block.outputs
     ):

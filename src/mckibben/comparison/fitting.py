@@ -33,7 +33,7 @@ from mckibben.system.workers import Outcome
 TIMED_SAMPLES = 20_000
 """Number of samples of the simulation that measures the time of a step."""
 
-WORTH_A_PROCESS = 4.0
+WORTH_A_PROCESS = 2.0
 """Seconds of work below which starting processes costs more time than it saves."""
 
 PIECES = 4

@@ -481,18 +481,16 @@ class Estimator(ABC):
         return block
 
     def _diagnose(self, runs: FreeRuns, tracker: Tracker, started: float) -> Diagnostics:
-        block, n_outputs = runs.block, len(runs.names)
-        at_bounds = self.at_bounds(block)
+        block, at_bounds = runs.block, self.at_bounds(runs.block)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ModelWarning)
-            by_output = _rms(runs.residual.reshape(-1, n_outputs))
-            from_rest = _rms(runs.from_rest.residual.reshape(-1, n_outputs))
+            by_output, from_rest = runs.errors, runs.from_rest.errors
         notes = dict.fromkeys([*tracker.notes, *sorted({str(one.message) for one in caught})])
         return Diagnostics(
-            rmse=float(by_output.mean()),
-            rmse_by_output=tuple(by_output.tolist()),
-            rmse_from_rest=float(from_rest.mean()),
-            n_samples=runs.residual.size // n_outputs,
+            rmse=float(np.mean(by_output)),
+            rmse_by_output=by_output,
+            rmse_from_rest=float(np.mean(from_rest)),
+            n_samples=runs.residual.size // len(runs.names),
             n_free=block.n_parameters - len(self.fixed(block)) + self.n_further,
             n_evaluations=tracker.evaluations,
             seconds=time.perf_counter() - started,
@@ -579,13 +577,6 @@ class SearchEstimator(Estimator):
     input: str = "pressure"
     output: str = "displacement"
     initial: Start = "first_sample"
-
-
-def _rms(residual: Array) -> Array:
-    """Return the root mean square of every column."""
-    with np.errstate(over="ignore", invalid="ignore"):  # a model that overflows has no finite error
-        found: Array = np.sqrt(np.mean(residual**2, axis=0))
-    return found
 
 
 def resting(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:

@@ -14,6 +14,7 @@ from mckibben.blocks.fields import Initial
 from mckibben.blocks.free_run import PERIODIC, Mask, run_free
 from mckibben.blocks.running import run_many
 from mckibben.blocks.starts import history, start_state
+from mckibben.metrics import rmse
 from mckibben.recording import Recording
 
 DIFFERENCE = 1e-6
@@ -118,6 +119,20 @@ class FreeRuns:
         """Measured less modelled outputs that count, sample by sample, shape (N,)."""
         measured = [recording.matrix(self.names) for recording in self.recordings]
         return self.scored(measured) - self.scored(self.modelled)
+
+    @property
+    def errors(self) -> tuple[float, ...]:
+        """Root mean square error of every output; infinite of a model that overflows."""
+        names = self.names
+        measured = np.concatenate(
+            [r.matrix(names)[rows] for r, rows in zip(self.recordings, self.rows, strict=True)]
+        )
+        modelled = np.concatenate(
+            [table[rows] for table, rows in zip(self.modelled, self.rows, strict=True)]
+        )
+        if not np.isfinite(modelled).all():
+            return (np.inf,) * len(names)
+        return tuple(rmse(*pair) for pair in zip(measured.T, modelled.T, strict=True))
 
     @property
     def rmse(self) -> float:

@@ -160,6 +160,8 @@ class SeparableEstimator(Estimator):
         lower, upper = self.bounds(data)
         if lower.size == 0:
             return lower
+        if tracker.near is not None and tracker.near.shape == lower.shape:
+            return self._polish(np.clip(tracker.near, lower, upper), data, tracker)
         thin = data.thinned(SEARCH_SAMPLES)
         if self.searches_condensed:
             thin = thin.condensed()
@@ -177,7 +179,8 @@ class SeparableEstimator(Estimator):
             jacobian=jacobian,
             choices=self.choices(data),
         )
-        return self._polish(theta, data, tracker)
+        tracker.near = self._polish(theta, data, tracker)
+        return tracker.near
 
     def _scattered(self, lower: Array, upper: Array) -> list[Array]:
         from scipy.stats import qmc

@@ -182,7 +182,7 @@ class BalanceEstimator(CoupledEstimator):
         "air balance-inverse",
         "piecewise-linear balance-inverse",
     )
-    effort: ClassVar[float] = 1.0
+    effort: ClassVar[float] = 6.0
     errors_known: ClassVar[bool] = True
     alone: ClassVar[bool] = True
     unmeasured: ClassVar[bool] = True

@@ -126,14 +126,12 @@ class PlayRidgeEstimator(CoupledEstimator):
         total, found = rows.T @ rows, []
         for part in parts:
             out = rows[part[::m]]
-            readout = readout_of(total - out.T @ out, width, self.penalties_, np.diag(total))
+            readout = readout_of(total - out.T @ out, width, self.penalties_)
             found.append([table @ readout.T for table in tables])
         return found
 
 
-def readout_of(
-    sums: Array, width: int, penalties: Sequence[float], powers: Array | None = None
-) -> Array:
+def readout_of(sums: Array, width: int, penalties: Sequence[float]) -> Array:
     """Return the readout of every output, shape (m, width).
 
     Parameters
@@ -142,9 +140,9 @@ def readout_of(
         Sums of products of what is read out, a constant first, and of the outputs.
     width : int
     penalties : sequence of m float
-        Relative to ``powers``, by default the diagonal of ``sums``.
+        Relative to the diagonal of ``sums``.
     """
-    size = np.sqrt(np.maximum(np.diag(sums) if powers is None else powers, 1e-300))
+    size = np.sqrt(np.maximum(np.diag(sums), 1e-300))
     scaled = sums / np.outer(size, size)
     readout = [
         np.linalg.solve(scaled[:width, :width] + np.diag(_damping(width, one)), scaled[:width, k])

@@ -24,6 +24,9 @@ class Tracker:
     evaluations: int = 0
     best_cost: float = np.inf
     best: Array | None = None
+    near: Array | None = None
+    """Result of a search on nearly the same data, from which the next one goes on."""
+
     notes: list[str] = field(default_factory=list)
     """Notes for the user on the result."""
 

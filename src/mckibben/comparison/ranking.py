@@ -217,7 +217,10 @@ def ranked(
     progress: Callable[[Standing], None] | None = None,
     watch: Watch | None = None,
 ) -> Generator[Ranking]:
-    """Yield the ranking after every model, fast models first; the last ranking is complete."""
+    """Yield the ranking after every model; the last ranking is complete.
+
+    In one process fast models are first, in several the slow ones, so that none is left for the end.
+    """
     checked(jobs)
     data, table = plan.data, _Table(plan)
     keys = {name: (item, source(item.made)) for name, item in plan.items.items()}

@@ -165,8 +165,7 @@ class Estimator(ABC):
     """Models that it can refit with as many operators, each by the kinds of its parts in order."""
 
     effort: ClassVar[float] = 0.5
-    """Approximate time of a fit to 10 000 samples [s]; comparisons start with the fastest models.
-    """
+    """Approximate time of a fit to 10 000 samples [s], by which comparisons order their work."""
 
     needs_time: ClassVar[bool] = False
     """Whether recordings must have time."""

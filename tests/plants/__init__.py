@@ -13,5 +13,14 @@ from tests.plants.plant import Bench, Fact, Plant, Respond, drawn
 __all__ = ["DEVELOP", "PLANTS", "SEALED", "Bench", "Fact", "Plant", "Respond"]
 
 DEVELOP = ("lugre_muscle", "antagonistic_joint", "continuum_section", "soft_finger")
-SEALED = ("load_rig", "three_muscle_arm", "lifter", "pushing_rig")
+SEALED = (
+    "load_rig",
+    "three_muscle_arm",
+    "lifter",
+    "pushing_rig",
+    "valve_muscle",
+    "isometric_bench",
+    "swinging_arm",
+    "piezo_stage",
+)
 PLANTS = {name: partial(drawn, name) for name in DEVELOP + SEALED}

@@ -407,11 +407,10 @@ class BalanceEstimator(CoupledEstimator):
         return search, z
 
     def _long_held(self, search: Search, z: Array) -> tuple[Search, Array]:
-        """Return the search with settled starts, if that explains the runs considerably better."""
+        """Return the search with settled starts, if that explains the runs better."""
         settled = replace(search, structure=replace(search.structure, settled=True))
         found = settled.descended(z, STEPS_BETWEEN, Tracker())
-        helps = settled.cost(found) < (1.0 - OWN_HELPS) * search.cost(z)
-        return (settled, found) if helps else (search, z)
+        return (settled, found) if settled.cost(found) < search.cost(z) else (search, z)
 
     def _balanced(self, search: Search, tracker: Tracker) -> Array:
         """Return the best linear force balance at measured positions, over several friction offsets."""

@@ -9,11 +9,21 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from mckibben import GPI, Banded, DataError, ModelError, PerChannel, Recording, calibrate
+from mckibben import GPI, Banded, DataError, ModelError, PerChannel, Recording, calibrate, compare
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.saving import from_dict
-from mckibben.diagnosis.bands import LEVEL, Held, calibration, find_band, outside
-from mckibben.signals import random_wave
+from mckibben.diagnosis.bands import (
+    FEWEST,
+    LEVEL,
+    SHARES,
+    Held,
+    TestedBand,
+    calibration,
+    find_band,
+    n_branches,
+    outside,
+)
+from mckibben.signals import random_wave, triangle
 
 MODEL = GPI.example()
 STEP = 0.1
@@ -186,3 +196,59 @@ def test_what_it_cannot_calibrate_on_is_refused(banded: Banded) -> None:
         calibrate(MODEL.inverse(), runs)
     with pytest.raises(ModelError):
         banded.inverse()
+
+
+def test_a_motion_that_is_repeated_adds_no_branch() -> None:
+    time, rng = STEP * np.arange(1000), np.random.default_rng(0)
+    same = triangle(time, 10.0, [5.0]) + 0.02 * rng.standard_normal((2, 1000))
+    falling = triangle(time, 10.0, [5.0, 4.2, 3.4, 2.6, 1.8, 1.0])
+    n = n_branches([same[:1].T])
+    assert n <= 3
+    assert n_branches([same[:1].T, same[1:].T]) == n
+    assert n_branches([same.T]) == n
+    assert n_branches([np.column_stack([same[0], falling])]) == n_branches([falling[:, None]]) > n
+    assert n_branches([np.ones((50, 1))]) == 1
+
+
+def recorded(u: np.ndarray, seed: int, factor: float = 1.0) -> Recording:
+    """Return the output of a model under an input, with white noise of 0.1 mm times a factor."""
+    noise = 0.1 * factor * np.random.default_rng(seed).standard_normal(u.size)
+    return Recording({"pressure": u, "displacement": MODEL.simulate(u) + noise}, STEP)
+
+
+def chosen(train: Recording, *tests: Recording) -> tuple[TestedBand, object]:
+    best = compare(train, tests, models=["gpi"], jobs=1).best
+    assert best is not None
+    assert best.band is not None
+    return best.band, best.banded
+
+
+def test_a_band_of_training_is_known_where_each_test_recording_has_its_share_inside() -> None:
+    def wave(seed: int, factor: float = 1.0, n: int = 600) -> Recording:
+        return recorded(random_wave(STEP * np.arange(n), 0.3, 5.0, seed=seed), seed, factor)
+
+    train = wave(0, n=1200)
+    band, banded = chosen(train, wave(1), wave(2))
+    assert band.unknown is None
+    assert band.level == LEVEL
+    assert min(band.units, band.branches) >= FEWEST
+    assert SHARES[0] <= band.lowest <= band.coverage["displacement"] <= band.highest <= SHARES[1]
+    assert isinstance(banded, Banded)
+    assert banded.band.widening[0] > 0
+    for factor, unknown in ((3.0, "narrow"), (0.2, "wide")):
+        band, banded = chosen(train, wave(1), wave(2, factor))
+        assert (band.unknown, banded) == (unknown, None)
+
+
+def test_a_band_of_few_branches_or_blocks_is_not_known() -> None:
+    u = triangle(STEP * np.arange(1200), 10.0, [5.0])
+    band, banded = chosen(recorded(u, 0), recorded(u[:600], 1))
+    assert (band.unknown, banded) == ("branches", None)
+    assert band.units >= FEWEST > band.branches
+    assert band.coverage["displacement"] == pytest.approx(LEVEL, abs=0.05)
+    time = STEP * np.arange(400)
+    run = recorded(random_wave(time, 1.0, 5.0, seed=0), 0, 0.1)
+    drifting = run.with_channels(displacement=run["displacement"] + np.sin(0.3 * time))
+    band, _ = chosen(drifting, recorded(random_wave(time, 1.0, 5.0, seed=1), 1))
+    assert band.unknown == "blocks"
+    assert band.units < FEWEST <= band.branches

@@ -50,8 +50,17 @@ def test_the_three_answers_are_short_and_hold_their_numbers(make: Callable[[], S
     assert sum(len(sentence.split()) for _, sentence in said) <= MOST_WORDS
     best = found.leaderboard.best
     assert best is not None
-    if best.band is not None:
-        assert percent(min(best.band.coverage.values())) in said[1][1]
+    band = best.band
+    if band is None:
+        return
+    numbers = {
+        None: percent(min(band.coverage.values())),
+        "blocks": f"{band.units} ",
+        "branches": f"{band.branches} ",
+        "narrow": percent(band.lowest),
+        "wide": percent(band.highest),
+    }
+    assert numbers[band.unknown] in said[1][1]
 
 
 def test_every_column_of_a_leaderboard_is_in_the_glossary() -> None:

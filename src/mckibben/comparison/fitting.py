@@ -93,15 +93,18 @@ class Data:
         ]
 
     def held(self, predictions: Sequence[Array], block: Block) -> list[Held]:
-        """Return the held-out predictions of every part of a recording, and the measured outputs."""
+        """Return the held-out predictions of every recording of the parts, and its measured outputs."""
         inputs = [channel.name for channel in block.inputs]
+        each = zip(self.held_out, predictions, zip(*self.parts, strict=True), strict=True)
         return [
             Held(
-                run.matrix(inputs), found, run.matrix(self.channels.outputs), rows, run.sample_time
+                run.matrix(inputs),
+                found,
+                run.matrix(self.channels.outputs),
+                np.any(rows, axis=0),
+                run.sample_time,
             )
-            for part in self.parts
-            for run, found, rows in zip(self.held_out, predictions, part, strict=True)
-            if rows.any()
+            for run, found, rows in each
         ]
 
 

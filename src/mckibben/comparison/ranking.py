@@ -283,8 +283,11 @@ def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
     if better or not row.sound or row.block is None or row.validation_rmse is None:
         return row
     held = plan.data.held(found.predictions, row.block)
-    banded = tested_band(row.block, held, found.outputs, plan.data)
-    return row if banded is None else replace(row, banded=banded[0], band=banded[1])
+    tested = tested_band(row.block, held, found.outputs, plan.data)
+    if tested is None:
+        return row
+    banded, band = tested
+    return replace(row, band=band, banded=None if band.unknown else banded)
 
 
 class _Table:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
 from mckibben.recording import Recording, listed
+from mckibben.signals.reversals import reversals
 from mckibben.statistics import block_length, correlation_length
 from mckibben.system.progress import Tell, one_by_one, telling
 
@@ -33,13 +34,16 @@ if TYPE_CHECKING:
 
 Unit = Literal["auto", "run", "block"]
 
+Unknown = Literal["blocks", "branches", "narrow", "wide"]
+"""Why a band is not known; see `TestedBand`."""
+
 LEVEL, LEVELS = 0.9, np.linspace(0.0, 1.0, 1001)
 """Default level of a band, reduced to the highest that the number of units allows; levels in the
 table of half widths.
 """
 
-RUNS = 9
-"""Smallest number of runs for a level of 0.9: with fewer, blocks of runs are the exchangeable
+FEWEST = 9
+"""Smallest number of units for a level of 0.9: with fewer runs, blocks of runs are the exchangeable
 units.
 """
 
@@ -51,8 +55,18 @@ WIDENINGS, FOLDS = (0.0, 0.3, 1.0, 3.0, 10.0), 5
 cross-validation folds that choose among them.
 """
 
+AT_SPEED = (1.0,)
+"""The same for motion of another kind than in training, where the narrowest band of these data is no
+better than another: half of the mean width grows with speed.
+"""
+
 MARGIN = 0.05
-"""Share of a calibrated range by which samples may exceed it and count as inside."""
+"""Share of a range by which samples may exceed it and count as inside, and by which turning points of
+like branches differ.
+"""
+
+SHARES = 0.8, 0.97
+"""Least and greatest share of the samples of a test recording in a band of 0.9 that is known."""
 
 
 @dataclass(frozen=True)
@@ -217,12 +231,14 @@ def held_of(model: Block, recording: Recording) -> Held:
     return Held(given, modelled, measured, np.arange(len(recording)) > 0, recording.sample_time)
 
 
-def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Calibration:
+def find_band(
+    model: Block, runs: Sequence[Held], unit: Unit = "auto", widenings: Sequence[float] = WIDENINGS
+) -> Calibration:
     """Return the band of a model from its errors on held-out runs; needs two units."""
     runs = [run for run in runs if run.counts.any()]
     errors = [run.errors for run in runs]
     memory = max(correlation_length(one) for one in zip(*(e.T for e in errors), strict=True))
-    by_run = unit == "run" or (unit == "auto" and len(runs) >= RUNS)
+    by_run = unit == "run" or (unit == "auto" and len(runs) >= FEWEST)
     which: Literal["run", "block"] = "run" if by_run else "block"
     units: list[NDArray[np.intp]] = []
     n = 0
@@ -238,7 +254,7 @@ def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Calibr
             remedy="calibrate on more, or longer, recordings",
         )
     level = min(LEVEL, n / (n + 1))
-    widenings = WIDENINGS if all(run.sample_time for run in runs) else WIDENINGS[:1]
+    widenings = widenings if all(run.sample_time for run in runs) else WIDENINGS[:1]
     of, speeds = np.concatenate(units), np.concatenate([run.speeds for run in runs])
     found = [
         _narrowest(np.abs(e), v, of, level, widenings)
@@ -304,28 +320,58 @@ def outside(band: Band, samples: Array) -> dict[str, float]:
     return {name: float(share) for name, share in zip(names, shares, strict=True) if share > 0}
 
 
+def n_branches(tables: Sequence[Array]) -> int:
+    """Return how many different branches between turning points an output has, of several the most.
+
+    Tables are outputs, shape (n, k). A motion that is repeated adds none.
+    """
+    every = np.concatenate(tables)
+    low, span = every.min(axis=0), np.maximum(np.ptp(every, axis=0), np.finfo(float).tiny)
+    counts = []
+    for runs in zip(*(((table - low) / span).T for table in tables), strict=True):
+        turns = [run[reversals(run, MARGIN)] for run in runs]
+        left = np.concatenate([np.column_stack([ends[:-1], ends[1:]]) for ends in turns])
+        count = 0
+        while len(left):
+            left = left[np.abs(left - left[0]).max(axis=1) > MARGIN]
+            count += 1
+        counts.append(count)
+    return max(counts)
+
+
 @dataclass(frozen=True)
 class TestedBand:
     """Coverage of a band, calibrated on training data, on the test.
 
     Parameters
     ----------
+    unknown : {"blocks", "branches", "narrow", "wide"} or None
+        Why the band is not known: fewer blocks or branches than ``needed``, or a test recording with
+        less or more of its samples inside than `SHARES`; None of a band that is known.
     level : float
-        What it is to hold: 0.9, or the most that so few units allow.
-    unit, units : {"run", "block"}, int
-        What counts as exchangeable, and how many the cross-validation had.
-    unit_of_width, coverage, width : str, mappings of str to float
-        Unit of the outputs; by output, the share of samples inside and the mean width.
+        Share that the band is to contain: 0.9, or the most that so few units allow.
+    units, branches : int
+        Independent blocks of the cross-validation, and different branches of the output there.
+    unit_of_width : str
+        Unit of the outputs.
+    coverage, width : mappings of str to float
+        By output, the share of test samples inside, and the mean width.
+    lowest, highest : float
+        Least and greatest share inside of a test recording, of any output.
     """
 
     __test__ = False  # it is no test
+    needed: ClassVar[int] = FEWEST
 
+    unknown: Unknown | None
     level: float
-    unit: str
     units: int
+    branches: int
     unit_of_width: str
     coverage: Mapping[str, float]
     width: Mapping[str, float]
+    lowest: float
+    highest: float
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
@@ -344,12 +390,14 @@ def tested_band(
     if not held or tuple(channel.name for channel in block.outputs) != tuple(names):
         return None
     try:
-        band = find_band(block, held).band
+        band = find_band(block, held, "block", AT_SPEED).band
     except DataError:
         return None
     covered, width = [], []
     tested = zip(split.test, outputs[len(split.train) :], split.test_rows, strict=True)
     for recording, modelled, kept in tested:
+        if not kept.any():
+            continue
         ends = band.simulate(modelled, sample_time=recording.sample_time)
         _, lower, upper = np.moveaxis(ends.reshape(len(ends), -1, 3)[kept], -1, 0)
         measured = recording.matrix(names)[kept]
@@ -359,5 +407,23 @@ def tested_band(
         dict(zip(names, np.concatenate(each).mean(axis=0).tolist(), strict=True))
         for each in (covered, width)
     )
-    unit = block.outputs[0].unit
-    return Banded(block, band), TestedBand(band.level, band.unit, band.units, unit, shares, widths)
+    by_run = np.array([inside.mean(axis=0) for inside in covered])
+    lowest, highest = float(by_run.min()), float(by_run.max())
+    branches = n_branches([recording.matrix(names) for recording in data.held_out])
+    reasons: dict[Unknown, bool] = {
+        "blocks": band.units < FEWEST,
+        "branches": branches < FEWEST,
+        "narrow": lowest < SHARES[0],
+        "wide": highest > SHARES[1],
+    }
+    return Banded(block, band), TestedBand(
+        unknown=next((reason for reason, holds in reasons.items() if holds), None),
+        level=band.level,
+        units=band.units,
+        branches=branches,
+        unit_of_width=block.outputs[0].unit,
+        coverage=shares,
+        width=widths,
+        lowest=lowest,
+        highest=highest,
+    )

@@ -525,13 +525,25 @@ def _how_far(study: Study) -> str:
     if best is None or best.test is None:
         return "No model is chosen."
     if best.band is None:
-        return f"At most {numeral(best.test.max_error, 2)} {unit} on the test."
-    worst = min(best.band.coverage, key=best.band.coverage.__getitem__)
+        largest = f"{numeral(best.test.max_error, 2)} {unit}".strip()
+        return f"A 90 % band is not known; the largest test error is {largest}."
+    unknown = best.band.unknown
+    farthest = max if unknown == "wide" else min
+    worst = farthest(best.band.coverage, key=best.band.coverage.__getitem__)
     of = f" for {worst}" if len(best.band.coverage) > 1 else ""
     half = numeral(best.band.width[worst] / 2, 2)
-    level, inside = percent(best.band.level), percent(best.band.coverage[worst])
-    unit = best.band.unit_of_width
-    return f"The {level} band{of} (±{half} {unit}) contains {inside} of the test samples."
+    band = f"(±{half} {best.band.unit_of_width})"
+    if unknown is None:
+        inside = percent(best.band.coverage[worst])
+        return f"The 90 % band{of} {band} contains {inside} of the test samples."
+    counts = {"blocks": best.band.units, "branches": best.band.branches}
+    if unknown in counts:
+        kind = "independent blocks" if unknown == "blocks" else "different branches"
+        what = f"training has {counts[unknown]} {kind}, and {best.band.needed} are needed"
+    else:
+        inside = percent(best.band.highest if unknown == "wide" else best.band.lowest)
+        what = f"that of training{of} {band} contains {inside} of a test recording"
+    return f"A 90 % band is not known: {what}."
 
 
 def _record_next(study: Study) -> str:

@@ -65,9 +65,9 @@ class Row:
     memory : Memory or None
         The memory test, on the test set.
     band : TestedBand or None
-        How its band does on the test, of the chosen model.
+        Its band, the share of the test inside, and whether it is known; of the chosen model.
     block, banded : Block or None
-        The model identified, and with that band.
+        The model identified, and with that band if it is known.
     diagnostics : mapping
         What the estimator reports of the fit.
     test_rank : int or None

@@ -150,8 +150,7 @@ def calibrate(
     The model runs free over each recording, and its errors give the half width of the band by split
     conformal prediction. The width is constant, or grows with the speed of the modelled output,
     whichever is narrower in cross-validation. ``banded.at(0.9)`` chooses the level; n units allow
-    n / (n + 1). On motion of another kind than the recordings' no level is guaranteed: bands of 90 % on
-    eight virtual plants held 94 % of such samples on average, in a tenth of the cases less than 88 %.
+    n / (n + 1). On motion of another kind than the recordings' no level is guaranteed.
 
     Parameters
     ----------

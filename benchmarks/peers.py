@@ -33,7 +33,7 @@ import pandas as pd
 
 from mckibben import compare
 from mckibben.blocks.free_run import run_free
-from mckibben.comparison.channels import Channels
+from mckibben.channels import Channels
 from mckibben.errors import MckibbenError
 from mckibben.measured.scoring import START, Part, entries, parts_of
 from mckibben.measured.sets import Set, chosen_in

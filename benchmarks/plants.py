@@ -32,7 +32,7 @@ from mckibben import Recording, registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.free_run import run_free
-from mckibben.comparison.channels import Channels
+from mckibben.channels import Channels
 from mckibben.comparison.fitting import Candidate
 from mckibben.comparison.planning import objections
 from mckibben.estimators.core.estimator import Estimator

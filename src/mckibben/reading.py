@@ -25,7 +25,7 @@ Data = Recording | str | Path | Sequence[Recording | str | Path]
 
 def prepared(recordings: list[Recording], reading: ReadOptions) -> list[Recording]:
     """Return recordings cut, resampled and zeroed."""
-    from mckibben.comparison.channels import recognised
+    from mckibben.channels import recognised
     from mckibben.signals import cut, resample, zeroed
 
     if reading.between is not None:
@@ -111,7 +111,7 @@ def read_sides(
     DataError
         As `mckibben.read`, of the channels that are needed.
     """
-    from mckibben.comparison.channels import channels_of
+    from mckibben.channels import channels_of
 
     reading = reading or ReadOptions()
     named = [*(inputs or ()), *(outputs or ()), *([load] if load else ())]
@@ -147,7 +147,7 @@ def read_pair(
     DataError
         If a channel is missing, or is that of several muscles.
     """
-    from mckibben.comparison.channels import channels_of
+    from mckibben.channels import channels_of
 
     named = [name for name in (input, output, *others) if name]
     with warnings.catch_warnings(record=True) as caught:

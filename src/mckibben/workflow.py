@@ -83,8 +83,8 @@ def fit(
 ) -> Fit:
     """Identify one model, by its short name, such as ``"gpi"``."""
     from mckibben.blocks.compose import Parallel
-    from mckibben.comparison.shared_rows import check_shared
     from mckibben.estimators.catalogue import settings_of
+    from mckibben.signals.shared_rows import check_shared
 
     chosen, reading = _chosen(FitOptions, options, reading, given)
     settings = settings_of(model, chosen.settings)

@@ -10,7 +10,7 @@ import pytest
 
 from mckibben import GPI, Recording, compare
 from mckibben.arrays import Array
-from mckibben.comparison.channels import Channels
+from mckibben.channels import Channels
 from mckibben.comparison.choosing import CAUTION
 from mckibben.comparison.doubts import Span, doubts_of
 from mckibben.comparison.leaderboard import Row

@@ -11,7 +11,7 @@ import pytest
 
 from mckibben import GPI, DataError, ModelError, Recording, compare, registry
 from mckibben.blocks.free_run import run_free
-from mckibben.comparison.channels import Channels
+from mckibben.channels import Channels
 from mckibben.comparison.choosing import USEFUL, order, recommended
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.splits import held_out_part

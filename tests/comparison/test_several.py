@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, DataError, Recording, compare
-from mckibben.comparison.channels import Channels, channels_of, with_dead_loads_scheduled
+from mckibben.channels import Channels, channels_of, with_dead_loads_scheduled
 from mckibben.comparison.planning import plan_of
 from mckibben.comparison.splits import held_out
 from mckibben.signals import triangle

@@ -14,7 +14,7 @@ import pytest
 import mckibben
 from mckibben import ModelError, Recording, registry
 from mckibben.blocks.force.feedforward import compensator
-from mckibben.comparison.channels import Channels
+from mckibben.channels import Channels
 from mckibben.comparison.fitting import Candidate
 from mckibben.comparison.leaderboard import inverse_of
 from mckibben.comparison.planning import objections

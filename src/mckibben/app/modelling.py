@@ -12,7 +12,7 @@ from typing import Any
 from mckibben import registry, workflow
 from mckibben.app.jobs import Tell
 from mckibben.app.workspace import Workspace
-from mckibben.comparison.channels import Channels, with_dead_loads_scheduled, with_loads_scheduled
+from mckibben.channels import Channels, with_dead_loads_scheduled, with_loads_scheduled
 from mckibben.comparison.choosing import recommended
 from mckibben.comparison.fitting import Candidate
 from mckibben.comparison.planning import objections, plan_of

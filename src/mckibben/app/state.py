@@ -15,7 +15,7 @@ from mckibben.app.jobs import Jobs
 from mckibben.app.modelling import sides_of
 from mckibben.app.widgets import shielded
 from mckibben.app.workspace import Workspace
-from mckibben.comparison.channels import Channels, channels_of
+from mckibben.channels import Channels, channels_of
 from mckibben.errors import DataError
 
 _VIEWS: list[Any] = []

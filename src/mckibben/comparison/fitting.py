@@ -14,7 +14,7 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.free_run import run_free
-from mckibben.comparison.channels import Channels
+from mckibben.channels import Channels
 from mckibben.comparison.choosing import CONSTANT, skill_of
 from mckibben.comparison.leaderboard import Row
 from mckibben.comparison.memory_test import Memory, memory_test

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from mckibben import registry
+from mckibben.channels import Channels, Names, channels_of
 from mckibben.checkpoints import Checkpoints
-from mckibben.comparison.channels import Channels, Names, channels_of
 from mckibben.comparison.fitting import Candidate, Constant, Data, constant_of
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.parts import parts_of, spans_of
-from mckibben.comparison.shared_rows import check_shared
 from mckibben.comparison.splits import Split, split_of
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.catalogue import declared
@@ -24,6 +23,7 @@ from mckibben.estimators.core.estimator import Estimator
 from mckibben.numerals import counted
 from mckibben.recording import Recording, listed, reading_notes
 from mckibben.signals import made_manageable
+from mckibben.signals.shared_rows import check_shared
 
 Settings = Mapping[str, Mapping[str, Any]]
 

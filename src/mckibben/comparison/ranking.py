@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.channels import Names
 from mckibben.checkpoints import Checkpoints, source
-from mckibben.comparison.channels import Names
 from mckibben.comparison.choosing import CONSTANT
 from mckibben.comparison.fitting import (
     FitResult,

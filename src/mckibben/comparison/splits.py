@@ -10,11 +10,11 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.free_run import Mask
-from mckibben.comparison.channels import Channels, held_at_levels
+from mckibben.channels import Channels, held_at_levels
 from mckibben.errors import DataError
 from mckibben.numerals import counted
 from mckibben.recording import Recording
-from mckibben.signals import reversals
+from mckibben.signals.reversals import reversals
 
 FEWEST = 10
 """Smallest number of samples on either side of a split."""

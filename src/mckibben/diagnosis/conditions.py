@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.channels import schedules
 from mckibben.diagnosis.tracks import FEWEST
-from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, moves
 from mckibben.statistics import hats

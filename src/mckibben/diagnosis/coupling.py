@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.comparison.channels import Channels, any_moves, moved_by
+from mckibben.channels import Channels, any_moves, moved_by
 from mckibben.recording import Recording
 from mckibben.statistics import dependence
 

@@ -14,16 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mckibben.comparison.channels import channels_of
-from mckibben.comparison.shared_rows import without_copies
+from mckibben.channels import channels_of, schedules
 from mckibben.diagnosis.excitation import Excitation, extremes
 from mckibben.errors import DataError
-from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording, listed
+from mckibben.signals.shared_rows import without_copies
 from mckibben.statistics import dependence
 
 if TYPE_CHECKING:
-    from mckibben.comparison.channels import Names
+    from mckibben.channels import Names
 
 FEWEST_SAMPLES, MOST_SAMPLES = 10, 20_000
 """Smallest number of samples of a recording, and largest number used for correlations."""

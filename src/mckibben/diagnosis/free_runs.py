@@ -11,9 +11,9 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, check_units
 from mckibben.blocks.free_run import refuse_runaway, run_free
-from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError
 from mckibben.recording import Recording
+from mckibben.signals.shared_rows import check_shared
 
 FEWEST, SHORTEST = 60, 10
 """Smallest number of samples that can be tested, in total and per recording."""

@@ -15,7 +15,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.free_run import run_free
 from mckibben.blocks.inverse import Inverse
-from mckibben.comparison.channels import Channels
+from mckibben.channels import Channels
 from mckibben.comparison.parts import parts_of
 from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.estimators.catalogue import declared

@@ -20,11 +20,11 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import MEASURED, FeedforwardFeedback
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.starts import start_state
-from mckibben.comparison.shared_rows import check_shared
 from mckibben.control.twin import COMMAND
 from mckibben.diagnosis.refit import Refit, refitted
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.recording import Recording, listed, sample_time_of
+from mckibben.signals.shared_rows import check_shared
 from mckibben.statistics import NORMAL_95, block_length, correlation_length
 from mckibben.system.showing import DrawsItself
 

@@ -12,7 +12,7 @@ import pandas as pd
 
 from mckibben.arrays import Array
 from mckibben.blocks.free_run import Mask
-from mckibben.comparison.channels import Channels, channels_of
+from mckibben.channels import Channels, channels_of
 from mckibben.comparison.memory_test import gap_ratio, paired_gaps
 from mckibben.comparison.splits import Split, split_of
 from mckibben.errors import DataError

@@ -13,7 +13,7 @@ import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.free_run import run_free
-from mckibben.comparison.channels import Channels, any_moves, channels_of
+from mckibben.channels import Channels, any_moves, channels_of
 from mckibben.control.identified import known_ranges
 from mckibben.diagnosis.coupling import coupling
 from mckibben.errors import DataError, ModelError

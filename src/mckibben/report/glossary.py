@@ -61,7 +61,7 @@ MODELS = {
 COMPARISON = {
     "free-run simulation": "simulation from inputs only; no measured output after the first sample",
     "one-step prediction": "prediction from measured past outputs; its errors are smaller",
-    "CV RMSE": "geometric mean of the errors on parts of the training data left out; it selects the model",
+    "CV RMSE": "geometric mean of errors on parts of the training data left out; it selects the model",
     "validation RMSE": "root-mean-square error on data left out of a fit; it selects the model",
     "fit RMSE": "root-mean-square error on the fitted data",
     "test RMSE": "root-mean-square error on the test data, which are not used in the selection",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mckibben.comparison.channels import any_moves
+from mckibben.channels import any_moves
 from mckibben.diagnosis.check import Validation
 from mckibben.diagnosis.coupling import coupling
 from mckibben.numerals import numeral

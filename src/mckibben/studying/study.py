@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.comparison.channels import moved_by
+from mckibben.channels import moved_by
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.planning import plan_of
 from mckibben.comparison.ranking import Standing, ranked

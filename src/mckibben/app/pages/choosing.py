@@ -13,7 +13,7 @@ from mckibben.app.modelling import Offered
 from mckibben.app.state import State
 from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
-from mckibben.comparison.channels import Channels
+from mckibben.channels import Channels
 from mckibben.estimators.catalogue import Need, ability, declared, full_name
 
 INVERSES = {

@@ -15,7 +15,7 @@ from mckibben.app.pages import parts
 from mckibben.app.state import State, view
 from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
-from mckibben.comparison.channels import Channels
+from mckibben.channels import Channels
 from mckibben.diagnosis.characterization import characterize
 from mckibben.diagnosis.coupling import Coupling, coupling
 from mckibben.diagnosis.data_gaps import data_gaps

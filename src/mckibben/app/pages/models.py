@@ -18,7 +18,7 @@ from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
 from mckibben.arrays import Array
 from mckibben.blocks.free_run import run_free
-from mckibben.comparison.channels import Channels
+from mckibben.channels import Channels
 from mckibben.diagnosis.coupling import coupling
 from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.estimators.catalogue import full_name

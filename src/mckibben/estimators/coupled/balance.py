@@ -22,6 +22,7 @@ from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance, balance_in
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import rows, vector
+from mckibben.channels import schedules
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.estimator import Grid
@@ -48,7 +49,7 @@ from mckibben.estimators.coupled.balance_prior import (
 from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
-from mckibben.estimators.coupled.base import CoupledEstimator, of_channels, schedules
+from mckibben.estimators.coupled.base import CoupledEstimator, of_channels
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.muscles.traits import TRAVELS
 from mckibben.recording import Recording, listed

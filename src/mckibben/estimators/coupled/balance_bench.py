@@ -11,11 +11,11 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel
 from mckibben.blocks.memoryless import Affine
+from mckibben.channels import LOADS
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_problem import held
 from mckibben.estimators.coupled.balance_structure import Bench
-from mckibben.estimators.coupled.base import LOADS
 from mckibben.recording import Recording
 
 ALIKE = 0.02

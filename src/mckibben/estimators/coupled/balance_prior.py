@@ -12,10 +12,10 @@ import numpy as np
 from pydantic import InstanceOf
 
 from mckibben.arrays import Array
+from mckibben.channels import LOADS
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.coupled.balance_structure import Bench, Structure
-from mckibben.estimators.coupled.base import LOADS
 from mckibben.muscles.prior import Prior, prior_of
 from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import TIMES, traits

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -12,17 +11,12 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.channels import loads_among, numbered, one, schedules
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Mask, Run, TrainingData, training_data
 from mckibben.estimators.core.estimator import Estimator, resting
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed
-
-SCHEDULES = ("pressure_extensor", "force", "torque")
-"""Default scheduling channels."""
-
-LOADS = ("N", "N*m")
-"""Units of loads on muscles or a joint, which are not scheduling inputs."""
 
 MOVES = 0.1
 """Share of its range over all runs that an input must cover to move in a run."""
@@ -289,42 +283,3 @@ def in_any(
 ) -> tuple[str, ...]:
     """Return the channels of so many muscles that any recording has."""
     return max((named(recording) for recording in recordings), key=len)
-
-
-def schedules(recordings: Sequence[Recording], others: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the default scheduling channels of any recording, with exceptions.
-
-    Of forces and torques there may be several, with numbers.
-    """
-    found = dict.fromkeys(
-        name
-        for quantity in SCHEDULES
-        for recording in recordings
-        for name in (*one(recording, quantity), *numbered(recording, quantity))
-    )
-    return tuple(name for name in found if name not in others)
-
-
-def loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tuple[str, ...]:
-    """Return forces that are loads: given, and not commanded."""
-    found = tuple(
-        name
-        for name in inputs
-        if any(name in one and one.units[name] in LOADS for one in recordings)
-    )
-    return found if len(found) < len(inputs) else ()
-
-
-def one(recording: Recording, *names: str) -> tuple[str, ...]:
-    """Return the first of some channels that a recording has, if any."""
-    return tuple(name for name in names if name in recording)[:1]
-
-
-def numbered(recording: Recording, quantity: str) -> tuple[str, ...]:
-    """Return the channels ``quantity_1``, ``quantity_2`` ... of a recording, in order."""
-    found = {
-        int(match.group(1)): name
-        for name in recording.channels
-        if (match := re.fullmatch(rf"{quantity}_(\d+)", name))
-    }
-    return tuple(found[number] for number in sorted(found))

@@ -14,10 +14,10 @@ from mckibben.blocks.compose import Parallel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import vector
 from mckibben.blocks.parameters import Parametrised
+from mckibben.channels import schedules
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Grid, Start, resting
-from mckibben.estimators.coupled.base import schedules
 from mckibben.estimators.dynamics.prediction_error import (
     Beginning,
     Orders,

@@ -10,7 +10,6 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.estimators.coupled.base import loads_among, schedules
 from mckibben.recording import Recording
 
 Names = str | Sequence[str] | None
@@ -36,6 +35,12 @@ PLACES = "[a-z]|left|right|top|bottom|upper|lower|front|back|rear|flexor|extenso
 
 DESIRED = ("reference_", "command_")
 """Prefixes of references of a loop, which are not measurements."""
+
+SCHEDULES = ("pressure_extensor", "force", "torque")
+"""Default scheduling channels."""
+
+LOADS = ("N", "N*m")
+"""Units of loads on muscles or a joint, which are not scheduling inputs."""
 
 FORCE, PRESSURE, OF_FORCE = "force", "pressure", ("length", "displacement")
 """Channels of force laws: the first of these that is present, with the pressure."""
@@ -323,3 +328,42 @@ def _named(
             return (given,)
         return tuple(name for name in by_name if name.startswith(f"{given}_")) or (given,)
     return tuple(given)
+
+
+def schedules(recordings: Sequence[Recording], others: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the default scheduling channels of any recording, with exceptions.
+
+    Of forces and torques there may be several, with numbers.
+    """
+    found = dict.fromkeys(
+        name
+        for quantity in SCHEDULES
+        for recording in recordings
+        for name in (*one(recording, quantity), *numbered(recording, quantity))
+    )
+    return tuple(name for name in found if name not in others)
+
+
+def loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tuple[str, ...]:
+    """Return forces that are loads: given, and not commanded."""
+    found = tuple(
+        name
+        for name in inputs
+        if any(name in one and one.units[name] in LOADS for one in recordings)
+    )
+    return found if len(found) < len(inputs) else ()
+
+
+def one(recording: Recording, *names: str) -> tuple[str, ...]:
+    """Return the first of some channels that a recording has, if any."""
+    return tuple(name for name in names if name in recording)[:1]
+
+
+def numbered(recording: Recording, quantity: str) -> tuple[str, ...]:
+    """Return the channels ``quantity_1``, ``quantity_2`` ... of a recording, in order."""
+    found = {
+        int(match.group(1)): name
+        for name in recording.channels
+        if (match := re.fullmatch(rf"{quantity}_(\d+)", name))
+    }
+    return tuple(found[number] for number in sorted(found))

@@ -11,8 +11,8 @@ import pytest
 
 import mckibben
 from mckibben import GPI, DataError, Recording
-from mckibben.comparison.shared_rows import check_shared, shared_rows, without_copies
 from mckibben.signals import irregular_triangle, triangle
+from mckibben.signals.shared_rows import check_shared, shared_rows, without_copies
 
 STEP = 0.02
 TIME = np.arange(0, 24, STEP)

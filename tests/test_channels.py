@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import Recording
-from mckibben.comparison.channels import Channels, channels_of, recognised, varies
+from mckibben.channels import Channels, channels_of, recognised, varies
 
 T = np.linspace(0.0, 9.0, 50)
 

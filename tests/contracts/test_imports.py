@@ -15,7 +15,7 @@ SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
     {"errors", "arrays", "registry", "presets", "numerals", "version", "system"},
-    {"recording", "signals", "metrics", "statistics"},
+    {"recording", "signals", "channels", "metrics", "statistics"},
     {"files"},
     {"rigs"},
     {"blocks"},

@@ -10,7 +10,7 @@ import pytest
 
 from mckibben import Recording
 from mckibben.blocks.hysteresis.gpi import GPI
-from mckibben.comparison.memory_test import hold_test
+from mckibben.diagnosis.branch_gaps import hold_test
 from mckibben.estimators.core.data import training_data
 from mckibben.estimators.dynamics.narx import (
     FreeRuns,

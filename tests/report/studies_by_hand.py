@@ -15,8 +15,8 @@ from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
 from mckibben.blocks.memoryless import PiecewiseLinear
 from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.comparison.memory_test import Memory
 from mckibben.diagnosis import characterize
+from mckibben.diagnosis.branch_gaps import Memory
 from mckibben.metrics import score
 from mckibben.recording import Recording
 from mckibben.signals import triangle

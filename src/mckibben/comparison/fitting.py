@@ -17,10 +17,10 @@ from mckibben.blocks.free_run import run_free
 from mckibben.channels import Channels
 from mckibben.comparison.choosing import CONSTANT, skill_of
 from mckibben.comparison.leaderboard import Row
-from mckibben.comparison.memory_test import Memory, memory_test
 from mckibben.comparison.parts import Part
 from mckibben.comparison.splits import Split
 from mckibben.diagnosis.bands import Held
+from mckibben.diagnosis.branch_gaps import Memory, memory_test
 from mckibben.errors import MckibbenError, unforeseen
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.leaving_out import held_out

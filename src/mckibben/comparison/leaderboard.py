@@ -14,8 +14,8 @@ from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.inverse import Inverse
 from mckibben.comparison.choosing import CONSTANT, Against, order, recommended
 from mckibben.comparison.doubts import Doubt, Span, doubts_of
-from mckibben.comparison.memory_test import Memory
 from mckibben.diagnosis.bands import TestedBand
+from mckibben.diagnosis.branch_gaps import Memory
 from mckibben.errors import MckibbenError
 from mckibben.metrics import Scores
 from mckibben.system.showing import DrawsItself

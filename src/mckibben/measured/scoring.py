@@ -13,8 +13,8 @@ import pandas as pd
 from mckibben.arrays import Array
 from mckibben.blocks.free_run import Mask
 from mckibben.channels import Channels, channels_of
-from mckibben.comparison.memory_test import gap_ratio, paired_gaps
 from mckibben.comparison.splits import Split, split_of
+from mckibben.diagnosis.branch_gaps import gap_ratio, paired_gaps
 from mckibben.errors import DataError
 from mckibben.files import write
 from mckibben.measured.running import span_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, PI, Recording
-from mckibben.comparison.memory_test import branch_gaps, memory_test
+from mckibben.diagnosis.branch_gaps import branch_gaps, memory_test
 from mckibben.signals import triangle
 
 U = triangle(np.arange(0, 24, 0.01), 6.0, [5.0, 4.0, 3.0, 2.0])

@@ -15,7 +15,11 @@ from mckibben.arrays import NARROWEST, Array
 from mckibben.errors import ModelError
 
 Rule = Literal["first_sample", "virgin"]
-"""Name of a start state."""
+"""Name of a start state: at rest at the first input, or as if nothing had ever happened.
+
+As the field of a block the first is used where no measured output determines another start, see
+`mckibben.blocks.starts`; as an argument of `simulate` it is used as stated.
+"""
 
 Initial = Rule | Sequence[float] | Array
 """State before the first sample."""

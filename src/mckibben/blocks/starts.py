@@ -36,12 +36,20 @@ EXPLAINED = 1e-9
 
 def start_state(block: Block, recording: Recording) -> Array:
     """Return the state before the first sample of a recording, shape (n_states,)."""
-    inputs = np.ascontiguousarray(recording.matrix(channel.name for channel in block.inputs))
-    outputs = first_outputs(block, recording)
-    known = None if outputs is None else block.state_at(inputs[0], outputs)
+    known = known_state(block, recording)
     if known is not None:
         return known
-    return state_after(block, history(block, recording), inputs[0], recording.sample_time)
+    first = recording.matrix(channel.name for channel in block.inputs)[0]
+    return state_after(block, history(block, recording), first, recording.sample_time)
+
+
+def known_state(block: Block, recording: Recording) -> Array | None:
+    """Return the state of a block of past outputs, shape (n_states,), which the first one gives."""
+    outputs = first_outputs(block, recording)
+    if outputs is None:
+        return None
+    first = recording.matrix(channel.name for channel in block.inputs)[0]
+    return block.state_at(first, outputs)
 
 
 def history(block: Block, recording: Recording) -> Array:
@@ -51,7 +59,7 @@ def history(block: Block, recording: Recording) -> Array:
     """
     inputs = recording.matrix(channel.name for channel in block.inputs)
     outputs, first = first_outputs(block, recording), inputs[0]
-    if outputs is None or block.n_driven != 1 or block.state_at(first, outputs) is not None:
+    if outputs is None or block.n_driven != 1 or known_state(block, recording) is not None:
         return np.empty((0, inputs.shape[1]))
     step = recording.sample_time
     missed = outputs - _outputs(block, first[np.newaxis], step)[-1]

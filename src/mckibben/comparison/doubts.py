@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.comparison.choosing import CAUTION
 
 if TYPE_CHECKING:
@@ -45,9 +46,11 @@ class Doubt:
     model : str
         That model: another one, or of a bad part the chosen one.
     ratio : float
-        Error of the chosen model over the other's; of a bad part, over its cross-validated error.
+        Error of the chosen model over the other's on the test; of a bad part, over its cross-validated
+        error; of a level model, its error over the chosen one's in the cross-validation, as they count
+        in the choice.
     interval : (float, float) or None
-        95 % interval of the other model's error over the chosen one's in the cross-validation.
+        95 % interval of the last.
     spans : tuple of Span
         The bad part, or that on which two level models differ most; empty where the test is meant.
     """
@@ -98,18 +101,18 @@ def doubts_of(
         if low <= 0:
             places = int(np.argmax(np.abs(ratios)))
             ends = float(np.exp(low)), float(np.exp(high))
-            ratio = float(np.exp(-ratios.mean()))
+            ratio = float(np.exp(ratios.mean()))
             found.append(Doubt("level", second.model, ratio, ends, tuple(parts[places])))
     return tuple(found)
 
 
-def _counted(row: Row) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _counted(row: Row) -> Array:
     """Return the errors on all parts as they count in the choice."""
     least = np.finfo(float).tiny
-    return np.maximum(row.validation_by_part, least) * (CAUTION if row.doubted else 1.0)
+    return np.asarray(np.maximum(row.validation_by_part, least) * (CAUTION if row.doubted else 1.0))
 
 
-def _interval(values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[float, float]:
+def _interval(values: Array) -> tuple[float, float]:
     """Return the interval of the mean of independent values, by Student's t."""
     from scipy.special import stdtrit
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.free_run import run_free
 from mckibben.channels import Channels
 from mckibben.comparison.choosing import CONSTANT, skill_of
-from mckibben.comparison.leaderboard import Row
+from mckibben.comparison.leaderboard import Row, Validated
 from mckibben.comparison.parts import Part
 from mckibben.comparison.splits import Split
 from mckibben.diagnosis.bands import Held
@@ -41,11 +41,6 @@ PIECES = 4
 
 LEAST_ERROR = 1e-300
 """Error of a part below which it is this, so that it has a logarithm."""
-
-Validated = Literal["step", "fit"]
-"""How the error on a part was found: of the model as it would be without the part; or, of models too
-large for that, of the model fitted to all.
-"""
 
 
 @dataclass(frozen=True)
@@ -146,8 +141,8 @@ class FitResult:
     ----------
     predictions : tuple of array, shape (n, k)
         Outputs over every recording of the parts, a part's by the model as it would be without it.
-    validated : {"step", "fit"}
-        How these were found.
+    validated : {"step", "given", "fit"}
+        How these were found; see `Row`.
     reason : str or None
         Why the model failed.
     block : Block or None
@@ -231,7 +226,9 @@ def _held_out(
     """Return the outputs over the recordings of the parts, each part by the model without it."""
     block, train, names = estimator.fitted, data.split.train, data.channels.outputs
     if data.checks:
-        return tuple(run_free(block, recording, names) for recording in data.checks), "step"
+        return tuple(run_free(block, recording, names) for recording in data.checks), "given"
+    if not data.parts:
+        return tuple(outputs[: len(train)]), "fit"
     found = held_out(estimator, train, data.parts)
     if found is None:
         return tuple(outputs[: len(train)]), "fit"

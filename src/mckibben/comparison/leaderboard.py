@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+Validated = Literal["step", "given", "fit"]
+"""How the error on a part was found; see `Row`."""
+
+
 @dataclass(frozen=True)
 class Row:
     """One model of a leaderboard.
@@ -54,9 +58,10 @@ class Row:
         RMSE on every part, of several outputs their mean.
     validation_failed : str or None
         Why the cross-validation failed, or None.
-    validated : {"step", "fit"}
-        How these errors were found: of the model as it would be without the part; or, of one with too
-        many parameters for that, of the model fitted to all, and counted `CAUTION` times.
+    validated : {"step", "given", "fit"}
+        How these errors were found: of the model as it would be without the part; on validation
+        recordings; or, of a model with too many parameters for a step, of the fit to all, and counted
+        `CAUTION` times.
     caution : str or None
         Why the model is reliable only near its training data, or None.
     skill, skill_least : float or None
@@ -93,7 +98,7 @@ class Row:
     validation_by_output: Mapping[str, float] = field(default_factory=dict)
     validation_by_part: tuple[float, ...] = ()
     validation_failed: str | None = None
-    validated: Literal["step", "fit"] = "step"
+    validated: Validated = "step"
     caution: str | None = None
     skill: float | None = None
     skill_least: float | None = None
@@ -135,7 +140,8 @@ class Row:
     @property
     def doubted(self) -> bool:
         """Whether the error counts `CAUTION` times in the choice."""
-        return self.caution is not None or self.validated == "fit"
+        too_large = self.validated == "fit" and bool(self.validation_by_part)
+        return self.caution is not None or too_large
 
     @cached_property
     def inverse(self) -> Block | None:
@@ -235,9 +241,9 @@ class Leaderboard(DrawsItself):
         The seed of everything random.
     n_train, n_test : int
         Samples.
-    chosen_by : {"cross-validation", "validation", "given", "fit"}
-        What the model is chosen by: parts of the training data left out in turn, the last of them,
-        recordings given for it, or, for want of these, the error on the data fitted; never the test.
+    chosen_by : {"cross-validation", "given", "fit"}
+        What the model is chosen by: parts of the training data left out in turn, recordings given for
+        it, or, for want of these, the error on the data fitted; never the test.
     left_out : mapping of str to str
         Models that were not asked for by name and do not apply to these channels, and why.
     pending : tuple of str

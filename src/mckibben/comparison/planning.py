@@ -1,4 +1,4 @@
-"""Set-up of a comparison: applicable models, channels, split and folds."""
+"""Set-up of a comparison: applicable models, channels, split and parts."""
 
 from __future__ import annotations
 

@@ -152,7 +152,7 @@ def compare(
     found : callable, optional
         Called with the leaderboard of the finished models after each one.
     watch : callable, optional
-        Called, while a model is fitted, with its name, the share done of its fits, and the least cost
+        Called, while a model is fitted, with its name, the share done of its fit, and the least cost
         so far.
 
     Returns

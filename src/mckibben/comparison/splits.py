@@ -1,4 +1,4 @@
-"""Splits of data into fit, validation and test."""
+"""Splits of data into fit and test."""
 
 from __future__ import annotations
 

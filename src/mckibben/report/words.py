@@ -82,15 +82,15 @@ def doubtful(board: Leaderboard) -> str:
     where = " and ".join(map(spanned, doubt.spans[:2])) + " …" * (len(doubt.spans) > 2)
     if doubt.kind == "part":
         return (
-            f"The choice is doubtful: on {where}, {doubt.model} fitted without it has {ratio} times its "
-            "error elsewhere. Another recording of that motion would decide."
+            f"The choice is doubtful: the error of {doubt.model} on {where} is {ratio} times its CV "
+            "RMSE. Another recording of that motion would decide."
         )
     assert doubt.interval is not None
     low, high = (numeral(end, 2) for end in doubt.interval)
     return (
-        f"The choice is doubtful: {doubt.model} has {numeral(1 / doubt.ratio, 2)} times the error of "
-        f"{chosen_model} in the cross-validation (95 % interval {low} to {high}). They differ most on "
-        f"{where}: another recording of that motion would decide."
+        f"The choice is doubtful: in the cross-validation {doubt.model} counts {ratio} times the error "
+        f"of {chosen_model} (95 % interval {low} to {high}). They differ most on {where}: another "
+        "recording of that motion would decide."
     )
 
 

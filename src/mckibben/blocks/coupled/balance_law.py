@@ -230,7 +230,7 @@ def friction(
     return force, by_p
 
 
-@kernel
+@short_kernel
 def resistance(
     c: Array,
     k: int,
@@ -244,11 +244,14 @@ def resistance(
 ) -> tuple[float, float, float]:
     """Fill the terms of muscle k and their slopes by y; return their force, its slope, and its size."""
     n, m, n_s, n_l, n_e, n_a = int(c[0]), int(c[1]), int(c[5]), int(c[6]), int(c[7]), int(c[8])
-    own, width, rate, first = muscle_at(c, k), n_terms(c), c[15], DYNAMIC + n_e
+    own, width, rate, scale, first = muscle_at(c, k), n_terms(c), c[15], c[10], DYNAMIC + n_e
     place = own + OWN + m
     before = shortening(c, k, state)
     moved = y - before
-    for i in range(first):
+    a, narrowing = area(c, k, y)
+    rubbed = friction(c, k, state, way, y, p, x, terms, by_y)[0]
+    force, slope, size = rubbed - p * a, -p * narrowing, abs(rubbed) + abs(p * a)
+    for i in range(DYNAMIC - 1):
         terms[i] = 0.0
         by_y[i] = 0.0
     if way == IN_TIME and rate > 0.0:
@@ -265,45 +268,40 @@ def resistance(
     terms[3] = y
     by_y[3] = 1.0
     inside = min(max(y, c[own]), c[own + 1])
-    u, beyond = inside / c[10], y - inside
+    u, beyond = inside / scale, y - inside
     power = u
-    for i in range(DYNAMIC, first):
-        by_y[i] = (i - DYNAMIC + 2) * power / c[10]
-        power *= u
-        terms[i] = power + by_y[i] * beyond
+    for i in range(first):
+        term, by = terms[i], by_y[i]
+        if i >= DYNAMIC:
+            by = (i - DYNAMIC + 2) * power / scale
+            power *= u
+            term = power + by * beyond
+        terms[i], by_y[i], part = term, by, c[place + i] * term
+        force += part
+        size += abs(part)
+        slope += c[place + i] * by
     power = 1.0
     terms[first] = -p
     by_y[first] = 0.0
     for i in range(first + 1, first + n_a):
-        by_y[i] = -p * (i - first) * power / c[10]
+        by_y[i] = -p * (i - first) * power / scale
         power *= u
         terms[i] = -p * power + by_y[i] * beyond
-    rubbed = friction(c, k, state, way, y, p, x, terms, by_y)[0]
+    for i in range(first + n_a, width - n_l):
+        slope += c[place + i] * by_y[i]
     for i in range(n_l):
-        gain = c[HEAD + n_s + n_l + i] if way == IN_TIME else c[17]
-        terms[width - n_l + i] = 0.0
-        by_y[width - n_l + i] = 0.0
+        at, term, gain = width - n_l + i, 0.0, 0.0
         if way != AT_REST:
-            behind = state[m + n + n * n_s + k * n_l + i]
-            terms[width - n_l + i] = c[HEAD + n_s + i] * behind + gain * moved
-            by_y[width - n_l + i] = gain
-    a, narrowing = area(c, k, y)
-    force, slope, size = rubbed - p * a, -p * narrowing, abs(rubbed) + abs(p * a)
-    for i in range(first):
-        part = c[place + i] * terms[i]
+            gain = c[HEAD + n_s + n_l + i] if way == IN_TIME else c[17]
+            term = c[HEAD + n_s + i] * state[m + n + n * n_s + k * n_l + i] + gain * moved
+        terms[at], by_y[at], part = term, gain, c[place + at] * term
         force += part
         size += abs(part)
-        slope += c[place + i] * by_y[i]
-    for i in range(width - n_l, width):
-        part = c[place + i] * terms[i]
-        force += part
-        size += abs(part)
-    for i in range(first + n_a, width):
-        slope += c[place + i] * by_y[i]
+        slope += c[place + at] * gain
     return force, slope, size
 
 
-@kernel
+@short_kernel
 def muscle_force(
     c: Array,
     k: int,

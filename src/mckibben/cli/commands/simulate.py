@@ -46,7 +46,7 @@ def simulate(
     found = simulated(
         saved(model, fields),
         lambda names: read_files(file, names, reading),
-        initial=None if initial in ("measured", "model") else initial,
+        initial=None if initial == "measured" else initial,
         interval=interval,
     )
     write(found.recording.with_meta(model=str(model)), out)

@@ -569,8 +569,8 @@ class SearchEstimator(Estimator):
     input, output : str
         Channels to learn from.
     initial : {"first_sample", "virgin"}
-        Memory before the first sample of every recording: at rest at the first input, or as if nothing
-        had ever happened.
+        Memory before the first sample of every recording: what its first output determines, else at rest
+        at the first input; or as if nothing had ever happened.
     """
 
     input: str = "pressure"

@@ -10,10 +10,9 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.fields import Initial
 from mckibben.blocks.free_run import PERIODIC, Mask, run_free
 from mckibben.blocks.running import run_many
-from mckibben.blocks.starts import history, start_state
+from mckibben.blocks.starts import history, known_state
 from mckibben.metrics import rmse
 from mckibben.recording import Recording
 
@@ -66,23 +65,22 @@ class FreeRuns:
     at_rest: bool = False
 
     @cached_property
-    def starts(self) -> list[tuple[Array, Initial | None]]:
-        """Inputs before every recording, shape (k, inputs), and the state before these."""
+    def known(self) -> list[Recording]:
+        """The recordings with the outputs that runs may begin from, or without."""
         inputs = [channel.name for channel in self.block.inputs]
-        found: list[tuple[Array, Initial | None]] = []
-        for place, (recording, rows) in enumerate(zip(self.recordings, self.rows, strict=True)):
-            block, known = self.changed(self.block, place), recording
-            if self.at_rest or not rows[0] or recording.meta.get(PERIODIC):
-                known = recording.select(inputs)
-            before = history(block, known)
-            state = None if len(before) else start_state(block, known).tolist()
-            found.append((before, state))
-        return found
+        pairs = zip(self.recordings, self.rows, strict=True)
+        return [
+            r.select(inputs) if self.at_rest or not rows[0] or r.meta.get(PERIODIC) else r
+            for r, rows in pairs
+        ]
 
-    @property
+    @cached_property
     def pasts(self) -> list[Array]:
         """Inputs before the first sample of every recording, shape (k, inputs) each."""
-        return [before for before, _ in self.starts]
+        return [
+            history(self.changed(self.block, place), known)
+            for place, known in enumerate(self.known)
+        ]
 
     @cached_property
     def from_rest(self) -> FreeRuns:
@@ -154,16 +152,25 @@ class FreeRuns:
     def simulated(self, blocks: Sequence[Block]) -> list[Array]:
         """Return the outputs of blocks over every recording, shape (blocks, n, m) each."""
         found = []
-        for place, (recording, (before, start)) in enumerate(
-            zip(self.recordings, self.starts, strict=True)
-        ):
+        for place, (recording, before) in enumerate(zip(self.recordings, self.pasts, strict=True)):
             own = [self.changed(block, place) for block in blocks]
             if recording.meta.get(PERIODIC):
                 found.append(np.array([run_free(block, recording, self.names) for block in own]))
                 continue
             inputs = recording.matrix(channel.name for channel in self.block.inputs)
             whole = np.ascontiguousarray(np.vstack([before, inputs]))
-            many = run_many(own, whole, sample_time=recording.sample_time, initial=start)
+            states = [known_state(block, self.known[place]) for block in own]
+            if states[0] is None:
+                many = run_many(own, whole, sample_time=recording.sample_time)
+            else:  # each from its own past outputs
+                pairs = zip(own, states, strict=True)
+                step = recording.sample_time
+                many = np.concatenate(
+                    [
+                        run_many([one], whole, sample_time=step, initial=state)
+                        for one, state in pairs
+                    ]
+                )
             found.append(many[:, len(before) :])
         return found
 

@@ -52,8 +52,8 @@ class SeparableEstimator(Estimator):
     input, output : str
         Channels to learn from.
     initial : {"first_sample", "virgin"}
-        Memory before the first sample of every recording: as if the input had only risen; or as if
-        nothing had ever happened.
+        Memory before the first sample of every recording: what its first output determines, else as if
+        the input had only risen; or as if nothing had ever happened.
     nonnegative : bool
         Whether each linear parameter is held at or above what `least` returns: by default 0, the first a
         little above it. Of most models that gives an inverse.
@@ -161,7 +161,8 @@ class SeparableEstimator(Estimator):
         if lower.size == 0:
             return lower
         if tracker.near is not None and tracker.near.shape == lower.shape:
-            return self._polish(np.clip(tracker.near, lower, upper), data, tracker)
+            tracker.near = self._polish(np.clip(tracker.near, lower, upper), data, tracker)
+            return tracker.near
         thin = data.thinned(SEARCH_SAMPLES)
         if self.searches_condensed:
             thin = thin.condensed()

@@ -146,15 +146,6 @@ def vanishing(parameters: Array) -> Array:
     return np.asarray(np.abs(parameters) <= NOTHING * relative_sizes(parameters))
 
 
-def inverted(slopes: Array) -> tuple[float, Array]:
-    """Return the condition of scaled sensitivities, shape (n, k), and the inverse of their products.
-
-    Rows and columns of what the slopes do not determine are NaN.
-    """
-    condition, inverse, determined = pseudo_inverse(slopes)
-    return condition, blanked(inverse, determined)
-
-
 def pseudo_inverse(slopes: Array) -> tuple[float, Array, NDArray[np.bool_]]:
     """Return condition, pseudo-inverse of the products, and which parameters are determined."""
     singular, right = np.linalg.svd(np.linalg.qr(slopes, mode="r"), full_matrices=False)[1:]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import compress
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -32,6 +33,7 @@ from mckibben.estimators.coupled.balance_bench import (
     check_numbers,
     directions,
     from_zero,
+    in_one_order,
     one_speed,
     only_forces,
     varying,
@@ -255,7 +257,7 @@ class BalanceEstimator(CoupledEstimator):
                 f"terms names {', '.join(sorted(unknown))}",
                 remedy=f"choose from {', '.join(TERMS)}",
             )
-        data, names = varying(data)
+        data, names = varying(in_one_order(data))
         tracker.notes += [
             f"{name} is about the same in all recordings, and is left out: record at other "
             "values too"
@@ -284,7 +286,7 @@ class BalanceEstimator(CoupledEstimator):
         structure = search.structure
         values = structure.expanded(z[: len(structure.terms)])
         balance = in_newtons(structure.block(values, final=True))
-        self.loads_ = np.zeros((1 + data.runs[-1].recording, structure.m))
+        self.loads_ = np.zeros((1 + max(run.recording for run in data.runs), structure.m))
         for run in data.runs:
             place = search.problem.loads_at(structure, run)
             if place.stop > place.start:
@@ -384,9 +386,7 @@ class BalanceEstimator(CoupledEstimator):
             if number == 0 and self.may("slack") and pushed:
                 search, z = self._slack(search, z)
             search = search.weighed(z)
-            active, z = search.chosen(z, tried & ~last)
-            if (active == search.active).all():
-                active, z = search.chosen(z, tried)
+            active, z = search.chosen(z, tried & ~last, tried)
             if (active == search.active).all() or number == ROUNDS - 1:
                 break
             search = replace(search, active=active)
@@ -487,9 +487,7 @@ class BalanceEstimator(CoupledEstimator):
         if self.unknown_load is not False:
             every = with_loads(every, scheduling)[0]
         runs = super().free_runs(block, every, rows)
-        if not self.loads_.any():
-            return runs
-        return replace(runs, changed=lambda own, place: under_load(own, self.loads_[place]))
+        return replace(runs, changed=partial(_loaded, self.loads_)) if self.loads_.any() else runs
 
 
 FIRST_OFFSET, TOWARDS, REFINED = 0.1, 60, 3
@@ -501,7 +499,7 @@ OF_TRAITS = ("elasticity", "areas", "friction", "relaxation")
 """Kinds of terms that a prior covers."""
 
 OWN_HELPS = 0.1
-"""Smallest relative reduction of errors by loads of recordings, or by settled starts."""
+"""Smallest relative reduction of errors by loads of recordings."""
 
 
 def _within(given_range: tuple[float, float] | None, block: Block) -> Block:
@@ -516,6 +514,11 @@ def fixed_in(block: Block) -> tuple[int, ...]:
     unit = shares[0] if len(shares) == 1 else r"area( of muscle 1)? at rest"
     given = re.compile(rf"gain|offset|hysteresis|dead time|side of obstacle .*|{unit}")
     return tuple(place for place, name in enumerate(names) if given.fullmatch(name))
+
+
+def _loaded(loads: Array, model: Block, place: int) -> Block:
+    """Return a model under the load of a recording, by its index."""
+    return under_load(model, loads[place])
 
 
 def under_load(model: Block, load: Array) -> Block:

@@ -84,6 +84,15 @@ def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:
     )
 
 
+def in_one_order(data: TrainingData) -> TrainingData:
+    """Return the same runs in an order that does not depend on how they were given.
+
+    Sums over runs are then equal to the last bit, and so are the terms that are chosen.
+    """
+    runs = sorted(data.runs, key=lambda run: (run.outputs.tobytes(), run.driven.tobytes()))
+    return replace(data, runs=tuple(replace(run, place=k) for k, run in enumerate(runs)))
+
+
 def only_forces(data: TrainingData) -> bool:
     """Return whether the one coordinate is held in every run, so that only the load is informative."""
     loads = sum(channel.unit in LOADS for channel in data.scheduled)
@@ -225,7 +234,7 @@ def one_speed(data: TrainingData) -> bool:
 def without_load(data: TrainingData, *, every: bool) -> tuple[int, ...]:
     """Return the recordings without a load that others have; or all but the first with it."""
     lacking = {run.recording for run in data.runs if run.unmeasured}
-    found = dict.fromkeys(run.recording for run in data.runs)
+    found = sorted({run.recording for run in data.runs})
     reference = next((one for one in found if one not in lacking), None)
     return tuple(one for one in found if one in lacking or (every and one != reference))
 

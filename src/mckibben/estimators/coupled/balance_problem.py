@@ -25,16 +25,11 @@ from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.coupled.constrained import constrained_least_squares
 
-EXACT, OF_AIR = (
-    ("friction_offset", "friction_slopes", "asymmetry", "lags", "places"),
-    ("filling", "venting", "dead", "contact"),
-)
-"""Nonlinear parameters with exact derivatives, in the order of `balance_slopes`; and those of the
-air.
-"""
+OF_AIR = ("filling", "venting", "dead", "contact")
+"""Nonlinear parameters of the air, the last; derivatives by all others are exact."""
 
 STEP, FIRST_STEP = 1e-4, 0.5
-"""Relative step for finite differences of nonlinear parameters, and of new ones."""
+"""Relative step for finite differences of parameters of the air, and of new ones."""
 
 RESTING = 0.1
 """Share of the pressure range up to which a run starts at rest."""
@@ -47,6 +42,9 @@ STRAIGHT = 0.01
 
 RIDGE = 1e-7
 """Ridge of least squares, relative to each coefficient's own effect."""
+
+LEAST_EFFECT = 0.01
+"""Effect of a coefficient, relative to that in others of a stack, that its ridge is of at least."""
 
 LEAST_AT_REST, PASSES = 0.1, 3
 """Smallest area at rest, relative to the mean over samples; number of reweightings of forces."""
@@ -211,36 +209,28 @@ class Problem:
         """Return the errors of every run, and derivatives by all unknowns, shape (errors, unknowns).
 
         Derivatives are computed only if some are ``wanted``. Those by parameters of the front are
-        finite differences of the acting pressures, with a large step for ``new`` ones; those by walls
-        and pushes are finite differences of the errors.
+        finite differences of the acting pressures, with a large step for ``new`` ones.
         """
         errors, slopes = list[Array](), [np.zeros((0, z.size))]
         if wanted is None:
             for run in self.runs:
                 errors.append(self.errors_of(structure, z, run, sloped=False)[0].ravel())
             return errors, slopes[0]
-        n, terms = structure.mix.shape[1], structure.terms
+        n, last = structure.mix.shape[1], structure.free("filling").start
         air = [kind for kind in OF_AIR if wanted[structure.free(kind)].any()]
-        exact = [place for place in range(n, len(terms)) if terms[place].kind in EXACT]
         for run in self.runs:
             by_air = self._by_air(structure, z, run, air, new)
             before, by = self.errors_of(structure, z, run, sloped=True, by_air=by_air)
             by = by.reshape(before.size, -1)
             whole = np.zeros((before.size, z.size))
             whole[:, :n] = by[:, : structure.n_linear] @ structure.mix
-            whole[:, exact] = by[:, structure.n_linear : structure.n_linear + len(exact)]
+            whole[:, n:last] = by[:, structure.n_linear : structure.n_linear + last - n]
             for number, kind in enumerate(air):
                 whole[:, structure.free(kind).start] = by[:, number - len(air)]
             loads = self.loads_at(structure, run)
             whole[:, loads] = by[
                 :, [structure.spring(0, j, -1) for j in range(loads.stop - loads.start)]
             ]
-            changed = [p for p in np.flatnonzero(wanted) if terms[p].kind in ("walls", "pushes")]
-            for place in changed:
-                moved = z.copy()
-                moved[place] += (step := self._step(structure, z, place, STEP))
-                after = self.errors_of(structure, moved, run, sloped=False)[0]
-                whole[:, place] = ((after - before) / step).ravel()
             errors.append(before.ravel())
             slopes.append(whole)
         return errors, np.concatenate(slopes)
@@ -331,7 +321,7 @@ class Problem:
 
         for _ in range(PASSES):
             flat = (table * weight[..., np.newaxis]).reshape(-1, table.shape[2])
-            put(bounded_least_squares(flat.T @ flat, bounded))
+            put(bounded_least_squares((flat.T @ flat)[np.newaxis], bounded)[0])
             if not of_force:
                 weight = 1.0 / (self.stiffness(structure, start) * structure.bench.travel)
         # the same within physics, in the unit in which the area is 1 on average
@@ -394,31 +384,32 @@ class Problem:
 
 
 def bounded_least_squares(
-    gram: Array, bounded: Mask, near: Array | None = None, ridge: float = RIDGE
+    grams: Array, bounded: Mask, near: Array | None = None, ridge: float = RIDGE
 ) -> Array:
-    """Return bounded least squares from products of columns and, last, a target.
+    """Return bounded least squares from products of columns and, last, a target, of all in a stack.
 
-    Damped towards what is ``near``, or 0, by every number's own effect.
+    Damped towards what is ``near``, or 0, by every number's own effect. With the bounded columns last,
+    the last rows of the Cholesky factor are what those are solved from.
     """
     from scipy.optimize import nnls
 
-    size = np.sqrt(np.diag(gram)[:-1])
+    order, first = np.argsort(bounded, kind="stable"), int((~bounded).sum())
+    size = np.sqrt(np.diagonal(grams, axis1=1, axis2=2)[:, order])
+    size = np.maximum(size, LEAST_EFFECT * size.max(axis=0))
     size[~(size > 0.0)] = 1.0
-    a = gram[:-1, :-1] / np.outer(size, size) + ridge * np.eye(size.size)
-    b, free, found = gram[:-1, -1] / size, ~bounded, np.zeros(size.size)
+    a = grams[:, order][:, :, order] / (size[:, :, np.newaxis] * size[:, np.newaxis])
+    b = grams[:, order, -1] / size
     if near is not None:
-        b = b + ridge * size * near
-    both = np.column_stack([a[np.ix_(free, bounded)], b[free]])
-    sizes, ways = np.linalg.eigh(a[np.ix_(free, free)])
-    across = ways @ ((ways.T @ both) / np.maximum(sizes, RIDGE)[:, np.newaxis])
-    if bounded.any():
-        inner = a[np.ix_(bounded, bounded)] - a[np.ix_(bounded, free)] @ across[:, :-1]
-        right = b[bounded] - a[np.ix_(bounded, free)] @ across[:, -1]
-        sizes, ways = np.linalg.eigh(inner)
-        root = np.sqrt(np.maximum(sizes, RIDGE))
-        found[bounded] = nnls((ways * root).T, ways.T @ right / root, maxiter=100 * len(right))[0]
-    found[free] = across[:, -1] - across[:, :-1] @ found[bounded]
-    return found / size
+        b += ridge * size * near[order]
+    lower = np.linalg.cholesky(a + ridge * np.eye(order.size))
+    upper = lower.transpose(0, 2, 1)
+    found = np.linalg.solve(lower, b[:, :, np.newaxis])[:, :, 0]
+    for one, root in zip(found[:, first:], upper[:, first:, first:], strict=True):
+        one[:] = nnls(root, one, maxiter=100 * one.size)[0] if one.size else one
+    found[:, :first] -= (upper[:, :first, first:] @ found[:, first:, np.newaxis])[:, :, 0]
+    rest = found[:, :first, np.newaxis]
+    found[:, :first] = np.linalg.solve(upper[:, :first, :first], rest)[:, :, 0]
+    return (found / size)[:, np.argsort(order)]
 
 
 def compared(data: TrainingData, most: int, *, of_force: bool = False) -> Problem:

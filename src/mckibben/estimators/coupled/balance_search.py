@@ -105,8 +105,7 @@ class Search:
 
     def cost(self, z: Array) -> float:
         """Return the root mean square error."""
-        found = _size(self.errors(z)[0])
-        return found if np.isfinite(found) else np.inf
+        return _size(self.errors(z)[0])
 
     @property
     def free(self) -> NDArray[np.intp]:
@@ -137,16 +136,19 @@ class Search:
         errors, slopes = self.errors(z, self.active)
         cost = _size(errors)
         tracker.update(z, cost)
-        for _ in range(steps):
-            usable = np.isfinite(slopes).all(axis=1) & np.isfinite(errors)
-            moving = slopes[usable][:, self.free]
-            target = moving @ z[self.free] - errors[usable]
-            both = np.column_stack([moving, target])
+        for step in range(steps):
+            if not len(slopes):
+                errors, slopes = self.errors(z, self.active)
+            both = np.column_stack([slopes, errors])[:, np.append(self.free, z.size)]
+            both[~np.isfinite(both).all(axis=1)] = 0.0
+            both[:, -1] = both[:, :-1] @ z[self.free] - both[:, -1]
             triangle: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
-            for _ in range(MOST_TRIES):
+            for turn in range(MOST_TRIES):
+                last = turn > 0 or step == steps - 1  # most others are accepted
                 try:
                     tried = self._solved(triangle, z, damping)
-                    found = self.cost(tried)
+                    errors, slopes = self.errors(tried, None if last else self.active)
+                    found = _size(errors)
                 except ModelError:
                     found = np.inf
                 if found < cost:
@@ -160,7 +162,6 @@ class Search:
             if slow >= SLOWEST:
                 return z
             damping = max(damping / 5.0, LIGHTEST**2)
-            errors, slopes = self.errors(z, self.active)
         return z
 
     def _solved(self, triangle: Array, z: Array, damping: float) -> Array:
@@ -171,10 +172,9 @@ class Search:
         they were found soft.
         """
         structure, free = self.structure, self.free
-        n, n_terms = structure.mix.shape[1], len(structure.terms)
-        sizes = np.append(structure.scales(), np.ones(z.size - n_terms))[free]
+        n = structure.mix.shape[1]
         size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
-        known = size * sizes > UNKNOWN * (size * sizes).max()
+        known = self._known(free, size)
         free, size, reduced = free[known], size[known], triangle[:, np.append(known, True)]
         held = np.maximum(np.sqrt(damping), LIGHTEST) * size
         reduced[:, -1] -= triangle[:, :-1][:, ~known] @ z[self.free[~known]]
@@ -197,6 +197,11 @@ class Search:
             sides = np.vstack([sides, np.append(side @ structure.mix, np.zeros(z.size - n))])
             least = np.append(least, structure.least_stiffness - side @ structure.base)
         return tried
+
+    def _known(self, free: Indices, size: Array) -> Mask:
+        """Return which unknowns have an effect, by the sizes of slopes, that is not rounding."""
+        scales = np.append(self.structure.scales(), np.ones(self.free[-1] + 1))[free]
+        return np.asarray(size * scales > UNKNOWN * (size * scales).max())
 
     def _conditions(self, z: Array) -> tuple[Array, Array]:
         """Return linear constraints of all unknowns: sides @ z >= least."""
@@ -221,39 +226,51 @@ class Search:
 
     # -- choice ----------------------------------------------------------------------------------
 
-    def chosen(self, z: Array, tried: Mask) -> tuple[Mask, Array]:
-        """Return the selected terms after a forward search over ``tried``, and their unknowns.
+    def chosen(self, z: Array, *groups: Mask) -> tuple[Mask, Array]:
+        """Return the selected terms after a forward search, and their unknowns.
 
-        New shape begins where least squares have it.
+        Over the first of ``groups`` of terms from which any are added. New shape begins where least
+        squares have it.
         """
         structure, n = self.structure, len(self.structure.terms)
         new = np.array([term.kind in NEW_SHAPE for term in structure.terms]) & ~self.active
-        wanted = (tried & new) | self.active
+        wanted = (np.any(groups, axis=0) & new) | self.active
         (grams, folds), likely = self._grams(z, wanted, new), self._likely(z, wanted)
+        apart = [folds != fold for fold in range(FOLDS)]
+        others = np.array([grams[out if out.any() else ~out].sum(axis=0) for out in apart]) + likely
         bounded = self._bounded(z.size)
-        active = self.active.copy()
+        known: dict[bytes, Array] = {}
 
-        def missed(free: Mask) -> Array:
-            every = np.append(free, np.ones(z.size - n, dtype=bool))
-            return _left_out(grams, folds, every, z, bounded, likely)
+        def missed(active: Mask) -> Array:
+            """Return the squared errors of every block under the least squares of other folds."""
+            if (key := active.tobytes()) not in known:
+                free = np.append(active, np.ones(z.size - n, dtype=bool))
+                theta = np.tile(np.append(z, -1.0), (len(others), 1))
+                theta[:, np.flatnonzero(free)] = _solved(others, free, bounded, z)
+                theta = theta[folds, :, np.newaxis]
+                known[key] = (theta * (grams @ theta)).sum(axis=(1, 2))
+            return known[key]
 
-        best, ahead, passed = missed(active), active, 0
-        while passed < AHEAD:
-            options = [
-                ahead | more for more in self._candidates(ahead, z) if not (more & ~tried).any()
-            ]
-            if not options:
+        active = self.active
+        for tried in groups:
+            best, ahead, passed = missed(active), active, 0
+            while passed < AHEAD:
+                options = [
+                    ahead | more for more in self._candidates(ahead, z) if not (more & ~tried).any()
+                ]
+                if not options:
+                    break
+                errors = [missed(option) for option in options]
+                first = int(np.argmin([one.sum() for one in errors]))
+                ahead, gain = options[first], best - errors[first]
+                passed += 1
+                if gain.sum() > max(np.sqrt(gain.size) * gain.std(), NO_GAIN * best.sum()):
+                    active, best, passed = ahead, errors[first], 0
+            if (active != self.active).any():
                 break
-            errors = [missed(option) for option in options]
-            first = int(np.argmin([one.sum() for one in errors]))
-            ahead, gain = options[first], best - errors[first]
-            passed += 1
-            if gain.sum() > max(np.sqrt(gain.size) * gain.std(), NO_GAIN * best.sum()):
-                active, best, passed = ahead, errors[first], 0
         free = np.append(active, np.ones(z.size - n, dtype=bool))
-        whole = _reduced((grams.sum(axis=0) + likely)[np.newaxis], free, z)[0]
         solution, found = z.copy(), z.copy()
-        solution[free] = bounded_least_squares(whole, bounded[free], z[free], DAMPED)
+        solution[free] = _solved((grams.sum(axis=0) + likely)[np.newaxis], free, bounded, z)[0]
         low, high, much = structure.nonlinear_bounds()
         shape = slice(structure.mix.shape[1], n)
         near = np.clip(
@@ -283,6 +300,8 @@ class Search:
         parts, slopes = self.problem.errors(self.structure, z, wanted, new)
         table = np.column_stack([slopes, slopes @ z - np.concatenate(parts)])
         table[~np.isfinite(table).all(axis=1)] = 0.0
+        size = np.sqrt((table[:, :-1] ** 2).sum(axis=0))
+        table[:, :-1] *= self._known(np.arange(z.size), size)
         ends = np.cumsum([part.size for part in parts])[:-1]
         runs = _blocks(np.split(table, ends))
         folds = [
@@ -385,37 +404,19 @@ def _blocks(parts: list[Array]) -> list[list[Array]]:
     return [np.array_split(part, max(1, round(BLOCKS * len(part) / total))) for part in parts]
 
 
-def _left_out(
-    grams: Array, folds: Indices, free: Mask, z: Array, bounded: Mask, likely: Array
-) -> Array:
-    """Return the squared errors of every block under the least squares of the others.
+def _solved(grams: Array, free: Mask, bounded: Mask, z: Array) -> Array:
+    """Return the least squares of free unknowns, others as they are, of every matrix in a stack.
 
-    ``grams`` are products of slopes and target by block, and ``likely`` those of the prior; what
-    is not free is as it is.
+    ``grams`` are products of slopes and target.
     """
-    parts, likely = _reduced(grams, free, z), _reduced(likely[np.newaxis], free, z)[0]
-    whole, errors = parts.sum(axis=0), np.zeros(len(grams))
-    for fold in np.unique(folds):
-        out = folds == fold
-        rest = whole - parts[out].sum(axis=0) if not out.all() else whole
-        found = bounded_least_squares(rest + likely, bounded[free], z[free], DAMPED)
-        theta = np.append(found, -1.0)
-        errors[out] = np.einsum("i,bij,j->b", theta, parts[out], theta)
-    return errors
-
-
-def _reduced(grams: Array, free: Mask, z: Array) -> Array:
-    """Return the products for free unknowns, with the target reduced by fixed ones."""
-    fixed = np.flatnonzero(~free)
-    keep = np.append(np.flatnonzero(free), grams.shape[1] - 1)
-    parts = grams[:, keep][:, :, keep].copy()
-    known = grams[:, :, fixed] @ z[fixed]
-    parts[:, :, -1] -= known[:, keep]
-    parts[:, -1, :-1] -= known[:, keep[:-1]]
-    parts[:, -1, -1] += known[:, fixed] @ z[fixed] - known[:, -1]
-    return parts
+    moving = np.flatnonzero(free)
+    keep = np.append(moving, z.size)
+    parts = grams[:, keep][:, :, keep]
+    parts[:, :-1, -1] -= grams[:, moving] @ np.append(np.where(free, 0.0, z), 0.0)
+    return bounded_least_squares(parts, bounded[free], z[free], DAMPED)
 
 
 def _size(errors: Array) -> float:
-    """Return the root mean square."""
-    return float(np.sqrt(np.mean(errors**2)))
+    """Return the root mean square, infinite if that of an error is not finite."""
+    size = float(np.sqrt(np.mean(errors**2)))
+    return size if np.isfinite(size) else np.inf

@@ -6,7 +6,8 @@ are the terms of `mckibben.blocks.coupled.balance_law`; what moves them through 
 
 Columns of slopes are the coefficients from those of the first coordinate on, then the shape: the
 friction offset, its slopes by scheduling inputs, the logarithms of the ratio of limits and of lags,
-places of obstacles, and what changes the pressures that act, whose slopes are given.
+stretch of the walls, forces of slackening, places of obstacles, and what changes the pressures that act,
+whose slopes are given.
 """
 
 from __future__ import annotations
@@ -34,8 +35,12 @@ from mckibben.blocks.coupled.balance_law import (
     unbalanced,
     update_state,
 )
-from mckibben.blocks.kernels import fill, kernel
+from mckibben.blocks.kernels import fill, inlined, kernel
 from mckibben.blocks.solving import eliminate
+
+FEW_STEPS, CLOSE = 6, 1e-7
+"""Number of Newton steps without a search along them; relative residual from which one more is the last.
+"""
 
 
 @kernel
@@ -46,17 +51,31 @@ def mix(to: Array, kept: float, share: float, row: Array) -> None:
 
 
 @kernel
-def n_shape(c: Array) -> int:
-    """Return the number of derivative columns of nonlinear parameters, before the front's."""
-    return 2 + int(c[2]) + int(c[6]) + int(c[1]) * int(c[9])
+def clear(to: Array) -> None:
+    """Fill with zeros."""
+    for i in range(to.size):
+        to[i] = 0.0
 
 
 @kernel
+def n_shape(c: Array) -> int:
+    """Return the number of derivative columns of nonlinear parameters, before the front's."""
+    return walls_at(c) + 1 + int(c[0]) + int(c[1]) * int(c[9])
+
+
+@kernel
+def walls_at(c: Array) -> int:
+    """Return the column of the walls among those; forces of slackening follow, then obstacles."""
+    return 2 + int(c[2]) + int(c[6])
+
+
+@inlined
 def by_coupling(c: Array, j: int, q: Array, x: Array, places: int, slopes: Array) -> None:
     """Fill derivatives of the force on coordinate j by its coefficients and obstacle positions."""
     m, n_x, degree, n_loads = int(c[1]), int(c[2]), int(c[3]), int(c[4])
-    place = coordinate_at(c, j) - coordinate_at(c, 0)
-    mix(slopes, 0.0, 0.0, slopes)
+    first = coordinate_at(c, 0)
+    place = coordinate_at(c, j) - first
+    clear(slopes)
     power = 1.0
     for order in range(1 + n_x * degree):
         if order > 0:
@@ -69,7 +88,7 @@ def by_coupling(c: Array, j: int, q: Array, x: Array, places: int, slopes: Array
         slopes[place + i] = x[n_x + i]
     place += n_loads
     for number in range(int(c[9])):
-        at = coordinate_at(c, 0) + place
+        at = first + place
         beyond = q[j] - c[at + 1]
         if c[at] * beyond > 0.0:
             slopes[place + 2] = beyond
@@ -100,7 +119,7 @@ def by_limit(
         to[to.size - dp.size + f] += share * upper * dp[f]
 
 
-@kernel
+@inlined
 def by_shape(
     c: Array,
     k: int,
@@ -132,6 +151,7 @@ def by_shape(
             if taut:
                 to[2 + int(c[2]) + i] += c[place + first + n_s + i] * late[i]
     if not taut:
+        to[walls_at(c) + 1 + k] += 1.0
         return
     a, wall = area(c, k, y)[0], c[muscle_at(c, k) + 2]
     for f in range(dp.size):
@@ -141,11 +161,12 @@ def by_shape(
         if slopes[first + i] == 0.0:
             by_limit(c, i, terms[first + i], p, x, dp, h, to)
         else:
+            to[walls_at(c)] += h * p
             for f in range(dp.size):
                 to[to.size - dp.size + f] += h * wall * dp[f]
 
 
-@kernel
+@inlined
 def through_past(c: Array, k: int, slopes: Array, past: Array, moved: Array, to: Array) -> None:
     """Add derivatives of the force of muscle k through its past, given in ``past``.
 
@@ -170,7 +191,7 @@ def through_past(c: Array, k: int, slopes: Array, past: Array, moved: Array, to:
     mix(to, 1.0, -carried, moved)
 
 
-@kernel
+@inlined
 def carry(
     c: Array,
     k: int,
@@ -187,31 +208,71 @@ def carry(
     """Update the derivatives of the past of muscle k to the current state."""
     n, m, n_s, n_l = int(c[0]), int(c[1]), int(c[5]), int(c[6])
     grown = friction_pressure(c, p, x) if way != AT_REST else 0.0
+    shape = now.size - n_shape(c) - dp.size
     for i in range(n_s):
         s, upper = state[m + n + k * n_s + i], c[HEAD + i] * grown
         if not -c[12] * upper < s < upper:
             row = m + k * n_s + i
             mix(past[row], 0.0, -1.0, now)
+            past[row, shape + walls_at(c)] -= p
             for f in range(dp.size):
                 past[row, now.size - dp.size + f] -= c[muscle_at(c, k) + 2] * dp[f]
             if way != AT_REST:
-                by_limit(c, i, s, p, x, dp, 1.0, past[row, now.size - n_shape(c) - dp.size :])
-    for i in range(n_l):
+                by_limit(c, i, s, p, x, dp, 1.0, past[row, shape:])
+    mix(moved, -1.0, 1.0, now)
+    for i in range(n_l if way != AT_REST else 0):
         row = m + n * n_s + k * n_l + i
         gain = c[HEAD + n_s + n_l + i] if way == IN_TIME else c[17]
-        mix(past[row], c[HEAD + n_s + i] if way != AT_REST else 0.0, 0.0, now)
-        if way != AT_REST:
-            mix(past[row], 1.0, gain, now)
-            mix(past[row], 1.0, -gain, moved)
-            past[row, now.size - n_shape(c) - dp.size + 2 + int(c[2]) + i] += late[i]
+        mix(past[row], c[HEAD + n_s + i], gain, moved)
+        past[row, shape + 2 + int(c[2]) + i] += late[i]
     if c[18] != 0.0 and way == IN_TIME:
         row = m + n * (n_s + n_l) + 2 * k
-        mix(past[row + 1], 0.0, 1.0, past[row])
-        mix(past[row], 0.0, 1.0, now)
-        mix(past[row], 1.0, -1.0, moved)
+        fill(past[row + 1], past[row])
+        fill(past[row], moved)
 
 
-@kernel
+@inlined
+def approach(
+    c: Array,
+    state: Array,
+    way: int,
+    q: Array,
+    x: Array,
+    p: Array,
+    copied: Array,
+    inverse: Array,
+    work: Array,
+) -> None:
+    """Approach equilibrium, and fill the last step, yet to be taken, and the inverse of the slopes.
+
+    By Newton's method from where coordinates are, or, where that does not end, `solve_equilibrium`.
+    """
+    m = int(c[1])
+    residual, step, sizes = work[:m], work[m : 2 * m], work[3 * m : 4 * m]
+    matrix, terms = work[4 * m : 4 * m + m * m].reshape((m, m)), work[4 * m + m * m :]
+    for turn in range(FEW_STEPS + 1):
+        if turn == FEW_STEPS:
+            fill(q, state)
+            solve_equilibrium(c, state, way, q, x, p, work)
+        left = unbalanced(c, state, way, q, x, p, residual, matrix, sizes, terms)
+        for i in range(m):
+            for j in range(m):
+                step[j] = 1.0 if i == j else 0.0
+                fill(copied[j], matrix[j])
+            eliminate(copied, step)
+            for j in range(m):
+                inverse[j, i] = step[j]
+        for j in range(m):
+            step[j] = 0.0
+            for i in range(m if turn < FEW_STEPS else 0):
+                step[j] -= inverse[j, i] * residual[i]
+        if left <= CLOSE:
+            return
+        for j in range(m):
+            q[j] += step[j]
+
+
+@inlined
 def move(
     c: Array,
     state: Array,
@@ -232,61 +293,53 @@ def move(
     Slopes of no columns are not computed. ``past`` begins with the slopes of coordinates; ``rows`` has
     two rows a muscle to compute in.
     """
-    n, m, width = int(c[0]), int(c[1]), n_terms(c)
-    residual, column, sizes = work[:m], work[m : 2 * m], work[3 * m : 4 * m]
-    matrix, terms = work[4 * m : 4 * m + m * m].reshape((m, m)), work[4 * m + m * m :]
-    copied, reverse = rows[2 * n : 2 * n + m, :m], rows[2 * n + m : 2 * n + 2 * m, :m]
-    if not held:
-        solve_equilibrium(c, state, way, q, x, p, work)
-    unbalanced(c, state, way, q, x, p, residual, matrix, sizes, terms)
-    for j in range(m):
-        found[j] = residual[j] if held else q[j]
-    if slopes.shape[1] == 0:
-        update_state(c, state, way, q, p, x)
-        return
-    shape = slopes.shape[1] - n_shape(c) - dp.shape[1]
-    places = shape + 2 + int(c[2]) + int(c[6])
-    late, values, by_y = rows[2 * n + 2 * m], terms[:width], terms[width : 2 * width]
-    for j in range(m):
-        by_coupling(c, j, q, x, places, slopes[j])
-    for k in range(n):
+    n, m, width, sloped = int(c[0]), int(c[1]), n_terms(c), slopes.shape[1] > 0
+    step, terms = work[m : 2 * m], work[4 * m + m * m :]
+    values, by_y = terms[:width], terms[width : 2 * width]
+    copied, inverse = rows[2 * n : 2 * n + m, :m], rows[2 * n + m : 2 * n + 2 * m, :m]
+    shape, late = slopes.shape[1] - n_shape(c) - dp.shape[1], rows[2 * n + 2 * m]
+    if held:
+        matrix, sizes = work[4 * m : 4 * m + m * m].reshape((m, m)), work[3 * m : 4 * m]
+        unbalanced(c, state, way, q, x, p, found, matrix, sizes, terms)
+    else:
+        approach(c, state, way, q, x, p, copied, inverse, work)
+    for j in range(m if sloped else 0):
+        by_coupling(c, j, q, x, shape + walls_at(c) + 1 + n, slopes[j])
+    for back in range(n if sloped else 0):
+        k = n - 1 - back
         own, y, moved, by_force = muscle_at(c, k) + OWN, shortening(c, k, q), rows[k], rows[n + k]
-        muscle_force(c, k, state, way, y, p[k], x, values, by_y)
-        mix(moved, 0.0, 0.0, moved)
-        mix(by_force, 0.0, 0.0, by_force)
+        if back > 0:  # those of the last muscle are there
+            muscle_force(c, k, state, way, y, p[k], x, values, by_y)
+        clear(moved)
+        clear(by_force)
         for j in range(m):
             if c[own + j] != 0.0:
                 mix(moved, 1.0, c[own + j], past[j])
         place = own + m - coordinate_at(c, 0)
-        for i in range(width):
-            by_force[place + i] = values[i]
+        fill(by_force[place : place + width], values)
         own_late, to = late[k * int(c[6]) : (k + 1) * int(c[6])], by_force[shape:]
         by_shape(c, k, state, way, y, p[k], x, dp[k], values, by_y, own_late, to)
-        if not held and way != AT_REST:
+        if way != AT_REST:
             through_past(c, k, by_y, past, moved, by_force)
         for j in range(m):
             if c[own + j] != 0.0:
                 mix(slopes[j], 1.0, c[own + j], by_force)
+    for j in range(m if not held else 0):
+        q[j] += step[j]
+        found[j] = q[j]
     update_state(c, state, way, q, p, x)
-    if held:
+    if not sloped:
         return
-    for i in range(m):
+    if not held:
         for j in range(m):
-            column[j] = -1.0 if i == j else 0.0
-            for h in range(m):
-                copied[j, h] = matrix[j, h]
-        eliminate(copied, column)
+            clear(past[j])
+            for i in range(m):
+                mix(past[j], 1.0, -inverse[j, i], slopes[i])
         for j in range(m):
-            reverse[j, i] = column[j]
-    for j in range(m):
-        mix(past[j], 0.0, 0.0, past[j])
-        for i in range(m):
-            mix(past[j], 1.0, reverse[j, i], slopes[i])
-    for j in range(m):
-        mix(slopes[j], 0.0, 1.0, past[j])
+            fill(slopes[j], past[j])
     for k in range(n):
         own, now = muscle_at(c, k) + OWN, rows[n + k]
-        mix(now, 0.0, 0.0, now)
+        clear(now)
         for j in range(m):
             if c[own + j] != 0.0:
                 mix(now, 1.0, c[own + j], past[j])
@@ -335,33 +388,42 @@ def follow(
     n, m = int(c[0]), int(c[1])
     n_states = scratch.size - 3 * m - 2 * n - 5 * m - m * m - 2 * n_terms(c)
     state, rest = scratch[:n_states], scratch[n_states:]
-    q, tare, now = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m]
+    q, tare, last = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m]
     p, work = rest[3 * m : 3 * m + n], rest[3 * m + n :]
     tared = past[past.shape[0] - m :]
-    if held:
-        fill(q, measured[0])
-        fill(p, driven[0])
     if held and rested:
         start_at_rest(c, state, x[0], q, p, work)
-    elif held:
-        update_state(c, state, AT_REST, q, p, x[0])
-    else:
-        move(c, state, AT_REST, False, q, x[0], p, dp[0], past, rows, now, slopes[0], work)
-        if c[16] != 0.0:
-            for j in range(m):
-                tare[j] = q[j]
-                mix(tared[j], 0.0, 1.0, past[j])
-    for t in range(driven.shape[0]):
-        fill(p, driven[t])
-        if held:
-            fill(q, measured[t])
-        way = FROM_REST if t == 0 else IN_TIME
-        place = t // every
-        move(c, state, way, held, q, x[t], p, dp[t], past, rows, now, slopes[place], work)
+    for t in range(0 if held and rested else -1, driven.shape[0]):
+        way = AT_REST if t < 0 else FROM_REST if t == 0 else IN_TIME
+        now, place = max(t, 0), max(t, 0) // every
+        fill(p, driven[now] if held or t >= 0 else p)
         for j in range(m):
-            found[place, j] = now[j] - tare[j]
-            if not held and c[16] != 0.0:
-                mix(slopes[place, j], 1.0, -1.0, tared[j])
+            ahead = 2.0 * q[j] - last[j] if t > 0 else q[j]
+            last[j] = q[j]
+            q[j] = measured[now, j] if held else ahead
+        move(
+            c,
+            state,
+            way,
+            held,
+            q,
+            x[now],
+            p,
+            dp[now],
+            past,
+            rows,
+            found[place],
+            slopes[place],
+            work,
+        )
+        if held or c[16] == 0.0:
+            continue
+        for j in range(m):
+            if t < 0:
+                tare[j] = q[j]
+                fill(tared[j], past[j])
+            found[place, j] -= tare[j]
+            mix(slopes[place, j], 1.0, -1.0, tared[j])
 
 
 def run(

@@ -26,6 +26,7 @@ from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError, require
 from mckibben.numerals import numeral
+from mckibben.recording import Recording
 from mckibben.registry import load
 
 
@@ -231,6 +232,11 @@ class Banded(Composition):
         if initial is None or isinstance(initial, str) or len(initial) != self.forward.n_states:
             return super().initial_state(first, initial)
         own = self.forward.initial_state(first, initial)
+        return np.concatenate([own, np.zeros(self.band.n_states)])
+
+    def start_on(self, recording: Recording) -> Array:
+        """Return the initial state on a recording: the model's, and the band at rest."""
+        own = self.forward.start_on(recording)
         return np.concatenate([own, np.zeros(self.band.n_states)])
 
     def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:

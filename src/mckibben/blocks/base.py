@@ -248,6 +248,10 @@ class Block(DrawsItself, Parametrised):
         """Return the equilibrium state for a first input and output; None if outputs do not matter."""
         return None
 
+    def start_on(self, recording: Recording) -> Array:
+        """Return the state before the first sample of a recording; see `mckibben.blocks.starts`."""
+        return start_state(self, recording)
+
     # -- its kernel --------------------------------------------------------------------------
 
     def coefficients(self, sample_time: float | None) -> Array:
@@ -375,7 +379,7 @@ class Block(DrawsItself, Parametrised):
         if isinstance(data, Recording):
             inputs = self._inputs_from(data)
             if initial is None:
-                initial = start_state(self, data).tolist()
+                initial = self.start_on(data).tolist()
             outputs = self._run(inputs, data.sample_time, initial)
             if not np.isfinite(outputs).all():
                 raise ModelError(
@@ -431,9 +435,7 @@ class Block(DrawsItself, Parametrised):
     def final_state(self, data: Recording, *, initial: Initial | None = None) -> Array:
         """Return the state after a recording, shape (n_states,), to start the next one from."""
         inputs = self._inputs_from(data)
-        state = (
-            start_state(self, data) if initial is None else self.initial_state(inputs[0], initial)
-        )
+        state = self.start_on(data) if initial is None else self.initial_state(inputs[0], initial)
         self.bind(data.sample_time, state, inputs, np.empty((len(inputs), len(self.outputs))))()
         return state
 

@@ -83,13 +83,13 @@ def state_after(block: Block, before: Array, first: Array, sample_time: float | 
 def first_outputs(block: Block, recording: Recording) -> Array | None:
     """Return the first measured value of every output of a block; None where they have no say.
 
-    That is where one is missing or also an input, where the block has no state or states its start, and
-    where it is a compensator, whose outputs are commands.
+    That is where one is missing, interpolated or also an input, where the block has no state or states
+    its start, and where it is a compensator, whose outputs are commands.
     """
     recording = recording.with_derived(channel.name for channel in block.outputs)
     commands = drives(block.outputs[0]) and not drives(block.inputs[0])
     given = {channel.name for channel in block.inputs}
-    if commands or block.n_states == 0 or not unstated(block):
+    if commands or block.n_states == 0 or not unstated(block) or recording.bridged[0]:
         return None
     if any(
         channel.name in given or recording.units.get(channel.name) != channel.unit

@@ -39,8 +39,9 @@ WORTH_A_PROCESS = 2.0
 PIECES = 4
 """Number of consecutive pieces of a part whose squared errors are summed, for resampling."""
 
-LEAST_ERROR = 1e-300
-"""Error of a part below which it is this, so that it has a logarithm."""
+LEAST_SHARE = 0.1
+"""Smallest error of a part that counts, relative to that of all parts together: a rest does not decide.
+"""
 
 
 @dataclass(frozen=True)
@@ -281,7 +282,9 @@ def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed
         invalid = "its outputs diverged without a part of the data"
     elif errors:
         by_part = np.sqrt([(error**2).mean(axis=0) for error in errors])
-        means = np.exp(np.log(np.maximum(by_part, LEAST_ERROR)).mean(axis=0))
+        pooled = np.sqrt((np.concatenate(errors) ** 2).mean(axis=0))
+        least_error = np.maximum(LEAST_SHARE * pooled, np.finfo(float).tiny)
+        means = np.exp(np.log(np.maximum(by_part, least_error)).mean(axis=0))
         by_output = dict(zip(names, means.tolist(), strict=True))
         parts = tuple(by_part.mean(axis=1).tolist())
         if constant is not None:

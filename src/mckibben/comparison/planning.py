@@ -13,6 +13,7 @@ import numpy as np
 from mckibben import registry
 from mckibben.channels import Channels, Names, channels_of
 from mckibben.checkpoints import Checkpoints
+from mckibben.comparison.choosing import CONSTANT
 from mckibben.comparison.fitting import Candidate, Constant, Data, constant_of
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.parts import parts_of, spans_of
@@ -197,6 +198,8 @@ def _chosen(
                 f"models cannot be {models!r:.60}", remedy="give 'all', 'quick', or a list of names"
             )
         found = {name.strip(): _item(name.strip(), seeded) for name in named}
+    if CONSTANT in found:
+        raise ModelError(f"{CONSTANT!r} is the mean of the output", remedy="choose another label")
     if not found:
         raise ModelError(
             "there are no models to compare",

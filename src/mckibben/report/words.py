@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 CHOICES = {
     "cross-validation": ("CV RMSE", "cross-validation on the training side"),
+    "validation": ("validation RMSE", "the last part of the training data (earlier versions)"),
     "given": ("validation RMSE", "validation recordings, which are not fitted"),
     "fit": ("fit RMSE", "the error on the fitted data, as there is no validation"),
 }

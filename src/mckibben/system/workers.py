@@ -15,7 +15,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import CancelledError, Executor, Future, as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import connection, forkserver, resource_tracker, util
@@ -223,17 +223,20 @@ def _submitted(
     executor: Executor, work: Work, common: Any, items: Sequence[Any], report: Tell | None
 ) -> Iterator[Outcome]:
     """Yield the outcomes of an executor, which reports no progress within an item."""
-    futures = {executor.submit(_alone, work, common, item): k for k, item in enumerate(items)}
+    futures: dict[Future[Any], int] = {}
     try:
-        if report is not None:
-            for index in futures.values():
+        for index, item in enumerate(items):
+            futures[executor.submit(_alone, work, common, item)] = index
+            if report is not None:
                 report(index)
         for future in as_completed(futures):
-            error = future.exception()
-            if error is not None and not isinstance(error, Exception):
-                raise error
-            value = None if error is not None else future.result()
-            yield Outcome(futures[future], value, error)
+            try:
+                outcome = Outcome(futures[future], future.result())
+            except (Exception, CancelledError) as error:
+                outcome = Outcome(
+                    futures[future], error=WorkerError(f"its executor gave {error!r}")
+                )
+            yield outcome
     finally:
         for future in futures:
             future.cancel()

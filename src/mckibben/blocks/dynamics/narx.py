@@ -89,8 +89,9 @@ def narx_kernels(regression: Callable[[Array, Array], float]) -> tuple[Step, Sta
     def narx_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
         """Start at equilibrium with the first input: a fixed point of the regression.
 
-        Of several such outputs within the data's range, the lowest for an input that has risen, the
-        middle one for a virgin start; where there is none, the output that changes least.
+        Of several such outputs within the data's range, the lowest from which a small change dies away
+        for an input that has risen, the middle one for a virgin start; where there is none, the output
+        that changes least.
         """
         n, m, k = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
         x = (inputs[0] - coefficients[3]) / coefficients[4]
@@ -106,9 +107,8 @@ def narx_kernels(regression: Callable[[Array, Array], float]) -> tuple[Step, Sta
                 change = regression(coefficients, state) - y
                 if rests == 0 and abs(change) < least:
                     found, least = y, abs(change)
-                if place > 0 and (
-                    (before > 0.0) != (change > 0.0) or (before < 0.0) != (change < 0.0)
-                ):
+                falls, rises = before > 0.0 and change <= 0.0, before < 0.0 and change >= 0.0
+                if falls or (virgin and rises):
                     if rests == wanted:
                         found = last - SPACING * before / (change - before)
                     rests += 1

@@ -20,6 +20,11 @@ Made = TypeVar("Made")
 MOVES_AT_ALL = 0.02
 """Share of its known range below which an output counts as constant."""
 
+SLOWEST = 1 / 3
+"""Largest time constant of a linear model, relative to the longest recording: in a slower one the gain
+and the time constant are not determined separately.
+"""
+
 FEWEST_SAMPLES = 10
 """Smallest number of samples for identification."""
 
@@ -191,6 +196,20 @@ class TrainingData:
         return self.once(
             "target", lambda: np.concatenate([run.outputs[run.counts].ravel() for run in self.runs])
         )
+
+    @property
+    def spread(self) -> Array:
+        """Standard deviation of every output at scored samples; of its known range where it is held."""
+        y = self.target.reshape(-1, len(self.outputs))
+        if self.spans is None:
+            return y.std(axis=0)
+        spans = np.array(self.spans)
+        return np.where(np.ptp(y, axis=0) > MOVES_AT_ALL * spans, y.std(axis=0), spans / 12**0.5)
+
+    @property
+    def slowest(self) -> float:
+        """Largest time constant of a linear model [samples]."""
+        return max(SLOWEST * max(run.u.size for run in self.runs), FEWEST_SAMPLES)
 
     @property
     def sample_time(self) -> float | None:

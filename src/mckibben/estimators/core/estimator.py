@@ -6,6 +6,7 @@ import time
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
@@ -19,7 +20,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.free_run import run_free
-from mckibben.errors import DataError, ModelWarning
+from mckibben.errors import DataError, MckibbenError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Mask, TrainingData, training_data
 from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.core.leaving_out import stepped
@@ -349,7 +350,7 @@ class Estimator(ABC):
         DataError
             On recordings that cannot be learned from.
         ModelError
-            On settings out of range.
+            On settings out of range, or if the model found is no better than the mean of the output.
         """
         before = dict(vars(self))
         runs = listed(recordings) if y is None else [self._recording(recordings, y, sample_time)]
@@ -387,12 +388,14 @@ class Estimator(ABC):
         started = time.perf_counter()
         self.check_settings()
         tracker = Tracker(progress=progress)
-        self.model_ = self.find(self.data(recordings, rows), tracker)[0]
+        data = self.data(recordings, rows)
+        self.model_ = self.find(data, tracker)[0]
         runs = self.free_runs(self.model_, listed(recordings), rows)
         elsewhere = not self.begins_measured and any(map(len, runs.pasts))
         if elsewhere and runs.apart(runs.from_rest) > MATTERS * runs.rmse:
             runs = self._after_pasts(runs, tracker)
-        self.diagnostics_ = self._diagnose(runs, tracker, started)
+        self.diagnostics_ = self._diagnose(runs, data, tracker, started)
+        refuse_useless(self.diagnostics_, data)
         if progress is not None:
             progress(1.0, self.diagnostics_.rmse)
         return self
@@ -401,8 +404,10 @@ class Estimator(ABC):
         """Fit again to recordings that begin after the pasts which the fit from rest shows."""
         for _ in range(MOST_PASTS):
             before = dict(vars(self))
-            self.model_ = self.find(self.data(*runs.preceded()), tracker)[0]
-            found = self.free_runs(self.model_, runs.recordings, runs.rows)
+            found = runs
+            with suppress(MckibbenError):  # the fit from rest remains
+                self.model_ = self.find(self.data(*runs.preceded()), tracker)[0]
+                found = self.free_runs(self.model_, runs.recordings, runs.rows)
             if not found.rmse < runs.rmse:
                 vars(self).clear()
                 vars(self).update(before)
@@ -479,8 +484,10 @@ class Estimator(ABC):
         block: Block = self.model_
         return block
 
-    def _diagnose(self, runs: FreeRuns, tracker: Tracker, started: float) -> Diagnostics:
-        block, at_bounds = runs.block, self.at_bounds(runs.block)
+    def _diagnose(
+        self, runs: FreeRuns, data: TrainingData, tracker: Tracker, started: float
+    ) -> Diagnostics:
+        block, at_bounds = runs.block, self.at_bounds(runs.block, data)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ModelWarning)
             by_output, from_rest = runs.errors, runs.from_rest.errors
@@ -555,7 +562,7 @@ class Estimator(ABC):
             return np.nan, unknown(runs.block)
         return covariance_of(runs, sorted({*at_bounds, *self.fixed(runs.block)}))
 
-    def at_bounds(self, block: Block) -> tuple[int, ...]:
+    def at_bounds(self, block: Block, data: TrainingData) -> tuple[int, ...]:
         """Return the indices of parameters at a bound: by default those equal to zero."""
         return tuple(np.flatnonzero(vanishing(block.pack())).tolist())
 
@@ -576,6 +583,21 @@ class SearchEstimator(Estimator):
     input: str = "pressure"
     output: str = "displacement"
     initial: Start = "first_sample"
+
+
+def refuse_useless(found: Diagnostics, data: TrainingData) -> None:
+    """Raise a `ModelError` if free runs on training data explain no more than the mean of the outputs.
+
+    Of several outputs the mean of their unexplained shares counts, as in `Estimator.score`.
+    """
+    errors, spread = np.array(found.rmse_by_output), data.spread
+    if not np.mean((errors / spread) ** 2) < 1.0:  # also where an error is not a number
+        each = zip(data.outputs, errors, spread, strict=True)
+        figures = (f"{c.name} {error:.4g} {c.unit}, of its mean {of:.4g}" for c, error, of in each)
+        raise ModelError(
+            f"the model found explains no more than the mean: RMSE on its data {'; '.join(figures)}",
+            remedy="change its settings, or fit another model: `compare()` ranks those that apply",
+        )
 
 
 def resting(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:

@@ -18,7 +18,7 @@ cross-validatory method for dependent data", Biometrika, 1994.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,24 +28,23 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.free_run import Mask
 from mckibben.errors import MckibbenError
-from mckibben.estimators.core.free_runs import FreeRuns, relative_sizes
+from mckibben.estimators.core.free_runs import FreeRuns, as_it_is, relative_sizes
 from mckibben.estimators.core.uncertainty import LARGEST
 from mckibben.recording import Recording
 
 if TYPE_CHECKING:
     from mckibben.estimators.core.estimator import Estimator
 
-DAMPINGS = np.geomspace(1e-4, 1e3, 8)
-"""Dampings tried in turn, relative to each parameter's own effect."""
+DAMPINGS = np.geomspace(1e-2, 1e3, 6)
+"""Dampings tried in turn, relative to each parameter's own effect on all data: what a part alone
+determines stays about as it is, as the fit's start or bounds would hold it.
+"""
 
 MOST_FREE = 150
 """Number of free parameters up to which slopes are computed by differences."""
 
 MOST_ROWS = 20_000
 """Number of outputs, evenly spread, on which slopes are computed."""
-
-LEAST_EFFECT = 1e-9
-"""Smallest effect of a parameter outside the part, relative to its whole effect."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +76,7 @@ def slopes_of(estimator: Estimator, runs: FreeRuns) -> Slopes | None:
     """Return the slopes of a fitted model's free run; None where more than `MOST_FREE` are free."""
     block, m = runs.block, len(runs.names)
     parameters = block.pack()
-    fixed = {*estimator.at_bounds(block), *estimator.fixed(block)}
+    fixed = {*estimator.diagnostics_.at_bounds, *estimator.fixed(block)}
     places = np.array([k for k in range(parameters.size) if k not in fixed], dtype=np.intp)
     n_samples = runs.residual.size // m
     samples = np.linspace(0, n_samples - 1, min(n_samples, max(MOST_ROWS // m, 1)))
@@ -111,7 +110,8 @@ def held_out(
     list of array, shape (n, m), or None
         None of a model with more parameters than a step is computed for.
     """
-    runs = estimator.free_runs(estimator.fitted, recordings)
+    # as the model is delivered, without loads of the recordings' own
+    runs = replace(estimator.free_runs(estimator.fitted, recordings), changed=as_it_is)
     counted = [
         np.concatenate([rows[own] for rows, own in zip(part, runs.rows, strict=True)])
         for part in parts
@@ -147,8 +147,8 @@ def stepped(
         thinned = residual.size / max(target.size, 1)
         best, before = runs.modelled, _cost(target - runs.scored(runs.modelled), ~part, thinned)
         for damping in DAMPINGS:
-            eased = (damping + slopes.penalty) * np.maximum(np.diag(rest), LEAST_EFFECT)
-            step = np.linalg.lstsq(rest + np.diag(eased), -uphill, rcond=1e-14)[0]
+            eased = rest + (damping + slopes.penalty) * np.eye(len(rest))
+            step = np.linalg.lstsq(eased, -uphill, rcond=1e-14)[0]
             tables = _moved(runs, slopes, step)
             if tables is None:
                 continue

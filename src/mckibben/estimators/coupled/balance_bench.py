@@ -89,7 +89,7 @@ def in_one_order(data: TrainingData) -> TrainingData:
 
     Sums over runs are then equal to the last bit, and so are the terms that are chosen.
     """
-    runs = sorted(data.runs, key=lambda run: (run.outputs.tobytes(), run.driven.tobytes()))
+    runs = sorted(data.runs, key=lambda run: (run.driven.tobytes(), run.outputs.ravel().tolist()))
     return replace(data, runs=tuple(replace(run, place=k) for k, run in enumerate(runs)))
 
 

@@ -17,7 +17,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations_with_replacement, pairwise
+from functools import cache, partial
+from itertools import combinations_with_replacement, islice, pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -93,7 +94,7 @@ class NarxEstimator(SearchEstimator):
     max_evaluations : int
         Of the refinement.
     allow_unstable : bool
-        Whether a model that leaves all bounds is returned, with a warning, instead of refused.
+        Whether a model that leaves all bounds is returned, with a warning, where no other is found.
     degree : int
         Of a polynomial's products of regressors.
     n_terms : int
@@ -137,15 +138,8 @@ class NarxEstimator(SearchEstimator):
         """Return the best bounded model, and the data."""
         data.timed(instead=", or use gpi")
         found = self._polynomials if self.mapping == "polynomial" else self._networks
+        error = cache(partial(free_run_rmse, data=data))
         paths: list[list[Narx]] = []
-        tried: list[tuple[float, Narx]] = []
-
-        def settle(path: list[Narx]) -> None:
-            # what is refined last is best, if it stays within bounds
-            options = (m for m in reversed(path) if self.allow_unstable or stable(m, data))
-            if (best := next(options, None)) is not None:
-                tried.append((free_run_rmse(best, data), best))
-
         for model in found(self._fields(data), data, tracker):
             if data.target.size <= model.n_parameters:
                 raise DataError(
@@ -155,24 +149,27 @@ class NarxEstimator(SearchEstimator):
             paths.append(path := [model])
             for horizon in HORIZONS if self.refine else ():
                 path += self._refined(path[-1], horizon, data, tracker)[-1:]
-        paths.sort(key=lambda path: free_run_rmse(path[-1], data))
+        paths.sort(key=lambda path: error(path[-1]))
+        tried: list[Narx] = []
         for path in paths:
             if self.refine and len(tried) < MOST_REFINED:
                 path += self._refined(path[-1], None, data, tracker)[1:]
-            settle(path)
+            tried += islice((m for m in sorted(path, key=error) if stable(m, data)), 1)
+        if not tried and self.allow_unstable:
+            tried = [model for path in paths for model in path]
+            warnings.warn(
+                "the NARX model diverges for constant or continued input: do not simulate it",
+                ModelWarning,
+                stacklevel=4,
+            )
         if not tried:
             raise ModelError(
                 "every NARX model found diverges in a free run",
                 remedy="use fewer terms or units, `settings[n_play]=3`, or "
                 "`settings[allow_unstable]=true` to return it anyway",
             )
-        tracker.best_cost, chosen = min(tried, key=lambda item: item[0])
-        if not stable(chosen, data):
-            warnings.warn(
-                "the NARX model diverges for constant or continued input: do not simulate it",
-                ModelWarning,
-                stacklevel=4,
-            )
+        chosen = min(tried, key=error)
+        tracker.best_cost = error(chosen)
         return chosen, data
 
     def _fields(self, data: TrainingData) -> dict[str, Any]:
@@ -529,8 +526,9 @@ def stable(model: Narx, data: TrainingData) -> bool:
     centre, half = model.output_scale
     most = (1.0 + 2.0 * BOUND) * half
     levels = [low, high, *np.linspace(low, high, 7), high, low]
-    # as fast as the data ever go, for nothing is known of faster inputs
-    fastest = max(np.quantile(np.abs(np.diff(run.u)), 0.99) for run in data.runs)
+    # as fast as the data go on 99 % of their way, for nothing is known of faster inputs
+    moves = np.sort(np.concatenate([np.abs(np.diff(run.u)) for run in data.runs]))
+    fastest = moves[np.searchsorted(np.cumsum(moves), 0.99 * moves.sum())] or high - low
     ramps = [
         np.linspace(start, stop, 2 + int(abs(stop - start) / fastest))
         for start, stop in pairwise(levels)

@@ -16,6 +16,12 @@ from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import Preset, preset
 
+LEAST_DAMPING, MOST_DAMPING = 0.02, 100.0
+"""Bounds of the damping, within those of the decay; see `damping_range`."""
+
+LARGEST_GAIN = 3.0
+"""Largest steady-state output over the range of the input, relative to the range of the output."""
+
 Structure = Literal["P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"]
 
 
@@ -64,14 +70,10 @@ class ProcessModelEstimator(SeparableEstimator):
         return 1 if "U" in self.structure else int(self.structure[1])
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of [log time constants, log damping]."""
-        step = data.sample_time or 1.0
-        longest = max(run.u.size for run in data.runs) * step
-        lower, upper = [np.log(step)] * self.n_times, [np.log(10 * longest)] * self.n_times
-        if "U" in self.structure:
-            lower.append(np.log(0.02))
-            upper.append(np.log(100.0))
-        return np.array(lower), np.array(upper)
+        """Return bounds of [log time constants], and of the share of the damping in its range."""
+        oscillates, step = "U" in self.structure, data.sample_time or 1.0
+        lower, upper = (np.full(self.n_times, np.log(k * step)) for k in (1.0, data.slowest))
+        return np.append(lower, [0.0] * oscillates), np.append(upper, [1.0] * oscillates)
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return initial lags; for several, distinct ones."""
@@ -82,8 +84,10 @@ class ProcessModelEstimator(SeparableEstimator):
     def unit(self, theta: Array, data: TrainingData, gain: float = 1.0) -> ProcessModel:
         """Return the model without zero and offsets."""
         n = self.n_times
-        damping = float(np.exp(theta[n])) if "U" in self.structure else None
-        times = np.sort(np.exp(theta[:n]))[::-1]
+        times, damping = np.sort(np.exp(theta[:n]))[::-1], None
+        if "U" in self.structure:
+            least, most = damping_range(times[0], data)
+            damping = least * (most / least) ** float(theta[n])
         return ProcessModel(
             gain,
             tuple(times.tolist()),
@@ -113,10 +117,9 @@ class ProcessModelEstimator(SeparableEstimator):
         responses, left = np.column_stack(columns), np.zeros(run.u.size)
         if self.initial == "first_sample" and run.counts[0]:
             ones = np.ones(run.u.size)
-            at_zero = unit.initial_state(np.array([0.0])).tolist()
-            left = 1.0 - replace(unit, input_offset=0.0).simulate(
-                ones, initial=at_zero, sample_time=run.sample_time
-            )
+            plain = replace(unit, input_offset=0.0)
+            at_zero = plain.initial_state(np.array([0.0])).tolist()
+            left = 1.0 - plain.simulate(ones, initial=at_zero, sample_time=run.sample_time)
             left /= left[0]
         known = responses - np.outer(left, responses[0])
         return np.column_stack([known, left * float(run.y[0])])
@@ -128,19 +131,53 @@ class ProcessModelEstimator(SeparableEstimator):
 
     def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
         """Return gain, zero and offset, and 1 for the share of the first output."""
-        known = data.target - matrix[:, -1]
+        known, others = data.target - matrix[:, -1], matrix[:, 1:-1]
         found = np.linalg.lstsq(matrix[:, :-1], known, rcond=1e-12)[0]
+        gain = np.clip(found[0], *self.gain_range(data))
+        if gain != found[0]:  # with a single bound the optimum is on it
+            rest = np.linalg.lstsq(others, known - gain * matrix[:, 0], rcond=1e-12)[0]
+            found = np.append(gain, rest)
         return np.append(found, 1.0), 0.0
 
+    def gain_range(self, data: TrainingData) -> tuple[float, float]:
+        """Return the bounds of the gain; a larger one is not seen in the recordings."""
+        (ul, uh), (yl, yh) = data.input_range, data.output_range
+        most = LARGEST_GAIN * (yh - yl) / (uh - ul)
+        return -most, most
+
     def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
-        """Return the responses whose gains are solved for."""
-        return matrix[:, :-1]
+        """Return the responses whose gains are solved for, and not at a bound."""
+        return matrix[:, int(linear[0] in self.gain_range(data)) : -1]
+
+    def at_bounds(self, block: Block, data: TrainingData) -> tuple[int, ...]:
+        """Return the indices of parameters that are zero, or at a bound of the search."""
+        assert isinstance(block, ProcessModel)
+        times = zip(*np.exp(self.bounds(data))[:, : self.n_times], strict=True)
+        ends = [self.gain_range(data), *times]
+        if block.damping is not None:
+            ends.append(damping_range(block.time_constants[0], data))
+        numbers = zip(block.pack(), ends, strict=False)
+        reached = [
+            k for k, (value, of) in enumerate(numbers) if np.isclose(value, of, 1e-3, 0).any()
+        ]
+        return tuple(sorted({*super().at_bounds(block, data), *reached}))
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> ProcessModel:
         gain, offset, zero = float(linear[0]), float(linear[-2]), None
         if "Z" in self.structure:
             zero = float(linear[1] / gain) if gain != 0 else 0.0
         return replace(self.unit(theta, data, gain), zero_time=zero, output_offset=offset)
+
+
+def damping_range(time: float, data: TrainingData) -> tuple[float, float]:
+    """Return the least and largest damping of poles of a time constant [s].
+
+    Their slower decay, `TrainingData.slowest` at most, takes time / damping, or time (damping +
+    sqrt(damping^2 - 1)).
+    """
+    slowest = data.slowest * (data.sample_time or 1.0) / time
+    most = 0.5 * (slowest + 1.0 / slowest)
+    return max(LEAST_DAMPING, 1.0 / slowest), min(MOST_DAMPING, most)
 
 
 def _structure(name: Structure, poles: str, **chosen: Any) -> Preset:

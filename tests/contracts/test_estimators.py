@@ -26,6 +26,7 @@ pytestmark = [
 
 STILL = {
     "activation-pressure": {"contractions 4", "contractions 8"},  # read off the input's extremes
+    "balance-force": {"asymmetry"},  # at its bound
     "p2": {"time constants 2"},  # at its least, the sample time
     "p3": {"time constants 2", "time constants 3"},
 }

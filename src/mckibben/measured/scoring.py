@@ -24,8 +24,7 @@ from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
 START = 20
-"""Measured outputs that any model may start from, and that are not scored, of a test recording that does
-not continue a training recording."""
+"""Measured outputs of a test recording that any model may start from, and that are not scored."""
 
 LEAST_WIDTH = 0.01
 """RMS of the measured branch gaps over the range tested on, below which no width is scored."""

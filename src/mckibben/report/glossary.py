@@ -43,8 +43,8 @@ MODELS = {
     "estimator": "identifies a block from recordings",
     "compensator": "inverse of a model: desired motion in, pressure out",
     "reachable set": "outputs that an inverse can reach from any state",
-    "initial state": "memory before the first sample: `first_sample` (the input has only risen), "
-    "`virgin`, or given",
+    "initial state": "memory before the first sample: from the first measured output, `first_sample` "
+    "(the input has only risen), `virgin`, or given",
     "dead time": "constant delay of the output; it has no causal inverse",
     "preview": "time by which a compensator receives its reference early, to cancel dead time",
     "rig": "virtual experiment, whose physics is independent of the models",

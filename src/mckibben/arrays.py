@@ -10,6 +10,9 @@ from mckibben.errors import DataError
 Array = NDArray[np.float64]
 """Double-precision numbers, of any shape."""
 
+Mask = NDArray[np.bool_]
+"""Which of some samples are meant."""
+
 NARROWEST = 1e-30
 """Smallest range of a channel, in its unit; products of smaller ranges would underflow."""
 

@@ -32,6 +32,9 @@ STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
 """Units of the standard channels; ``pressure_2`` and ``pressure_extensor`` follow ``pressure``."""
 
 
+PERIODIC = "periodic"
+"""Entry of ``meta`` of a recording that is one period of a motion that repeats."""
+
 REST_LENGTH = 'the rest length (`rest_length=MM`, or meta["rest_length"] in Python)'
 """Remedy that states the rest length."""
 
@@ -245,6 +248,11 @@ class Recording(DrawsItself):
         return tuple(map(str, several))
 
     @property
+    def periodic(self) -> bool:
+        """Whether it is one whole period of a motion that repeats, from ``meta["periodic"]``."""
+        return bool(self.meta.get(PERIODIC))
+
+    @property
     def rest_length(self) -> float | None:
         """Length of the muscle at displacement 0 [mm], from ``meta["rest_length"]``."""
         given = self.meta.get("rest_length")
@@ -363,15 +371,9 @@ class Recording(DrawsItself):
             self,
             channels={name: samples[start:stop] for name, samples in self.channels.items()},
             start_time=float(self.time[start]),
+            # a piece of a period does not repeat
+            meta={name: value for name, value in self.meta.items() if name != PERIODIC},
         )
-
-    def continues(self, other: Recording) -> bool:
-        """Return whether this recording begins one sample time after ``other`` ends."""
-        step = self.sample_time
-        if step is None or other.sample_time is None:
-            return False
-        same_grid = abs(step - other.sample_time) <= 1e-3 * step
-        return same_grid and abs(self.start_time - float(other.time[-1]) - step) <= 0.1 * step
 
 
 def sample_time_of(

@@ -283,7 +283,6 @@ def _compared(
     written: Callable[[Sequence[str]], Sequence[str]],
 ) -> Iterator[tuple[dict[str, Any], Results | None]]:
     """Claim the output files of a comparison, read its recordings, and return its arguments."""
-    from mckibben.estimators.catalogue import settings_of_all
     from mckibben.files.sources import expanded
     from mckibben.outputs import results_in
     from mckibben.system import workers
@@ -292,8 +291,7 @@ def _compared(
         workers.prepare()
     arguments = {one.name: getattr(chosen, one.name) for one in fields(CompareOptions)}
     whole = chosen.models in ("all", "quick")
-    names = registry.names("estimators") if whole else list(chosen.models)
-    arguments["settings"] = settings_of_all(names, chosen.settings) if chosen.settings else {}
+    names = registry.names("estimators") if whole else list(map(str, chosen.models))
     files = expanded(files_of(train), files_of(test))
     runs: tuple[list[Recording], ...] = (loaded(train), [], loaded(test))
     sides: list[Data] = [[*some, *more] for some, more in zip(files, runs, strict=True)]

@@ -13,8 +13,9 @@ from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.dynamics.narx import NarxPolynomial
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.blocks.free_run import PERIODIC, run_free
+from mckibben.blocks.free_run import run_free
 from mckibben.blocks.starts import history, start_state
+from mckibben.recording import PERIODIC
 
 T = np.linspace(0, 1, 800)
 U = 2.5 + 2.0 * np.sin(17 * T) * (1 - 0.5 * T) - 0.4 * np.sin(50 * T)

@@ -113,7 +113,9 @@ def test_settings_are_of_one_model_or_nested() -> None:
 
 
 def test_a_bare_setting_goes_to_the_models_that_have_it() -> None:
-    found = settings_of_all(["pi", "bouc-wen"], {"n_operators": 7, "bouc-wen.seed": 3})
+    other = registry.load("estimators", "bouc-wen")
+    both = {"pi": PIEstimator, "bouc-wen": other}
+    found = settings_of_all(both, {"n_operators": 7, "bouc-wen.seed": 3})
     assert found == {"pi": {"n_operators": 7}, "bouc-wen": {"seed": 3}}
     with pytest.raises(ModelError, match="n_operators"):
-        settings_of_all(["bouc-wen"], {"n_operators": 7})
+        settings_of_all({"bouc-wen": other}, {"n_operators": 7})

@@ -54,24 +54,16 @@ def test_extremes_survive_bins_of_many_turns(
         assert np.abs(thin - u[-1]).min() == 0
 
 
-@given(st.integers(900, 1100))
-def test_a_test_that_goes_on_from_training_still_does(cut: int) -> None:
-    whole = run_through([0, 5, 1, 4, 2, 5, 0], 300)
-    train, test = whole.slice(0, cut), whole.slice(cut, len(whole))
-    assert test.continues(train)
-    (a,), (b,), _ = made_manageable([train], [test], "pressure", 150)
-    assert b.continues(a)
-
-
 def test_recordings_are_thinned_alike_and_short_ones_left_out_with_a_word() -> None:
     long, short = run_through([0, 5, 0], 2000), run_through([0, 5, 0], 20).with_meta(name="short")
-    train, test, notes = made_manageable([long, short], [long], "pressure", 100)
+    (train, checks, test), notes = made_manageable([[long, short], [], [long]], "pressure", 100)
+    assert checks == []
     assert [len(r) for r in train] == [98]
     assert train[0].sample_time == test[0].sample_time
     assert len(notes) == 2
     assert "short" in notes[1]
-    assert made_manageable([short], [short], "pressure", 100)[2] == ()
+    assert made_manageable([[short], [short]], "pressure", 100)[1] == ()
     with pytest.raises(DataError):
-        made_manageable([long], [short], "pressure", 100)
+        made_manageable([[long], [short]], "pressure", 100)
     with pytest.raises(DataError):
-        made_manageable([long], [], "pressure", 5)
+        made_manageable([[long], []], "pressure", 5)

@@ -189,6 +189,12 @@ class Block(DrawsItself, Parametrised):
         return (-np.inf, np.inf) if ends is None else ends
 
     @property
+    def driven_range(self) -> tuple[float, float] | None:
+        """Lowest and highest identified driven input; None if it is not known."""
+        parts: tuple[Block, ...] = getattr(self, "parts", ())
+        return parts[0].driven_range if parts else getattr(self, "input_range", None)
+
+    @property
     def n_missable(self) -> int:
         """Number of trailing inputs that may be missing (NaN), in streams, C and arrays."""
         return 0
@@ -359,7 +365,8 @@ class Block(DrawsItself, Parametrised):
             A recording needs a channel for every input.
         initial : {"first_sample", "virgin"} or sequence of float, optional
             Memory before the first sample. Default: of a recording that has the outputs, what the first
-            of these determines, the rest at rest (see `mckibben.blocks.starts`); else the block's own.
+            of these determines, the rest at rest (see `mckibben.blocks.starts`); of one that is a
+            period of a motion, that of the periodic response; else the block's own.
         sample_time : float, optional
             Time between samples [s]; for arrays of a rate-dependent block only.
 
@@ -378,18 +385,12 @@ class Block(DrawsItself, Parametrised):
         """
         if isinstance(data, Recording):
             inputs = self._inputs_from(data)
+            if initial is None and data.periodic:
+                return self.steady_state(data)
             if initial is None:
                 initial = self.start_on(data).tolist()
             outputs = self._run(inputs, data.sample_time, initial)
-            if not np.isfinite(outputs).all():
-                raise ModelError(
-                    f"the output of {self.kind!r} is not finite on {data.name}",
-                    remedy="this model does not suit these data; identify it again",
-                )
-            units = {channel.name: channel.unit for channel in self.outputs}
-            modelled = dict(zip(units, outputs.T, strict=True))
-            kept = data.select([channel.name for channel in self.inputs])
-            return kept.with_channels(units, **modelled)
+            return self._modelled(data, outputs)
         try:
             array = np.asarray(data, dtype=np.float64)
         except (TypeError, ValueError) as error:
@@ -399,6 +400,12 @@ class Block(DrawsItself, Parametrised):
             ) from None
         outputs = self._run(self._inputs_from_array(array), sample_time, initial)
         return outputs[:, 0] if array.ndim == 1 and outputs.shape[1] == 1 else outputs
+
+    def steady_state(self, recording: Recording) -> Recording:
+        """Return the response to one period of a motion that repeats: at least the second."""
+        inputs = self._inputs_from(recording)
+        twice = self._run(np.tile(inputs, (2, 1)), recording.sample_time, None)
+        return self._modelled(recording, twice[len(inputs) :])
 
     def stream(self, sample_time: float | None = None, *, initial: Initial | None = None) -> Stream:
         """Return a stepper for sample-by-sample use; see `Stream`."""
@@ -447,6 +454,18 @@ class Block(DrawsItself, Parametrised):
         self.bind(sample_time, state, inputs, outputs)()
         self.report(state)
         return outputs
+
+    def _modelled(self, recording: Recording, outputs: Array) -> Recording:
+        """Return the inputs of a recording and outputs, (n, n_outputs), which must be finite."""
+        if not np.isfinite(outputs).all():
+            raise ModelError(
+                f"the output of {self.kind!r} is not finite on {recording.name}",
+                remedy="this model does not suit this recording; identify it again",
+            )
+        units = {channel.name: channel.unit for channel in self.outputs}
+        modelled = dict(zip(units, outputs.T, strict=True))
+        kept = recording.select([channel.name for channel in self.inputs])
+        return kept.with_channels(units, **modelled)
 
     def check_time(self, sample_time: float | None) -> None:
         """Warn if the sample time changes the model or one of its parts."""

@@ -10,7 +10,6 @@ block, or where a start was stated, the block begins as it states: by default at
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -18,7 +17,6 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.fields import drives
-from mckibben.errors import ModelWarning
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
@@ -105,16 +103,12 @@ def unstated(block: Block) -> bool:
 
 
 def _outputs(block: Block, inputs: Array, sample_time: float | None) -> Array:
-    """Return the outputs over inputs, (k, n_inputs), of a run from rest; infinite after a warning."""
+    """Return the outputs over inputs, (k, n_inputs), of a run from rest; infinite where it clipped."""
     state = block.initial_state(inputs[0], "first_sample")
     outputs = np.empty((len(inputs), len(block.outputs)))
     block.bind(sample_time, state, np.ascontiguousarray(inputs), outputs)()
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", ModelWarning)
-        try:
-            block.report(state)
-        except ModelWarning:  # a past that the model itself warns of is none
-            outputs[:] = np.inf
+    if block.n_clipped(state):  # a past that the model itself warns of is none
+        outputs[:] = np.inf
     return outputs
 
 
@@ -143,7 +137,7 @@ def _excursion(block: Block, inputs: Array, outputs: Array, sample_time: float |
     none explains the outputs, it is the end that explains them better.
     """
     first, given = inputs[0], inputs[:, 0]
-    low, high = getattr(_first_part(block), "input_range", None) or (first[0], first[0])
+    low, high = block.driven_range or (first[0], first[0])
     low, high = min(low, float(given.min())), max(high, float(given.max()))
     held = np.tile(first, (SETTLING if block.rate_dependent else 0, 1))
 
@@ -192,7 +186,3 @@ def _where(
         return way(high)
     tolerance = PRECISE * (high - low)
     return way(float(brentq(missed, low, high, xtol=tolerance, disp=False)))
-
-
-def _first_part(block: Block) -> Block:
-    return _first_part(block.parts[0]) if hasattr(block, "parts") else block

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mckibben.blocks.free_run import Mask
+from mckibben.arrays import Mask
 from mckibben.channels import Channels, held_at_levels
 from mckibben.comparison.doubts import Span
 from mckibben.recording import Recording

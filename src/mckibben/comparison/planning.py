@@ -19,14 +19,12 @@ from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.parts import parts_of, spans_of
 from mckibben.comparison.splits import Split, split_of
 from mckibben.errors import DataError, ModelError
-from mckibben.estimators.catalogue import declared
+from mckibben.estimators.catalogue import declared, settings_of_all
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.numerals import counted
 from mckibben.recording import Recording, listed, reading_notes
 from mckibben.signals import made_manageable
 from mckibben.signals.shared_rows import check_shared
-
-Settings = Mapping[str, Mapping[str, Any]]
 
 Models = str | Sequence[str] | Mapping[str, str | Estimator]
 """Models of a comparison: "all", "quick", short names, or labels with short names or estimators."""
@@ -76,7 +74,7 @@ def plan_of(
     load: str | None = None,
     validation: Sequence[Recording] = (),
     models: Models = "all",
-    settings: Settings | None = None,
+    settings: Mapping[str, Any] | None = None,
     seed: int = 0,
     most_samples: int | None = None,
     allow_shared: bool = False,
@@ -85,8 +83,12 @@ def plan_of(
     recordings, tests, checks = listed(train), listed(test), listed(validation)
     if not recordings:
         raise DataError("there are no recordings to fit", remedy="give at least one")
+    channels = channels_of([*recordings, *tests, *checks], inputs, outputs, load)
+    names = (*channels.inputs, *channels.outputs)
+    recordings, tests, checks = (
+        [one.with_derived(names) for one in side] for side in (recordings, tests, checks)
+    )
     every = [*recordings, *tests, *checks]
-    channels = channels_of(every, inputs, outputs, load)
     unit = _checked([recordings, every], channels)
     notes: tuple[str, ...] = ()
     shared = check_shared(
@@ -96,8 +98,8 @@ def plan_of(
         allow=allow_shared,
     )
     if channels.single:
-        recordings, tests, thinned = made_manageable(
-            recordings, tests, channels.inputs[0], most_samples
+        (recordings, checks, tests), thinned = made_manageable(
+            [recordings, checks, tests], channels.inputs[0], most_samples
         )
         notes = (*thinned, *notes)
     elif most_samples is not None:
@@ -112,14 +114,9 @@ def plan_of(
     if chosen_by == "cross-validation":
         described += f", cross-validated on {counted(len(parts), 'part')}"
     items, left_out = _chosen(models, every, channels, seed)
-    given = dict(settings or {})
-    named = {*items, *(registry.names("estimators") if models in ("all", "quick") else ())}
-    if lost := sorted({*given} - named):
-        raise ModelError(
-            f"no model is compared that is named {', '.join(lost)}",
-            parameter="settings",
-            remedy="add it to `models`, or leave its settings out",
-        )
+    made = {name: item.made for name, item in items.items()}
+    made |= {name: declared(name) for name in left_out}
+    given = settings_of_all(made, settings) if settings else {}
     # that a model is not given the load is no reason against it
     unloaded = replace(channels, scheduling=None)
     refused = objections(items, split.train, channels)

@@ -8,6 +8,7 @@ from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from mckibben.comparison.fitting import (
     row_of,
 )
 from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.comparison.planning import Models, Plan, Settings, plan_of
+from mckibben.comparison.planning import Models, Plan, plan_of
 from mckibben.diagnosis.bands import tested_band
 from mckibben.errors import MckibbenError
 from mckibben.numerals import duration
@@ -87,7 +88,7 @@ def compare(
     load: str | None = None,
     validation: Sequence[Recording] = (),
     models: Models = "all",
-    settings: Settings | None = None,
+    settings: Mapping[str, Any] | None = None,
     seed: int = 0,
     jobs: int | None = None,
     executor: Executor | None = None,

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mckibben.arrays import Array
-from mckibben.blocks.free_run import Mask
+from mckibben.arrays import Array, Mask
 from mckibben.channels import Channels, held_at_levels
 from mckibben.errors import DataError
 from mckibben.numerals import counted

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from typing import Any
 
@@ -123,16 +123,18 @@ def described() -> dict[str, Any]:
 
 def settings_of(model: str, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of one model's estimator; see `settings_of_all`."""
-    return settings_of_all([model], given)[model]
+    return settings_of_all({model: registry.load("estimators", model)}, given)[model]
 
 
-def settings_of_all(models: Iterable[str], given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def settings_of_all(
+    estimators: Mapping[str, type[Estimator]], given: Mapping[str, Any]
+) -> dict[str, dict[str, Any]]:
     """Return the settings of several models, checked against their declarations.
 
     Parameters
     ----------
-    models : iterable of str
-        Short names.
+    estimators : mapping of str to type
+        By short name, or another label.
     given : mapping
         ``NAME`` -> value, of all models that have it; ``MODEL.NAME`` -> value; or ``MODEL`` -> settings.
 
@@ -141,7 +143,6 @@ def settings_of_all(models: Iterable[str], given: Mapping[str, Any]) -> dict[str
     ModelError
         If no model has one of the settings, or it may not have that value.
     """
-    estimators = {name: registry.load("estimators", name) for name in models}
     known = {name: [one.name for one in fields(each)] for name, each in estimators.items()}
     found: dict[str, dict[str, Any]] = {name: {} for name in estimators}
     flat = {

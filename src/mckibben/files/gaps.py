@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.arrays import Array, true_runs
+from mckibben.arrays import Array, Mask, true_runs
 from mckibben.files import timebase
 from mckibben.files.converting import Times
 from mckibben.files.notices import listed
-from mckibben.files.quality import Mask
 from mckibben.files.request import FEWEST, Source
 from mckibben.files.units import convert
 

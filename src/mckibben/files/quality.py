@@ -6,15 +6,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.files.headers import unit_of
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.units import SPELLINGS, convert
-
-Mask = NDArray[np.bool_]
 
 
 class Plausible(NamedTuple):

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from mckibben.arrays import Array
-from mckibben.blocks.free_run import Mask
+from mckibben.arrays import Array, Mask
 from mckibben.channels import Channels, channels_of
 from mckibben.comparison.splits import Split, split_of
 from mckibben.diagnosis.branch_gaps import gap_ratio, paired_gaps

@@ -14,14 +14,13 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from mckibben.blocks.free_run import PERIODIC
 from mckibben.comparison.splits import FEWEST
 from mckibben.errors import DataError
 from mckibben.files import read
 from mckibben.files.channels import NAME, Folder, describing, description
 from mckibben.files.formats import SOUGHT, reason
 from mckibben.files.sources import inside, is_bag
-from mckibben.recording import Recording
+from mckibben.recording import PERIODIC, Recording
 from mckibben.signals import resample
 
 KNOWN = Path(str(resources.files("mckibben.measured"))) / "known"

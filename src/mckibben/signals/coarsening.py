@@ -76,22 +76,22 @@ def _beyond(u: NDArray[np.float64]) -> bool:
 
 
 def made_manageable(
-    train: Sequence[Recording], test: Sequence[Recording], channel: str, most: int | None = None
-) -> tuple[list[Recording], list[Recording], tuple[str, ...]]:
-    """Return recordings thinned alike to at most so many samples for fit and test.
+    sides: Sequence[Sequence[Recording]], channel: str, most: int | None = None
+) -> tuple[list[list[Recording]], tuple[str, ...]]:
+    """Return recordings thinned alike to at most so many samples for fit, for choice and for test.
 
     Parameters
     ----------
-    train, test : sequence of Recording
-        All have the channel.
+    sides : sequence of sequence of Recording
+        For fit, for choice, for test. All have the channel.
     channel : str
         What drives.
     most : int, optional
-        Samples of all training recordings together, and of all test recordings; default `MOST`.
+        Samples of all recordings of a side together; default `MOST`.
 
     Returns
     -------
-    train, test : list of Recording
+    sides : list of list of Recording
     notes : tuple of str
         What was done, in words.
 
@@ -102,21 +102,20 @@ def made_manageable(
     """
     most = MOST if most is None else most
     require(most >= FEWEST, "most_samples", most, f"{FEWEST} or more", DataError)
-    total = max(sum(map(len, train)), sum(map(len, test)))
+    total = max(sum(map(len, recordings)) for recordings in sides)
     factor = -(-total // most)
     if factor == 1:
-        return list(train), list(test), ()
-    step = train[0].sample_time
+        return [list(recordings) for recordings in sides], ()
+    step = next(recordings[0].sample_time for recordings in sides if recordings)
     grid = "" if step is None else f", {step * factor:g} s apart: models hold for that sample time"
     notes = [
         f"{total} samples are many: one in {factor} is used{grid}, turning points first. Models are "
         "fitted, chosen and tested on those."
     ]
-    aligned = [_continuing(recording, train, factor) for recording in test]
-    parts, lost = [], 0
-    for recordings in (list(train), aligned):
+    thinned, lost = [], 0
+    for recordings in sides:
         long = [r for r in recordings if len(r) >= FEWEST * factor]
-        parts.append([coarsened(recording, factor, channel) for recording in long])
+        thinned.append([coarsened(recording, factor, channel) for recording in long])
         lost += sum(_lost(recording[channel], factor) for recording in long)
         left_out = [r.name for r in recordings if len(r) < FEWEST * factor]
         if left_out:
@@ -132,14 +131,7 @@ def made_manageable(
         notes.append(
             f"{lost} turning points lie too close to others and are lost: allow more samples."
         )
-    return parts[0], parts[1], tuple(notes)
-
-
-def _continuing(recording: Recording, others: Sequence[Recording], factor: int) -> Recording:
-    """Return a recording without the samples of a bin shared with its predecessor."""
-    before = next((other for other in others if recording.continues(other)), None)
-    skipped = 0 if before is None else -len(before) % factor
-    return recording.slice(skipped, len(recording)) if skipped + 2 <= len(recording) else recording
+    return thinned, tuple(notes)
 
 
 def _lost(u: NDArray[np.float64], factor: int) -> int:

@@ -243,9 +243,8 @@ def _submitted(
 
 
 def _alone(work: Work, common: Any, item: Any) -> Any:
-    """Do the work on one item, on one thread and without warnings, as a worker process does."""
-    with threads.one_blas_thread(), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    """Do the work on one item, on one thread."""
+    with threads.one_blas_thread():
         return work(common, item, _silent)
 
 

@@ -461,6 +461,11 @@ class Balance(Invertible):
         flat = np.hstack([np.reshape(table, (n, -1)) for table in own])
         return np.concatenate([*shared, *(np.concatenate(row) for row in tables), flat.ravel()])
 
+    @property
+    def driven_range(self) -> tuple[float, float] | None:
+        """Lowest and highest identified pressure."""
+        return self.pressure_range
+
     def reachable(self) -> tuple[Array, Array]:
         """Return the lowest and highest pressures."""
         if self.pressure_range is None:

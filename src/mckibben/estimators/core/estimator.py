@@ -16,12 +16,12 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import ArrayLike
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.free_run import run_free
 from mckibben.errors import DataError, MckibbenError, ModelError, ModelWarning
-from mckibben.estimators.core.data import Mask, TrainingData, training_data
+from mckibben.estimators.core.data import TrainingData, training_data
 from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.core.leaving_out import stepped
 from mckibben.estimators.core.settings import check_settings

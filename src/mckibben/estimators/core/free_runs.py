@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
-from mckibben.blocks.free_run import PERIODIC, Mask, run_free
+from mckibben.blocks.free_run import run_free
 from mckibben.blocks.running import run_many
 from mckibben.blocks.starts import history, known_state
 from mckibben.metrics import rmse
@@ -70,7 +70,7 @@ class FreeRuns:
         inputs = [channel.name for channel in self.block.inputs]
         pairs = zip(self.recordings, self.rows, strict=True)
         return [
-            r.select(inputs) if self.at_rest or not rows[0] or r.meta.get(PERIODIC) else r
+            r.select(inputs) if self.at_rest or not rows[0] or r.periodic else r
             for r, rows in pairs
         ]
 
@@ -154,7 +154,7 @@ class FreeRuns:
         found = []
         for place, (recording, before) in enumerate(zip(self.recordings, self.pasts, strict=True)):
             own = [self.changed(block, place) for block in blocks]
-            if recording.meta.get(PERIODIC):
+            if recording.periodic:
                 found.append(np.array([run_free(block, recording, self.names) for block in own]))
                 continue
             inputs = recording.matrix(channel.name for channel in self.block.inputs)

@@ -24,9 +24,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
-from mckibben.blocks.free_run import Mask
 from mckibben.errors import MckibbenError
 from mckibben.estimators.core.free_runs import FreeRuns, as_it_is, relative_sizes
 from mckibben.estimators.core.uncertainty import LARGEST

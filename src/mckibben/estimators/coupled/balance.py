@@ -17,7 +17,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from annotated_types import Gt, Interval
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance, balance_in
@@ -25,7 +25,7 @@ from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import rows, vector
 from mckibben.channels import schedules
 from mckibben.errors import ModelError
-from mckibben.estimators.core.data import Mask, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.coupled.balance_bench import (

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from pydantic import InstanceOf
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Mask
 from mckibben.channels import LOADS
 from mckibben.errors import ModelError
-from mckibben.estimators.core.data import Mask, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_structure import Bench, Structure
 from mckibben.muscles.prior import Prior, prior_of
 from mckibben.muscles.sheet import Sheet

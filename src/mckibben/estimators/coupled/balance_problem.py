@@ -13,14 +13,14 @@ import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance_law import coordinate_at
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Contact, PiecewiseLinear
 from mckibben.blocks.running import run_many
-from mckibben.estimators.core.data import Mask, Run, TrainingData
+from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.coupled.constrained import constrained_least_squares

@@ -16,9 +16,8 @@ from itertools import compress, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Mask
 from mckibben.errors import ModelError
-from mckibben.estimators.core.data import Mask
 from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, PriorErrors
 from mckibben.estimators.coupled.balance_problem import MOST_CUTS, Problem, bounded_least_squares
 from mckibben.estimators.coupled.balance_structure import Indices, Structure, Term

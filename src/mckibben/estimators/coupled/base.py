@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.channels import loads_among, numbered, one, schedules
 from mckibben.errors import DataError
-from mckibben.estimators.core.data import Mask, Run, TrainingData, training_data
+from mckibben.estimators.core.data import Run, TrainingData, training_data
 from mckibben.estimators.core.estimator import Estimator, resting
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed

@@ -20,11 +20,10 @@ from typing import Annotated, ClassVar
 import numpy as np
 from annotated_types import Ge, Gt, Interval, Len
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
 from mckibben.blocks.fields import Channel, rows, vector
-from mckibben.blocks.free_run import Mask
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.coupled.base import CoupledEstimator

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from annotated_types import Interval, Len
 
+from mckibben.arrays import Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Parallel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
@@ -16,7 +17,7 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.parameters import Parametrised
 from mckibben.channels import schedules
 from mckibben.errors import DataError, ModelError
-from mckibben.estimators.core.data import Mask, Run, TrainingData
+from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Grid, Start, resting
 from mckibben.estimators.dynamics.prediction_error import (
     Beginning,

@@ -24,7 +24,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from annotated_types import Interval
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.narx import (
     Narx,
@@ -35,7 +35,7 @@ from mckibben.blocks.dynamics.narx import (
 from mckibben.blocks.fields import vector
 from mckibben.blocks.kernels import kernel
 from mckibben.errors import DataError, ModelError, ModelWarning
-from mckibben.estimators.core.data import Mask, Run, TrainingData
+from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, SearchEstimator
 from mckibben.estimators.core.free_runs import relative_sizes
 from mckibben.estimators.hysteresis.pi import play_operators

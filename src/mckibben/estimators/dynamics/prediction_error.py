@@ -23,8 +23,8 @@ from typing import Literal
 
 import numpy as np
 
-from mckibben.arrays import Array
-from mckibben.estimators.core.data import Mask, Run
+from mckibben.arrays import Array, Mask
+from mckibben.estimators.core.data import Run
 from mckibben.estimators.optimisers.multi_start import follow_best, trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 

@@ -447,6 +447,7 @@ def _inverse(
     from mckibben.blocks.force.feedforward import ForceFeedforward
     from mckibben.blocks.predictive import Predictive
     from mckibben.estimators.coupled.sdchm import trained_inverse
+    from mckibben.studying.inverting import made
 
     if chosen.learned:
         runs = read_files(chosen.learned, None, reading)
@@ -460,13 +461,13 @@ def _inverse(
             return Inverse(block, "itself")
         return Inverse(load_of(block), "force")
     if not chosen.adaptive:
-        if (feedforward := ForceFeedforward.of(block)) is not None:
-            return Inverse(feedforward, "feedforward")
+        if ForceFeedforward.of(block) is not None:
+            return Inverse(made(block), "feedforward")
         if not block.inverts and drives(block.outputs[0]) and not drives(block.inputs[0]):
             return Inverse(block, "itself")
     kind = "adaptive" if chosen.adaptive else "inverse"
     time = 60.0 if chosen.time is None else chosen.time
-    inverse = adaptive(block, time, chosen.noise) if chosen.adaptive else block.inverse()
+    inverse = adaptive(block, time, chosen.noise) if chosen.adaptive else made(block)
     ends = [(float(low), float(high)) for low, high in zip(*block.reachable(), strict=True)]
     known = all(math.isfinite(end) for pair in ends for end in pair)
     names = [channel.name for channel in block.outputs]
@@ -571,12 +572,12 @@ def export(
     target : {"c", "fmu", "ros2", "mjcf"}
         Of that target: `COptions`, `FMUOptions`, `MJCFOptions`, or for ROS 2 `ExportOptions`.
     """
-    from mckibben.blocks.force.feedforward import compensator
     from mckibben.export import export_c, export_fmu, export_ros2
     from mckibben.export.c.emulation import emulate
     from mckibben.export.naming import name_from
     from mckibben.export.programs import self_test
     from mckibben.outputs import refuse_inputs
+    from mckibben.studying.inverting import made
 
     kinds = {"c": COptions, "fmu": FMUOptions, "ros2": ExportOptions, "mjcf": MJCFOptions}
     if target not in kinds:
@@ -588,7 +589,7 @@ def export(
     if target == "mjcf":
         return _export_mjcf(saved(model), out, chosen)
     block = saved(model, chosen.fields)
-    block = compensator(block) if chosen.inverse else block
+    block = made(block) if chosen.inverse else block
     name = chosen.name or next(map(name_from, _paths(model)), "model")
     common = {"sample_time": chosen.sample_time, "force": chosen.force}
     tests: list[str | None] = [None, None]

@@ -20,7 +20,8 @@ from mckibben.diagnosis.branch_gaps import Memory
 from mckibben.metrics import score
 from mckibben.recording import Recording
 from mckibben.signals import triangle
-from mckibben.studying.inverting import InverseCheck, check_inverse
+from mckibben.studying.inverting import Compensation, checked
+from mckibben.studying.recorded_inputs import RecordedInputs
 from mckibben.studying.study import Study
 
 Array = NDArray[np.float64]
@@ -145,15 +146,18 @@ def study(
         characterization=characterize([*train, *test], input_name, output_name),
         leaderboard=board,
         predictions=predictions,
-        inverse=checked_inverse(blocks, train[0]) if inverse and blocks else None,
+        inverse=compensated(rows[0], train[0]) if inverse and blocks else None,
         notes=notes,
     )
 
 
-def checked_inverse(blocks: Mapping[str, Block], recording: Recording) -> InverseCheck:
-    """Return the check of the first model's inverse."""
-    name, block = next(iter(blocks.items()))
-    return check_inverse(name, block, recording)
+def compensated(row: Row, recording: Recording) -> Compensation:
+    """Return what is expected of the compensator of a row."""
+    assert row.block is not None
+    space = RecordedInputs.of([recording], [channel.name for channel in row.block.inputs])
+    check = checked(row.block, space, model=row.model)
+    error, ends = row.test_error, row.rmse_interval
+    return Compensation(row.model, check.inverse, "mm", error, ends, 10 * error, check)
 
 
 def renamed(block: Block, names: tuple[str, str]) -> Block:

@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import GPI, PI, DataError, PiecewiseLinear, Recording, study
-from mckibben.blocks.base import Block
+from mckibben import GPI, DataError, Recording, study
 from mckibben.blocks.fields import Channel
 from mckibben.diagnosis.check import Validation
 from mckibben.files import read, write
 from mckibben.rigs import load_rig
 from mckibben.signals import triangle
-from mckibben.studying.inverting import check_inverse
 from mckibben.studying.loops import closed_loops, named, recorded_rig
 
 TIME = np.arange(0, 24, 0.02)
@@ -50,27 +48,6 @@ def test_check_and_leaderboard_have_one_mean_to_beat(train: Recording) -> None:
     assert one.rmse == pytest.approx(found.leaderboard.rows[0].test_error)
     assert one.mean_error == pytest.approx(found.leaderboard.constant.test_error)
     assert not one.useless
-
-
-@pytest.mark.parametrize("block", [PI.example(), GPI.example()], ids=lambda b: b.kind)
-def test_inverse_check_covers_the_reachable_range(block: Block, train: Recording) -> None:
-    check = check_inverse("it", block, train)
-    assert check.error <= 1e-12
-    assert check.reachable is not None
-    low, high = check.reachable
-    assert np.ptp(check.reference) > 0.9 * (high - low)
-    assert np.all((check.pressure >= 0) & (check.pressure <= 5))
-
-
-def test_inverse_check_keeps_the_units_of_other_channels(train: Recording) -> None:
-    block = replace(
-        PiecewiseLinear.example(), input=Channel("stroke", "mm"), output=Channel("pull", "N")
-    )
-    samples = {"stroke": train["displacement"], "pull": train["pressure"]}
-    recording = Recording(samples, 0.02, units={"stroke": "mm", "pull": "N"})
-    check = check_inverse("it", block, recording)
-    assert check.own
-    assert check.error <= 1e-12
 
 
 @pytest.mark.parametrize(("driven", "closed"), [("voltage", True), ("pressure", False)])
@@ -137,19 +114,3 @@ def test_no_loop_is_closed_on_a_rig_that_is_not_known(meta: dict[str, Any], matc
     other = load_rig("rail").run(given)
     with pytest.raises(DataError, match=match):
         recorded_rig([given.with_meta(**meta), other])
-
-
-def test_no_compensation_leaves_the_loop_of_the_model() -> None:
-    """Read off the rising branch of one stop, falling references are off by its height: 2 r w."""
-    weight, threshold = 4.0, 0.4
-    model = PI((0.0, threshold), (2.0, weight), 0.0, (0.0, 5.0))
-    t = np.arange(500) * 0.05
-    recording = Recording({"pressure": 2.5 - 2.5 * np.cos(t)}, 0.05)
-    found = check_inverse(
-        "pi", model, model.simulate(recording).with_channels(pressure=recording["pressure"])
-    )
-    assert found.reachable is not None
-    assert found.uncompensated_error is not None
-    height = 2 * threshold * weight / (found.reachable[1] - found.reachable[0])
-    assert found.error < 1e-9
-    assert found.uncompensated_error == pytest.approx(height, rel=0.02)

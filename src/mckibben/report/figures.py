@@ -323,9 +323,9 @@ def _study_recordings(drawn: Callable[..., Drawing]) -> Callable[[Study], Drawin
 
 def _inverse(study: Study) -> Drawing:
     """Draw desired and modelled output, error, and the input that the inverse computes."""
-    if study.inverse is None or study.inverse.reachable is None:
+    if study.inverse is None:
         raise ModelError("no model of this study has an inverse", remedy="compare pi, mpi and gpi")
-    return model_subjects.inverse_check(study.inverse, study.train[0].sample_time is not None)
+    return model_subjects.inverse_check(study.inverse.check)
 
 
 # --- What was found ---------------------------------------------------------------------------------

@@ -92,14 +92,8 @@ def tracking(loops: Mapping[str, Tracked], output: str, points: int = POINTS) ->
     return Drawing((Panel(time_label(first), axis_label(output, first.units[output]), curves),))
 
 
-def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
-    """Draw reference and output, their difference, and the input computed by the inverse.
-
-    Parameters
-    ----------
-    timed : bool
-        Whether ``check.time`` is in seconds, and not in samples.
-    """
+def inverse_check(check: InverseCheck) -> Drawing:
+    """Draw reference and output, their difference, and the input computed by the inverse."""
     wanted, given = check.inverse.inputs[0], check.inverse.outputs[0]
     reference, output = check.reference[:, 0], check.output[:, 0]
     rows: list[tuple[str, str, list[Course]]] = [
@@ -107,10 +101,8 @@ def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
         ("error", wanted.unit, [(output - reference, "", "series-6", "fine")]),
         (given.name, given.unit, [(check.pressure[:, 0], "", "input", "line")]),
     ]
-    if check.uncompensated is not None:
-        rows[0][2].append((check.uncompensated[:, 0], "no compensation", "series-2", "line"))
     rows[0][2].append((output, "model behind its inverse", "series-1", "line"))
-    x, least = "time [s]" if timed else "sample", 1e-6 * float(np.ptp(reference))
+    x, least = "time [s]" if check.timed else "sample", 1e-6 * float(np.ptp(reference))
     panels = [
         Panel(x, axis_label(name, unit), _courses(check.time, POINTS, *given), least=least)
         for name, unit, given in rows

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from mckibben.channels import any_moves
 from mckibben.diagnosis.check import Validation
 from mckibben.diagnosis.coupling import coupling
-from mckibben.numerals import numeral
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
     interactive,
@@ -150,11 +149,10 @@ def _checks(study: Study, view: _View) -> Section | None:
     if isinstance(study.check, Validation):
         for one in study.check.outputs[:MOST_CHECKED]:
             items += results.checked(one)
-    check = study.inverse
-    if check is not None and check.reachable is not None:
-        low, high = (numeral(end, 3) for end in check.reachable)
-        drawing = model_subjects.inverse_check(check, study.train[0].sample_time is not None)
-        caption = f"The inverse of {check.model} on the model, {low} to {high} {board.unit}."
+    items.append(Text(said, "note", listed=True) if (said := words.passed_over(study)) else None)
+    if study.inverse is not None:
+        drawing = model_subjects.inverse_check(study.inverse.check)
+        caption = f"A random motion of {study.inverse.model}, and the model behind its inverse."
         items.append(Figure("inverse", [interactive.plots(drawing)], caption, caption, "tall"))
     if study.loops:
         items.append(Text([f"A measured motion, followed on the virtual rig {study.plant}."]))

@@ -339,7 +339,7 @@ def study(found: Study) -> list[Item]:
     """Return the leaderboard, the three answers, further tiles, and loops."""
     said = [f"{question} {answer}" for question, answer in words.answers(found)]
     said += [f"{one.label}: {one.value}, {one.note}".rstrip(", ") for one in tiles(found)]
-    said += filter(None, [words.not_looped(found)])
+    said += [*words.passed_over(found), *filter(None, [words.not_looped(found)])]
     closed = loops(found.loops) if found.loops else []
     return [*leaderboard(found.leaderboard), Text(said), *closed]
 
@@ -365,12 +365,11 @@ def tiles(study: Study) -> tuple[Tile, ...]:
         model = Tile(
             "Best model", best.model, f"{error} {board.unit} RMSE on the test{of}", "leaderboard"
         )
-    inverse, check = Tile("Inverse", "–", "none", "checks"), study.inverse
-    if check is not None:
-        plain = check.uncompensated_error
-        against = "" if plain is None else f"; static map: {percent(plain)}"
-        note = f"{check.model}, error on the model itself{against}"
-        inverse = Tile("Inverse", percent(check.error), note, "checks")
+    inverse, own = Tile("Compensator", "–", "none", "checks"), study.inverse
+    if own is not None:
+        error, plain = (numeral(x, 2) for x in (own.following_error, own.static_error))
+        note = f"expected RMSE with the inverse of {own.model}; static map: {plain} {own.unit}"
+        inverse = Tile("Compensator", f"{error} {own.unit}".strip(), note, "checks")
     gaps = [words.gap_name(gap) for gap in study.data_gaps]
     listed = ", ".join(gaps[:3]) + " ..." * (len(gaps) > 3)
     return loop, model, inverse, Tile("Data gaps", str(len(gaps)), listed, "recordings")

@@ -32,6 +32,7 @@ def study_files(models: Iterable[str]) -> list[str]:
         "report.html",
         "characterization.json",
         "inverse.json",
+        "inverse_expected.json",
         "validation.json",
         "banded.json",
         "review.json",
@@ -81,6 +82,8 @@ class StudyFolder:
         write_leaderboard(board, self._results)
         if study.inverse is not None:
             write("inverse.json", to_text(study.inverse.inverse))
+            facts = study.inverse.to_dict() | {"passed_over": dict(study.passed_over)}
+            write("inverse_expected.json", to_json(facts) + "\n")
         best = board.best
         if best is not None and not board.pending:
             about = {"not_checked": study.check}

@@ -555,6 +555,11 @@ def _record_next(study: Study) -> str:
     return f"{gap_run(first, ranges=False)[:-1]}: {gap_name(first)} cannot be identified{more}."
 
 
+def passed_over(study: Study) -> list[str]:
+    """Return which better models have no compensator, and why."""
+    return [f"No compensator of {model}: {why}" for model, why in study.passed_over.items()]
+
+
 def not_looped(study: Study) -> str:
     """Return why no loop was closed; empty if one was."""
     return f"No loop was closed: {study.not_looped}" if study.not_looped else ""

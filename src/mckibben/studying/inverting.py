@@ -1,8 +1,14 @@
-"""Check of a model's inverse on the model itself."""
+"""Compensators: the inverse of a model, tested once when it is made, and what is to be expected of it.
+
+A compensator follows a motion as well as its model predicts the muscle, so what is expected of it is the
+model's free-run error on the test. That the model follows behind its own inverse is required: it says
+only that the inverse is right.
+"""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,34 +16,29 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.fields import drives
 from mckibben.blocks.force.feedforward import compensator
-from mckibben.comparison.choosing import acceptable
-from mckibben.comparison.leaderboard import Leaderboard
-from mckibben.control.uncompensated import RISE, curve
+from mckibben.comparison.choosing import acceptable, useful
+from mckibben.comparison.leaderboard import Leaderboard, Row
+from mckibben.comparison.splits import Split
 from mckibben.errors import MckibbenError, ModelError, ModelWarning
 from mckibben.recording import Recording
+from mckibben.studying.recorded_inputs import RecordedInputs
+from mckibben.studying.static_map import static_error
 
-CHECK_SAMPLES = 2000
+FOLLOWED = 1e-9
+"""Largest error of a model behind its inverse, relative to the range of the motion."""
 
-MOST_RISE = 20_000
-"""Samples of a slow rise, and as many without time."""
+PACES = (1.0, 10.0)
+"""Times for which the input takes to run through its range, over the fastest recorded."""
 
-FOLLOWED = 1e-6
-"""Largest error of a valid inverse, relative to the reachable range."""
-
-REACH = 0.01
-"""Smallest reachable range of an inverse, relative to the recorded range of the output."""
-
-NEARLY = 0.01
-"""The same for a model's output on a recording, whose start may be out of reach."""
+MOST_OUTSIDE = 0.05
+"""Largest share of a recorded motion in which commands leave the inputs that were recorded."""
 
 
 @dataclass(frozen=True)
 class InverseCheck:
-    """Result of an inverse on its own model.
-
-    Of one muscle, on a reference it can reach: where nothing is known of that, on what the model makes
-    of a recording. Of several, on a measured motion, which it may not reach.
+    """A random motion of a model, and of the model behind its inverse.
 
     Parameters
     ----------
@@ -46,20 +47,13 @@ class InverseCheck:
     inverse : Block
         The compensator.
     reference, pressure, output : array, shape (n, k)
-        Desired outputs, inputs that the inverse gives, and the model's outputs for these.
+        What the model does under random inputs; what the inverse gives for that; and what the model does
+        then. With a dead time, outputs are later than the references by it.
     time : array, shape (n,)
-        Time [s], or sample numbers.
-    reachable : (float, float) or None
-        Outputs reachable whatever happened before; None where nothing is known of that.
+    timed : bool
+        Whether this is in seconds, and not sample numbers.
     error : float
-        Largest difference between reference and output, relative to that range, or to the reference's.
-    uncompensated : array, shape of ``output``, or None
-        What the model does without the inverse, its inputs read off its own slow rise
-        (`mckibben.control.uncompensated`); None where inputs and outputs do not pair.
-    uncompensated_error : float or None
-        As ``error``.
-    own : bool
-        Whether the reference is what the model makes of a recording.
+        Largest difference between reference and output, relative to the reference's range.
     """
 
     model: str
@@ -68,156 +62,203 @@ class InverseCheck:
     pressure: Array
     output: Array
     time: Array
-    reachable: tuple[float, float] | None
+    timed: bool
     error: float
-    uncompensated: Array | None = None
-    uncompensated_error: float | None = None
-    own: bool = False
+
+
+@dataclass(frozen=True)
+class Compensation:
+    """A compensator, and what is to be expected of it.
+
+    Parameters
+    ----------
+    model : str
+        Whose inverse it is.
+    inverse : Block
+        From desired outputs to inputs.
+    unit : str
+        Of the errors.
+    following_error : float
+        Predicted RMSE with which a muscle follows: the model's free-run error on the test.
+    following_interval : (float, float) or None
+        95 % interval of that.
+    static_error : float
+        Error of a static map on the same test; see `static_error`.
+    check : InverseCheck
+        Of the inverse on its own model.
+    """
+
+    model: str
+    inverse: Block
+    unit: str
+    following_error: float
+    following_interval: tuple[float, float] | None
+    static_error: float
+    check: InverseCheck
 
     @property
     def given(self) -> str:
-        """Label of the inverse's outputs."""
+        """Label of the compensator's outputs."""
         return ", ".join(channel.name for channel in self.inverse.outputs)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the inverted model, and the errors."""
-        reachable = None if self.reachable is None else list(self.reachable)
-        found = {"model": self.model, "error": self.error, "reachable": reachable}
-        return found | {"uncompensated_error": self.uncompensated_error}
+        """Return whose it is, and its errors."""
+        return {
+            "model": self.model,
+            "unit": self.unit,
+            "following_error": self.following_error,
+            "following_interval": self.following_interval and list(self.following_interval),
+            "static_map_error": self.static_error,
+            "inverse_error": self.check.error,
+        }
 
 
-def invert_best(board: Leaderboard, recording: Recording) -> InverseCheck | None:
-    """Invert the first model of a leaderboard that has an inverse, and check it.
+def compensation(
+    board: Leaderboard, split: Split, seed: int = 0
+) -> tuple[Compensation | None, Mapping[str, str]]:
+    """Return the compensator of the first model of a leaderboard that has a good one.
 
-    None where no model is recommended, for an inverse is as good as its model.
+    Parameters
+    ----------
+    board : Leaderboard
+        Without a recommended model there is no compensator: one is as good as its model.
+    split : Split
+        The recordings of the leaderboard.
+    seed : int
+        Of the random motion of the check.
+
+    Returns
+    -------
+    found : Compensation or None
+    passed_over : mapping of str to str
+        The models before it in the order of the choice, and why they have no compensator.
     """
     if board.best is None:
-        return None
+        return None, {}
+    passed_over: dict[str, str] = {}
     judged = board.best.skill_least is not None
+    plain = static_error(split, (*board.inputs, *board.loads), board.outputs)
     for row in board.rows:
         unvalidated = judged and row.skill_least is None  # the test must not decide
         if row.block is None or unvalidated or not acceptable(row, board.constant):
             continue
         try:
-            return check_inverse(row.model, row.block, recording)
-        except ModelError:
-            continue
-    return None
+            return _of_row(row, row.block, board, split, plain, seed), passed_over
+        except MckibbenError as error:
+            passed_over[row.model] = str(error)
+    return None, passed_over
 
 
-def check_inverse(model: str, block: Block, recording: Recording) -> InverseCheck:
-    """Pass a reference through the inverse and back through the model.
+def _of_row(
+    row: Row, block: Block, board: Leaderboard, split: Split, plain: float, seed: int
+) -> Compensation:
+    """Return the compensator of a row; raise a `ModelError` where it has no good one."""
+    if not drives(compensator(block).outputs[0]):
+        raise ModelError("its inverse gives no input of a muscle", remedy="invert another model")
+    if not useful(row.test_error, plain):
+        raise ModelError(
+            f"its error on the test, {row.test_error:.3g} {board.unit}, is not clearly below that of a "
+            f"static map, {plain:.3g}",
+            remedy="record more, or use the static map",
+        )
+    space = RecordedInputs.of(split.train, [channel.name for channel in block.inputs])
+    check = checked(block, space, model=row.model, seed=seed)
+    for recording in split.test:
+        _refuse_unrecorded(check.inverse, split.train, recording)
+    return Compensation(
+        row.model,
+        check.inverse,
+        board.unit,
+        row.test_error,
+        row.rmse_interval,
+        plain,
+        check,
+    )
 
-    The reference has minor loops over all that can be reached; where a model does not say what that is,
-    it is the output that the model gives for the recording, and of several inputs, the recorded motion.
+
+def checked(
+    block: Block, space: RecordedInputs, *, model: str | None = None, seed: int = 0
+) -> InverseCheck:
+    """Return the compensator of a model, tested on a random motion, slow and fast.
 
     Parameters
     ----------
-    model : str
-        Short name.
     block : Block
-        The model.
-    recording : Recording
-        Gives the sample time, loads, and the pace of the reference.
+    space : RecordedInputs
+        The inputs of that motion, their rate, and the sample time.
+    model : str, optional
+        Short name; default the block's kind.
+    seed : int
 
     Raises
     ------
     ModelError
-        If the model has no inverse, nothing can be reached whatever happened before, or the inverse
-        does not follow the reference.
+        If the model has no inverse, or does not follow behind it.
     """
-    inverse = compensator(block)
-    step, most, reachable, own = recording.sample_time, float("inf"), None, False
-    desired = recording
-    if len(block.inputs) == 1:
-        (output,) = block.outputs
-        low, high = (float(end[0]) for end in block.reachable())
-        own, most = bool(np.isinf([low, high]).all()), NEARLY
-        if own:
-            desired = recording.with_channels(
-                **{output.name: block.simulate(recording)[output.name]}
-            )
-        elif high - low > REACH * np.ptp(recording[output.name]) and np.isfinite(high - low):
-            reachable, most = (low, high), FOLLOWED
-            desired = Recording(
-                {output.name: minor_loops(low, high)}, step, units={output.name: output.unit}
-            )
-        else:
-            raise ModelError(
-                f"{model!r} has no output that it can reach whatever happened before",
-                remedy="identify it on a recording that covers the range of interest",
-            )
-    reference = desired.matrix(channel.name for channel in block.outputs)
-    span = np.ptp(reference, axis=0) if reachable is None else np.array([high - low])
-    span = np.maximum(span, np.finfo(float).tiny)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ModelWarning)
-        found = inverse.simulate(desired.select([channel.name for channel in inverse.inputs]))
-        driven = desired.with_channels(found.units, **found.channels)
-        output_of = block.simulate(driven).matrix(channel.name for channel in block.outputs)
-    error = float((np.abs(output_of - reference) / span).max())
-    if not error <= most:
+    inverse, name = compensator(block), block.kind if model is None else model
+    checks = [_check(name, block, inverse, space, pace, seed) for pace in PACES]
+    worst = max(checks, key=lambda check: check.error)
+    if not worst.error <= FOLLOWED:
         raise ModelError(
-            f"the inverse of {model!r} misses a reachable reference by {error:.1e} of its range",
+            f"its inverse misses a motion of the model by {worst.error:.1e} of the range",
             remedy="invert another model",
         )
-    commanded = inverse.outputs == block.inputs[: len(inverse.outputs)]
-    plain = _without(block, recording, reference, step) if commanded else None
+    return checks[0]
+
+
+def made(block: Block) -> Block:
+    """Return the compensator of a model, tested within its identified inputs where it knows them.
+
+    Raises
+    ------
+    ModelError
+        As `checked`.
+    """
+    space = None if block.inverts else RecordedInputs.known(block)
+    return compensator(block) if space is None else checked(block, space).inverse
+
+
+def _check(
+    name: str, block: Block, inverse: Block, space: RecordedInputs, pace: float, seed: int
+) -> InverseCheck:
+    driven = space.motion(pace, seed)
+    outputs = [channel.name for channel in block.outputs]
+    given = [channel.name for channel in inverse.outputs]
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore", ModelWarning)
+        wanted = block.simulate(driven)
+        asked = wanted.select([channel.name for channel in inverse.inputs])
+        commands = inverse.simulate(asked)
+        again = driven.with_channels(**{n: commands[n] for n in given if n in driven})
+        found = block.simulate(again).matrix(outputs)
+    reference = wanted.matrix(outputs)
+    late = round((block.dead_time + inverse.dead_time) / (space.sample_time or 1.0))
+    missed = np.abs(found[late:] - reference[: len(reference) - late])
+    span = np.maximum(np.ptp(reference, axis=0), np.finfo(float).tiny)
     return InverseCheck(
-        model=model,
+        model=name,
         inverse=inverse,
         reference=reference,
-        pressure=found.matrix(channel.name for channel in inverse.outputs),
-        output=output_of,
-        time=desired.time,
-        reachable=reachable,
-        error=error,
-        uncompensated=plain,
-        uncompensated_error=(
-            None if plain is None else float((np.abs(plain - reference) / span).max())
-        ),
-        own=own,
+        pressure=commands.matrix(given),
+        output=found,
+        time=driven.time,
+        timed=space.sample_time is not None,
+        error=float((missed / span).max()),
     )
 
 
-def minor_loops(low: float, high: float) -> Array:
-    """Return a reference over a range, with minor loops on slow triangles, shape (CHECK_SAMPLES,)."""
-    phase = np.linspace(0, 1, CHECK_SAMPLES)
-    slow = 1 - np.abs(2 * ((3 * phase) % 1) - 1)
-    wave = slow * (1 - 0.5 * phase) + 0.12 * np.sin(2 * np.pi * 11 * phase) * phase
-    share = (wave - wave.min()) / np.ptp(wave)
-    return np.asarray(low + (high - low) * (0.02 + 0.96 * share))
-
-
-def _without(
-    block: Block, recording: Recording, reference: Array, step: float | None
-) -> Array | None:
-    """Return a model's outputs for inputs from its own slow rise, shape (n, outputs).
-
-    Inputs rise from the lowest to the highest recorded, with what schedules as the recording begins.
-    """
-    n_driven = len(block.inputs) - len(block.scheduling)
-    if n_driven != len(block.outputs) or any(c.name not in recording for c in block.inputs):
-        return None
-    recorded = recording.matrix(channel.name for channel in block.inputs)
-    rise = np.tile(recorded[0], (MOST_RISE if step is None else _steps(step), 1))
-    low, high = recorded[:, :n_driven].min(axis=0), recorded[:, :n_driven].max(axis=0)
-    rise[:, :n_driven] = np.linspace(low, high, len(rise))
-    given = np.tile(recorded[0], (len(reference), 1))
-    if len(recorded) == len(reference):
-        given[:] = recorded
+def _refuse_unrecorded(inverse: Block, train: Sequence[Recording], recording: Recording) -> None:
+    """Raise a `ModelError` if commands for a recorded motion are no inputs as they were recorded."""
+    recording = recording.with_derived(channel.name for channel in inverse.inputs)
+    asked = recording.select([channel.name for channel in inverse.inputs])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
-        try:
-            risen = block.simulate(rise, sample_time=step).reshape(len(rise), -1)
-            for k, channel in enumerate(block.outputs):
-                places, commands = curve(rise[:, k], risen[:, k], channel.name)
-                given[:, k] = np.interp(reference[:, k], places, commands)
-            found = block.simulate(given, sample_time=step).reshape(len(given), -1)
-        except MckibbenError:
-            return None
-    return found if np.isfinite(found).all() else None
-
-
-def _steps(step: float) -> int:
-    return min(max(round(RISE / step), 2), MOST_RISE)
+        commands = inverse.simulate(asked)
+    names = [channel.name for channel in inverse.outputs]
+    share = RecordedInputs.of(train, names).outside(commands.matrix(names))
+    if share > MOST_OUTSIDE:
+        raise ModelError(
+            f"its commands for {recording.name} leave the recorded combinations of inputs in "
+            f"{100 * share:.0f} % of the samples",
+            remedy="record these too, or invert another model",
+        )

@@ -26,7 +26,7 @@ from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
 from mckibben.rigs import load_rig
 from mckibben.studying.checking import check_on_test
-from mckibben.studying.inverting import InverseCheck, invert_best
+from mckibben.studying.inverting import Compensation, compensation
 from mckibben.studying.loops import closed_loops, named, recorded_rig
 from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
@@ -46,8 +46,10 @@ class Study(DrawsItself):
         Models in the order of the choice.
     predictions : mapping of str to tuple of array
         Model name to its free-running output on every training recording, then every test recording.
-    inverse : InverseCheck or None
-        Of the first model of the leaderboard that has one, or None where no model has.
+    inverse : Compensation or None
+        Of the first model in the order of the choice that has a good one; None where none has.
+    passed_over : mapping of str to str
+        Models before that one, and why they have no compensator.
     loops : mapping of str to Tracked
         Errors of following a measured motion on a virtual rig, by controller.
     plant : str or None
@@ -75,7 +77,8 @@ class Study(DrawsItself):
     characterization: Characterization | None
     leaderboard: Leaderboard
     predictions: Mapping[str, tuple[Array, ...]] = field(repr=False)
-    inverse: InverseCheck | None
+    inverse: Compensation | None
+    passed_over: Mapping[str, str] = field(default_factory=dict)
     loops: Mapping[str, Tracked] = field(default_factory=dict, repr=False)
     plant: str | None = None
     not_looped: str = ""
@@ -110,6 +113,7 @@ class Study(DrawsItself):
             "review": None if self.review is None else self.review.to_dict(),
             "leaderboard": self.leaderboard.to_dict(),
             "inverse": None if self.inverse is None else self.inverse.to_dict(),
+            "passed_over": dict(self.passed_over),
             "tracking": {name: dict(tracked.rmse) for name, tracked in self.loops.items()},
         }
 
@@ -132,8 +136,9 @@ def study(
 ) -> Study:
     """Characterize recordings, choose a model by cross-validation, test it, and invert it if possible.
 
-    If the chosen model has no inverse, the next best one with an inverse is inverted. If no model
-    is recommended, none is inverted.
+    The compensator is that of the first model in the order of the choice whose inverse is right, stays
+    within the recorded inputs, and whose error on the test is clearly below that of a static map; see
+    `mckibben.studying.inverting`. If no model is recommended, there is none.
 
     For several muscles, or under a load, a test motion is tracked on a virtual rig with every
     inverse, and with PID feedback. An interrupt ends the work at once; the study then has the
@@ -222,8 +227,8 @@ def study(
             check=check_on_test(block, split, on_test, names),
             description=describe(block, split.train, fitted=True),
         )
-    so_far = replace(so_far, inverse=invert_best(board, so_far.test[0]))
-    undone = so_far.inverse
+    undone, passed_over = compensation(board, plan.data.split, seed)
+    so_far = replace(so_far, inverse=undone, passed_over=passed_over)
     if not channels.single and undone is not None:
         try:
             plant = recorded_rig([*recordings, *tests]) if rig is None else load_rig(rig)

@@ -1,0 +1,107 @@
+"""A compensator: whose it is, whether its inverse is right, and what is to be expected of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mckibben import GPI, PI, ModelError, PiecewiseLinear, RateDependentPI, Recording, study
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
+from mckibben.comparison.splits import given_split
+from mckibben.signals import triangle
+from mckibben.studying.inverting import checked, made
+from mckibben.studying.recorded_inputs import RecordedInputs
+from mckibben.studying.static_map import static_error
+
+TIME = np.arange(0, 24, 0.02)
+RISE = triangle(TIME, 4.0, [5.0, 4.2, 3.4, 2.6, 1.8, 1.0])
+
+
+def recorded(u: np.ndarray, seed: int = 0) -> Recording:
+    noise = 0.02 * np.random.default_rng(seed).standard_normal(u.size)
+    return Recording({"pressure": u, "displacement": GPI.example().simulate(u) + noise}, 0.02)
+
+
+TRAIN, TEST = recorded(RISE), recorded(RISE[::-1], 1)
+
+
+@pytest.mark.parametrize("block", [PI.example(), GPI.example()], ids=lambda b: b.kind)
+def test_the_check_covers_the_recorded_inputs(block: Block) -> None:
+    check = checked(block, RecordedInputs.of([TRAIN], ["pressure"]))
+    assert check.error <= 1e-12
+    assert np.ptp(check.pressure) > 0.9 * np.ptp(TRAIN["pressure"])
+    assert np.all((check.pressure >= -1e-9) & (check.pressure <= 5 + 1e-9))
+
+
+def test_the_check_keeps_names_and_units() -> None:
+    block = replace(
+        PiecewiseLinear.example(), input=Channel("stroke", "mm"), output=Channel("pull", "N")
+    )
+    recording = Recording({"stroke": TRAIN["displacement"]}, 0.02, units={"stroke": "mm"})
+    check = checked(block, RecordedInputs.of([recording], ["stroke"]))
+    assert check.error <= 1e-12
+
+
+def test_an_inverse_that_is_wrong_at_speed_is_refused() -> None:
+    slow = replace(RateDependentPI.example(), rate_time_constant=0.0)
+    fast = replace(slow, rate_weights=(-2.0, *slow.rate_weights[1:]))
+    assert made(slow) == slow.inverse()
+    with pytest.raises(ModelError):
+        made(fast)
+
+
+def test_what_is_expected_is_the_error_on_the_test() -> None:
+    found = study([TRAIN], [TEST], models=["pi", "gpi", "mpi"], jobs=1)
+    own, board = found.inverse, found.leaderboard
+    assert own is not None
+    assert board.best is not None
+    assert own.model == board.best.model
+    assert own.following_error == board.best.test_error
+    assert own.following_interval == board.best.rmse_interval
+    assert own.following_error < own.static_error
+    assert own.check.error <= 1e-12
+    assert found.passed_over == {}
+
+
+def test_the_compensator_is_that_of_the_first_that_has_one() -> None:
+    found = study([TRAIN], [TEST], models=["narx", "gpi"], jobs=1)
+    order = [row.model for row in found.leaderboard.rows]
+    assert found.inverse is not None
+    assert found.inverse.model == "gpi"
+    assert set(found.passed_over) == {*order[: order.index("gpi")]}
+
+
+def test_no_compensator_where_a_static_map_does_as_well() -> None:
+    """Without hysteresis and with noise, no model follows better than a curve."""
+    noise = np.random.default_rng(2).standard_normal((2, RISE.size))
+    runs = [
+        Recording({"pressure": u, "displacement": 2 * u + 0.3 * e}, 0.02)
+        for u, e in zip((RISE, RISE[::-1]), noise, strict=True)
+    ]
+    found = study([runs[0]], [runs[1]], models=["pi"], jobs=1)
+    assert found.inverse is None
+    assert set(found.passed_over) == {"pi"}
+
+
+def test_inputs_driven_in_opposition_fill_a_line() -> None:
+    half = Recording({"pressure_1": RISE, "pressure_2": 6.0 - RISE}, 0.02)
+    space = RecordedInputs.of([half], ["pressure_1", "pressure_2"])
+    moved = space.motion(1.0, 0)
+    assert moved["pressure_1"] + moved["pressure_2"] == pytest.approx(6.0, abs=1e-9)
+    assert np.ptp(moved["pressure_1"]) > 0.7 * np.ptp(RISE)
+    on = np.column_stack([RISE, 6.0 - RISE])
+    assert space.outside(on) == 0.0
+    assert space.outside(on + 1.0) == 1.0
+    assert space.outside(1.5 * (on - 3.0) + 3.0) > 0.2
+
+
+def test_the_static_map_is_a_polynomial_of_all_inputs() -> None:
+    rng = np.random.default_rng(0)
+    p, q = rng.uniform(0, 4, (2, 400))
+    run = Recording({"pressure": p, "force": q, "displacement": 1 + p * q - 0.1 * p**3}, 0.02)
+    split = given_split([run], [run])
+    assert static_error(split, ("pressure", "force"), ("displacement",)) < 1e-4
+    assert static_error(split, ("pressure",), ("displacement",)) > 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations_with_replacement
 from math import comb
 
@@ -31,18 +31,7 @@ def static_error(split: Split, inputs: Sequence[str], outputs: Sequence[str]) ->
     kept = [~recording.bridged for recording in train]
 
     fitted = _joined(train, kept, known)
-    low, high = fitted.min(axis=0), fitted.max(axis=0)
-    degree = _degree(len(known))
-
-    def terms(values: Array) -> Array:
-        scaled = (np.clip(values, low, high) - low) / np.where(high > low, high - low, 1.0) * 2 - 1
-        chosen = [
-            places
-            for order in range(degree + 1)
-            for places in combinations_with_replacement(range(len(known)), order)
-        ]
-        return np.column_stack([scaled[:, list(places)].prod(axis=1) for places in chosen])
-
+    terms = polynomial(fitted)
     given = terms(fitted)
     gram = given.T @ given
     gram += RIDGE * gram.diagonal().max() * np.eye(len(gram))
@@ -52,12 +41,31 @@ def static_error(split: Split, inputs: Sequence[str], outputs: Sequence[str]) ->
     return float(np.sqrt((errors**2).mean(axis=0)).mean())
 
 
+def polynomial(fitted: Array) -> Callable[[Array], Array]:
+    """Return the function from values, (m, n), to the terms of a polynomial of them, (m, terms).
+
+    Parameters
+    ----------
+    fitted : array, shape (k, n)
+        Values beyond these count as the nearest one.
+    """
+    low, high = fitted.min(axis=0), fitted.max(axis=0)
+    n = low.size
+    fits = (d for d in range(LARGEST_DEGREE, 1, -1) if comb(n + d, d) <= MOST_TERMS)
+    degree = next(fits, 1)
+    factors = [
+        list(places)
+        for order in range(degree + 1)
+        for places in combinations_with_replacement(range(n), order)
+    ]
+
+    def terms(values: Array) -> Array:
+        scaled = (np.clip(values, low, high) - low) / np.where(high > low, high - low, 1.0) * 2 - 1
+        return np.column_stack([scaled[:, places].prod(axis=1) for places in factors])
+
+    return terms
+
+
 def _joined(runs: Sequence[Recording], rows: Sequence[Mask], names: Sequence[str]) -> Array:
     pairs = zip(runs, rows, strict=True)
     return np.concatenate([run.matrix(names)[own] for run, own in pairs])
-
-
-def _degree(n: int) -> int:
-    """Return the largest degree of a polynomial of n inputs."""
-    fits = (d for d in range(LARGEST_DEGREE, 1, -1) if comb(n + d, d) <= MOST_TERMS)
-    return next(fits, 1)

@@ -118,3 +118,15 @@ def test_the_self_test_fails_for_another_model(tmp_path: Path) -> None:
     (own / "src" / "muscle.c").write_bytes(source.read_bytes())
     with pytest.raises(ModelError):
         self_test(own, "muscle")
+
+
+@pytest.mark.parametrize("flag", ["-ffast-math", "-ffinite-math-only"])
+def test_code_without_infinity_is_refused(flag: str, tmp_path: Path) -> None:
+    """Such code would take the guards against NaN away."""
+    folder = tmp_path / "code"
+    export_c(MODELS["pi"], folder, name="muscle")
+    compiling = ["cc", "-std=c99", "-O3", "-c", "src/muscle.c", "-o", "muscle.o"]
+    assert subprocess.run(compiling, cwd=folder, capture_output=True).returncode == 0
+    refused = subprocess.run([*compiling, flag], cwd=folder, capture_output=True, text=True)
+    assert refused.returncode != 0
+    assert "-ffinite-math-only" in refused.stderr

@@ -6,8 +6,8 @@
 
 #include "mck_config.h"
 
-#ifdef __FAST_MATH__
-#error "compile without -ffast-math: infinity, NaN and the order of operations have a meaning here"
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "compile without -ffast-math and -ffinite-math-only: infinity and NaN have a meaning here"
 #endif
 
 #ifdef MCK_FLOAT32

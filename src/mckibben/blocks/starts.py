@@ -57,7 +57,7 @@ def history(block: Block, recording: Recording) -> Array:
     """
     inputs = recording.matrix(channel.name for channel in block.inputs)
     outputs, first = first_outputs(block, recording), inputs[0]
-    if outputs is None or block.n_driven != 1 or known_state(block, recording) is not None:
+    if outputs is None or block.n_driven != 1 or block.state_at(first, outputs) is not None:
         return np.empty((0, inputs.shape[1]))
     step = recording.sample_time
     missed = outputs - _outputs(block, first[np.newaxis], step)[-1]
@@ -142,7 +142,7 @@ def _excursion(block: Block, inputs: Array, outputs: Array, sample_time: float |
     held = np.tile(first, (SETTLING if block.rate_dependent else 0, 1))
 
     def come_from(level: float) -> Array:
-        return np.vstack([np.append(level, first[1:]), np.empty((0, first.size))])
+        return np.append(level, first[1:])[np.newaxis]
 
     def down_from(peak: float) -> Array:
         return np.vstack([come_from(peak), held])

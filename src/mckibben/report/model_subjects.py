@@ -97,11 +97,17 @@ def inverse_check(check: InverseCheck) -> Drawing:
     wanted, given = check.inverse.inputs[0], check.inverse.outputs[0]
     reference, output = check.reference[:, 0], check.output[:, 0]
     rows: list[tuple[str, str, list[Course]]] = [
-        (wanted.name, wanted.unit, [(reference, "reference", "measured", "broad")]),
+        (
+            wanted.name,
+            wanted.unit,
+            [
+                (reference, "reference", "measured", "broad"),
+                (output, "model behind its inverse", "series-1", "line"),
+            ],
+        ),
         ("error", wanted.unit, [(output - reference, "", "series-6", "fine")]),
         (given.name, given.unit, [(check.pressure[:, 0], "", "input", "line")]),
     ]
-    rows[0][2].append((output, "model behind its inverse", "series-1", "line"))
     x, least = "time [s]" if check.timed else "sample", 1e-6 * float(np.ptp(reference))
     panels = [
         Panel(x, axis_label(name, unit), _courses(check.time, POINTS, *given), least=least)

@@ -149,7 +149,8 @@ def _checks(study: Study, view: _View) -> Section | None:
     if isinstance(study.check, Validation):
         for one in study.check.outputs[:MOST_CHECKED]:
             items += results.checked(one)
-    items.append(Text(said, "note", listed=True) if (said := words.passed_over(study)) else None)
+    if said := words.passed_over(study):
+        items.append(Text(said, "note", listed=True))
     if study.inverse is not None:
         drawing = model_subjects.inverse_check(study.inverse.check)
         caption = f"A random motion of {study.inverse.model}, and the model behind its inverse."

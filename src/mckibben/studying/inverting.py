@@ -60,9 +60,6 @@ class InverseCheck:
         first sample that the inverse clips.
     error_afterwards : float
         The same over the whole motion.
-    clipped : float
-        Share of the motion after that sample. Of several muscles it may be large: those that the
-        inverse commands need not be those that made the motion, and may be at a limit.
     """
 
     model: str
@@ -74,7 +71,6 @@ class InverseCheck:
     timed: bool
     error: float
     error_afterwards: float
-    clipped: float
 
 
 @dataclass(frozen=True)
@@ -239,10 +235,11 @@ def _check(
         wanted = block.simulate(driven)
         asked = wanted.select([channel.name for channel in inverse.inputs])
         commands = inverse.simulate(asked)
-        again = driven.with_channels(**{n: commands[n] for n in given if n in driven})
+        again = driven.with_channels(**{name: commands[name] for name in given})
         found = block.simulate(again).matrix(outputs)
     reference = wanted.matrix(outputs)
-    late = round((block.dead_time + inverse.dead_time) / (space.sample_time or 1.0))
+    step, dead = space.sample_time, block.dead_time + inverse.dead_time
+    late = 0 if step is None else round(dead / step)
     kept = _first_clipped(inverse, asked)
     span = np.maximum(np.ptp(reference, axis=0), np.finfo(float).tiny)
     missed = np.abs(found[late:] - reference[: len(reference) - late]) / span
@@ -256,7 +253,6 @@ def _check(
         timed=space.sample_time is not None,
         error=float(missed[: max(kept - late, 0)].max(initial=0.0)),
         error_afterwards=float(missed.max()),
-        clipped=1.0 - kept / len(reference),
     )
 
 

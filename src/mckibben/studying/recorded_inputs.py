@@ -11,17 +11,14 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.laws import wander
-from mckibben.control.identified import known_ranges
+from mckibben.control.identified import BEYOND, known_ranges
 from mckibben.recording import Recording
 
 FAST = 0.99
 """Quantile of the changes between samples that counts as the fastest."""
 
-FEWEST, MOST = 4, 1000
-"""Samples from one turning point of a random motion to the next."""
-
-MARGIN = 0.05
-"""Share of the largest range by which inputs may be beyond the recorded ones."""
+STRIDES = (4, 1000)
+"""Fewest and most samples from one turning point of a random motion to the next."""
 
 SAMPLES, STEP = 100, 0.02
 """Of the motion of a model whose recordings are not at hand: samples, and the time between them [s]."""
@@ -90,7 +87,7 @@ class RecordedInputs:
             directions,
             np.array([along.min(axis=0), along.max(axis=0)]),
             np.array([low, high]),
-            int(np.clip(1.0 / fastest, FEWEST, MOST)),
+            int(np.clip(1.0 / fastest, *STRIDES)),
             recordings[0].sample_time,
         )
 
@@ -114,7 +111,7 @@ class RecordedInputs:
 
     def motion(self, slowness: float, seed: int) -> Recording:
         """Return a random motion, so many times slower than the fastest recorded."""
-        pace = int(np.clip(self.samples * slowness, FEWEST, MOST))
+        pace = int(np.clip(self.samples * slowness, *STRIDES))
         low, high = self.extent
         along = wander(low, high, np.random.default_rng(seed), pace, TURNS)
         inputs = self.middle + self.scale * (along @ self.directions.T)
@@ -125,5 +122,5 @@ class RecordedInputs:
         """Return the share of some inputs, shape (k, n), that are not as the recorded ones."""
         along = (inputs - self.middle) / self.scale @ self.directions
         low, high = self.extent
-        margin = MARGIN * (high - low).max()
+        margin = BEYOND * (high - low).max()
         return float(((along < low - margin) | (along > high + margin)).any(axis=1).mean())

@@ -67,6 +67,5 @@ def steady_state(block: Any, recording: Recording) -> Recording:
             f"within {PERIODS} periods",
             remedy="use simulate, which starts from rest",
         )
-    units = {block.outputs[0].name: block.outputs[0].unit}
-    kept = recording.select([block.inputs[0].name])
-    return kept.with_channels(units, **{block.outputs[0].name: now})
+    modelled: Recording = block._modelled(recording, now[:, np.newaxis])
+    return modelled

@@ -329,7 +329,7 @@ def track(
     from mckibben.control import track as close
     from mckibben.control.identified import beyond_known
     from mckibben.control.roles import asked, offered
-    from mckibben.control.suiting import caveats
+    from mckibben.control.suiting import flatters_feedback, kind_of
     from mckibben.control.twin import COMMAND
     from mckibben.files import write
 
@@ -379,13 +379,20 @@ def track(
         write(without.beside(tracked.recording), file)
     if controller_file is not None and isinstance(law, Block):
         law.save(controller_file)
-    notes = (
-        *beyond_known(block, wanted),
-        *without.notes,
-        *caveats(block, plant, chosen.controller),
+    return Tracking(
+        tracked=tracked,
+        uncompensated=without,
+        plant=plant,
+        plant_kind=kind_of(plant, block),
+        flatters_feedback=flatters_feedback(plant, chosen.controller),
+        law=chosen.controller,
+        seed=chosen.seed,
+        controller=law,
+        reference=wanted,
+        notes=(*beyond_known(block, wanted), *without.notes),
+        file=file,
+        controller_file=controller_file,
     )
-    plain = chosen.controller, chosen.rig is not None, chosen.seed
-    return Tracking(tracked, without, plant, *plain, law, wanted, notes, file, controller_file)
 
 
 def _half(tell: Tell | None, start: float) -> Callable[[float], None] | None:

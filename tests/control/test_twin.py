@@ -25,7 +25,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import PIDFeedback
 from mckibben.blocks.fields import Channel
 from mckibben.control import Twin, before, track, tune_pid
-from mckibben.control.suiting import caveats
+from mckibben.control.suiting import flatters_feedback, kind_of
 from mckibben.registry import load as registered
 from mckibben.registry import names
 from tests.cli.conftest import Cli
@@ -76,14 +76,17 @@ def test_without_a_band_a_twin_is_simulate_to_the_bit(block: Block) -> None:
     np.testing.assert_array_equal(ran.matrix(twin.outputs), alone)
 
 
-def test_a_compensator_beats_no_compensation_and_a_plant_that_is_the_model_is_noted() -> None:
+def test_a_compensator_beats_no_compensation_and_plants_are_told_apart() -> None:
     with_it = track(MODEL.inverse(), Twin(MODEL), wave())
     without = before(MODEL.inverse(), Twin(MODEL), wave())
     assert with_it.rmse["displacement"] < 1e-9 * (HIGH - LOW)
     assert without.tracked is not None
     assert without.tracked.rmse["displacement"] > 0.02 * (HIGH - LOW)
     assert not without.notes
-    assert len(caveats(MODEL.inverse(), Twin(Banded(MODEL, Band.example())))) == 1
+    compensator = MODEL.inverse()
+    assert kind_of(Twin(Banded(MODEL, Band.example())), compensator) == "same model"
+    assert kind_of(Twin(registered("blocks", "gpi").example()), compensator) == "another model"
+    assert kind_of(load_rig("mas20-hanging"), compensator) == "rig"
 
 
 def test_pressures_recorded_with_a_reference_are_passed_over() -> None:
@@ -103,10 +106,10 @@ def test_pid_is_tuned_on_a_twin() -> None:
     assert isinstance(pid, PIDFeedback)
     assert track(pid, Twin(lagging), wave()).rmse["displacement"] < 0.2 * (HIGH - LOW)
     # a model without time is no plant for feedback
-    assert caveats(pid, Twin(MODEL), "pid")
-    assert not caveats(pid, Twin(MODEL))
-    assert not caveats(pid, Twin(lagging), "pid")
-    assert not caveats(pid, load_rig("mas20-hanging"), "pid")
+    assert flatters_feedback(Twin(MODEL), "pid")
+    assert not flatters_feedback(Twin(MODEL), "feedforward")
+    assert not flatters_feedback(Twin(lagging), "pid")
+    assert not flatters_feedback(load_rig("mas20-hanging"), "pid")
 
 
 def test_pid_is_tuned_for_the_steepest_part_of_a_muscle_that_is_flat_in_its_middle() -> None:

@@ -1,27 +1,30 @@
-"""Plants on which a controller looks better than on the muscle."""
+"""What a loop on a plant tells about the muscle."""
 
 from __future__ import annotations
+
+from typing import Literal
 
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.control.roles import Plant
 from mckibben.control.twin import Twin
 
+Kind = Literal["rig", "same model", "another model"]
+"""A virtual rig; the model that a compensator inverts; or another model."""
 
-def caveats(compensator: Block, plant: Plant, law: str = "feedforward") -> list[str]:
-    """Return why the errors of a loop on a twin underestimate those on the muscle."""
+
+def kind_of(plant: Plant, compensator: Block) -> Kind:
+    """Return what kind of plant a compensator is tested on.
+
+    Errors on the same model come from limits, rates and rounding alone, whatever the muscle does.
+    """
     if not isinstance(plant, Twin):
-        return []
-    notes, model = [], compensator.forward_model
-    if model is not None and inside(model).to_dict() == plant.forward.to_dict():
-        notes.append(
-            "the plant is the model that the compensator inverts, so errors come from limits and rates "
-            "alone: test it on another model of the muscle"
-        )
-    if law != "feedforward" and not plant.forward.rate_dependent:
-        notes.append(
-            "the plant is a static model, which responds within one sample: feedback performs better on "
-            "it than on the muscle; test feedback on a model with dynamics, such as balance fitted to "
-            "recordings that have time"
-        )
-    return notes
+        return "rig"
+    model = compensator.forward_model
+    same = model is not None and inside(model).to_dict() == plant.forward.to_dict()
+    return "same model" if same else "another model"
+
+
+def flatters_feedback(plant: Plant, law: str) -> bool:
+    """Return whether feedback performs better on a plant than on a muscle: it responds at once."""
+    return isinstance(plant, Twin) and law != "feedforward" and not plant.forward.rate_dependent

@@ -565,12 +565,22 @@ def not_looped(study: Study) -> str:
     return f"No loop was closed: {study.not_looped}" if study.not_looped else ""
 
 
+PLANTS = {
+    "rig": "virtual rig: errors as on its muscle",
+    "same model": "the model that the compensator inverts: errors of limits, rates and rounding alone, "
+    "not those on the muscle",
+    "another model": "another model: errors as far as it is the muscle",
+}
+"""Plants of loops, and what errors on them tell."""
+
+
 def tracked(found: Tracking) -> list[str]:
     """Return the plant of a tracked reference, and its part out of reach."""
     one = found.tracked
     unit = one.recording.units[next(iter(one.rmse))]
-    kind = "virtual rig" if found.virtual else "model"
-    said = [f"Plant: {found.plant.name} ({kind}), seed {found.seed}."]
+    said = [f"Plant: {found.plant.name} ({PLANTS[found.plant_kind]}), seed {found.seed}."]
+    if found.flatters_feedback:
+        said.append("The plant responds within one sample; on a muscle, feedback performs worse.")
     if one.clipped >= len(one.recording):
         said.append("Commands were at a limit throughout: the reference is out of reach.")
     elif one.clipped > max((far.samples for far in one.beyond.values()), default=0):

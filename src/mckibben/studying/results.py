@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from mckibben.blocks.base import Block
     from mckibben.control import Before, Tracked
     from mckibben.control.roles import Plant
+    from mckibben.control.suiting import Kind
     from mckibben.estimators.core.estimator import Estimator
     from mckibben.recording import Recording
 
@@ -83,10 +84,12 @@ class Tracking:
     tracked : Tracked
     uncompensated : Before
     plant : Plant
+    plant_kind : {"rig", "same model", "another model"}
+        The model that the compensator inverts tells nothing about the muscle.
+    flatters_feedback : bool
+        Whether feedback performs better on the plant than on a muscle, as the plant has no lag.
     law : str
         Name of the controller.
-    virtual : bool
-        Whether the plant is a virtual rig.
     seed : int
     controller : Block or Controller
     reference : Recording
@@ -99,8 +102,9 @@ class Tracking:
     tracked: Tracked = field(repr=False)
     uncompensated: Before = field(repr=False)
     plant: Plant = field(repr=False)
+    plant_kind: Kind
+    flatters_feedback: bool
     law: str
-    virtual: bool
     seed: int
     controller: Any = field(repr=False)
     reference: Recording = field(repr=False)
@@ -113,7 +117,8 @@ class Tracking:
         found, without = self.tracked, self.uncompensated.tracked
         return {
             "controller": self.law,
-            "plant": {"name": self.plant.name, "virtual_rig": self.virtual},
+            "plant": {"name": self.plant.name, "kind": self.plant_kind},
+            "flatters_feedback": self.flatters_feedback,
             **_errors(found),
             "out_of_reach": {name: far._asdict() for name, far in found.beyond.items()},
             "uncompensated": None if without is None else _errors(without),

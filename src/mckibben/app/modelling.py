@@ -25,6 +25,7 @@ from mckibben.numerals import numeral
 from mckibben.recording import Recording
 from mckibben.report import results, words
 from mckibben.report.builder import Figure, Item, Table, Text
+from mckibben.studying.inverting import compensation
 
 VALIDATED = 1.2
 """Time of a fit with its cross-validation, relative to that of the fit."""
@@ -175,6 +176,9 @@ def fit(
     copied = ("unit", "split", "chosen_by", "not_recommended", "shared")
     told = {key: whole[key] for key in copied}
     told["constant"] = None if board.constant is None else board.constant.to_dict()
+    undone, refused = compensation(board, plan.data.split, seed)
+    told["compensator"] = None if undone is None else undone.to_dict()
+    told["no_compensator"] = refused.get(row.model, "")
     told["notes"] = [*board.notes, *row.diagnostics.get("notes", ())]
     workspace.save_model(name, row.block, row.to_dict() | about | told | {"data": data})
     by = "fit" if row.validation_rmse is None else board.chosen_by

@@ -80,9 +80,12 @@ class StudyFolder:
                 write(model_file(row.model), to_text(row.block))
                 self._saved.add(row.model)
         write_leaderboard(board, self._results)
-        if study.inverse is not None:
-            write("inverse.json", to_text(study.inverse.inverse))
-            facts = study.inverse.to_dict() | {"passed_over": dict(study.passed_over)}
+        undone = study.inverse
+        if undone is not None:
+            write("inverse.json", to_text(undone.inverse))
+        if undone is not None or last:
+            facts = {"model": None} if undone is None else undone.to_dict()
+            facts |= {"passed_over": dict(study.passed_over)}
             write("inverse_expected.json", to_json(facts) + "\n")
         best = board.best
         if best is not None and not board.pending:

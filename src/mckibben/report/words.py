@@ -560,6 +560,14 @@ def passed_over(study: Study) -> list[str]:
     return [f"No compensator of {model}: {why}" for model, why in study.passed_over.items()]
 
 
+def expected(found: Mapping[str, Any]) -> str:
+    """Return the error to expect of a compensator, from `Compensation.to_dict`."""
+    unit, ends = found["unit"], found["following_interval"]
+    interval = f" (95 %: {numeral(ends[0], 2)} to {numeral(ends[1], 2)})" if ends else ""
+    error, plain = (size(unit, found[key]) for key in ("following_error", "static_map_error"))
+    return f"Expected RMSE of following: {error}{interval}; a static map: {plain}."
+
+
 def not_looped(study: Study) -> str:
     """Return why no loop was closed; empty if one was."""
     return f"No loop was closed: {study.not_looped}" if study.not_looped else ""

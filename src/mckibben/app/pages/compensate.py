@@ -18,7 +18,7 @@ from mckibben.errors import DataError, MckibbenError
 from mckibben.numerals import number
 from mckibben.options import InvertOptions, TrackOptions
 from mckibben.recording import Recording
-from mckibben.report import interactive
+from mckibben.report import interactive, words
 from mckibben.report.drawing import Curve, Drawing, Panel, axis_label, over_time, series_colour
 
 TITLE = "Compensate"
@@ -215,6 +215,8 @@ def _compensator(state: State, name: str) -> None:
         with widgets.row(classes="fields"):
             parts.select_model(state, following.having(workspace, "inverse"))
             form = parts.select(state, "compensate.form", kinds, "As", page.refresh)
+        if form == "inverse":
+            _expected(state, name)
         if asked := following.SETTINGS.get(form):
             title = "How it learns" if form == "adaptive" else "Limits and horizon"
             with widgets.details(title), widgets.row():
@@ -231,6 +233,15 @@ def _compensator(state: State, name: str) -> None:
         with widgets.row(classes="spread"):
             ui.label("Compared with no compensation.").classes("muted")
             mark(widgets.primary("Run", partial(_start, state, name), "play_arrow"), "run")
+
+
+def _expected(state: State, name: str) -> None:
+    """Show the error to expect of the model's compensator, or why it is not recommended."""
+    row = state.workspace.read("results", name) or {}
+    if own := row.get("compensator"):
+        mark(ui.label(words.expected(own)), "expected")
+    elif why := row.get("no_compensator"):
+        widgets.error_box(f"This compensator is not recommended: {why}")
 
 
 def values_of(state: State, of: str) -> Json:

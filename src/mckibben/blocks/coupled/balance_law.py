@@ -23,11 +23,11 @@ the pressures nearest to the middle of those that were recorded, in the metric o
 with one lambda a coordinate. So they stay on the line on which a differential drive was recorded.
 
 Coefficients: the head, r (m), decays and gains of the lags (l each), g (schedules); with a drive, p_0
-and C; of every coordinate its springs (powers of what schedules by 1 + coordinates), loads, and of every obstacle its side (1 or
--1), place and stiffness; of every muscle lowest and highest shortening known, w, b, W, then the
-coefficients of its terms: d, l, m, own spring, elasticity, area, friction, relaxation. State:
-coordinates, stretches, stops (muscle by muscle), lags (the same), with mass the last two moves of each
-muscle, the tare of coordinates, whether this is the first sample, number of failed samples.
+and C; of every coordinate its springs (powers of what schedules by 1 + coordinates), loads, and of every
+obstacle its side (1 or -1), place and stiffness; of every muscle lowest and highest shortening known, w,
+b, W, then the coefficients of its terms: d, l, m, own spring, elasticity, area, friction, relaxation.
+State: coordinates, stretches, stops (muscle by muscle), lags (the same), with mass the last two moves of
+each muscle, the tare of coordinates, whether this is the first sample, number of failed samples.
 """
 
 from __future__ import annotations
@@ -558,6 +558,7 @@ def undriven(
     p: Array,
     held: Array,
     ways: Array,
+    taut: bool,
     lacks: Array,
     sizes: Array,
     matrix: Array,
@@ -565,7 +566,8 @@ def undriven(
 ) -> float:
     """Fill what every coordinate lacks at pressures, and its slopes; return the largest relative one.
 
-    ``held`` has the forces of `held_force`; slopes are by lambda, of which ``ways`` are the pressures.
+    That is infinite where forces are. ``held`` has the forces of `held_force`; slopes are by lambda, and
+    those of the pressures are ``ways``. No muscle goes slack where they are ``taut``.
     """
     m, width = int(c[1]), n_terms(c)
     for j in range(m):
@@ -582,7 +584,7 @@ def undriven(
         )
         force, slope = held[k] + rubbed - p[k] * a, by_p - a
         size = abs(held[k]) + abs(rubbed) + abs(p[k] * a)
-        if force > c[own + 3]:  # slack
+        if force > c[own + 3] and not taut:
             force, slope = c[own + 3], 0.0
         for j in range(m):
             pull = c[own + OWN + j]
@@ -592,9 +594,20 @@ def undriven(
                 matrix[j, i] -= pull * slope * ways[k, i]
     left = 0.0
     for j in range(m):
+        if not sizes[j] < np.inf:
+            return np.inf
         if sizes[j] > 0.0:
             left = max(left, abs(lacks[j]) / sizes[j])
     return left
+
+
+@kernel
+def combine(middle: Array, ways: Array, at: Array, p: Array) -> None:
+    """Fill the pressures that are so far along their ways from the middle."""
+    for k in range(p.size):
+        p[k] = middle[k]
+        for j in range(at.size):
+            p[k] += ways[k, j] * at[j]
 
 
 @kernel
@@ -615,7 +628,8 @@ def balance_driven(
     straight in pressure.
     """
     n, m = int(c[0]), int(c[1])
-    lacks, step, sizes = work[:m], work[m : 2 * m], work[3 * m : 4 * m]
+    lacks, step = work[:m], work[m : 2 * m]
+    start, sizes = work[2 * m : 3 * m], work[3 * m : 4 * m]
     matrix, terms = work[4 * m : 4 * m + m * m].reshape((m, m)), work[4 * m + m * m :]
     rest = work[work_size(c) :]
     held, ways, at = rest[:n], rest[n : n + n * m].reshape((n, m)), rest[n + n * m : n + n * m + m]
@@ -629,28 +643,29 @@ def balance_driven(
             for j in range(m):
                 ways[k, j] += spread[k, i] * a * c[muscle_at(c, i) + OWN + j]
     for j in range(m):
-        at[j] = 0.0
+        start[j] = 0.0
         step[j] = 0.0
-    left, before = 0.0, np.inf
-    for _ in range(MOST_STEPS):
-        for k in range(n):
-            p[k] = middle[k]
-            for j in range(m):
-                p[k] += ways[k, j] * at[j]
-        left = undriven(c, state, way, q, x, p, held, ways, lacks, sizes, matrix, terms)
-        if left <= BALANCED or (not left < before and before < NEARLY):
+    left, before = np.inf, np.inf
+    for turn in range(MOST_STEPS):
+        first = turn == 0  # from where all muscles are taut, since slack ones do not answer
+        for j in range(m):
+            at[j] = start[j] + step[j]
+        combine(middle, ways, at, p)
+        left = undriven(c, state, way, q, x, p, held, ways, first, lacks, sizes, matrix, terms)
+        if not first and (left <= BALANCED or (not left < before and before < NEARLY)):
             break
         if left < before:
-            before = left
+            before = np.inf if first else left
             eliminate(matrix, lacks)
             for j in range(m):
+                start[j] = at[j]
                 step[j] = -lacks[j]
-                at[j] += step[j]
         else:
             for j in range(m):
                 step[j] *= 0.5
-                at[j] -= step[j]
-    return left < NEARLY
+    if not left <= before:
+        combine(middle, ways, start, p)
+    return min(left, before) < NEARLY
 
 
 @kernel
@@ -706,8 +721,8 @@ def solve_pressures(
 
     Muscles that are more than coordinates take the forces that they rest with at the pressure they
     share, and the least changes of them that balance; those that would leave the range of pressures, or
-    go slack, stay at its end, one by one, and the others take their part. With a drive, `drive_pressures`
-    fills them instead. ``work`` has two numbers a muscle more than `work_size`, or what a drive needs.
+    go slack, stay at its end, one by one, and the others take their part; with a drive, see
+    `drive_pressures`. ``work`` has two numbers a muscle more than `work_size`, or what a drive needs.
     """
     if c[21] != 0.0:
         return drive_pressures(c, state, way, q, x, p, work)

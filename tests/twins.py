@@ -955,7 +955,7 @@ class _Parallel:
             p = p + shift * (ends[worst] - p[worst])
             middle = middle + shift * (ends[worst] - middle[worst])
             ways = ways - np.outer(ways @ along, along)
-        return np.clip(p, low, high).tolist()  # type: ignore[no-any-return]
+        return [min(max(float(value), low), high) for value in p]
 
     def found(self, p: list[float], x: list[float]) -> list[float]:
         from scipy.optimize import root

@@ -69,10 +69,11 @@ def along(drive: Any, steps: Array) -> Array:
 
 
 def driven_motion(block: Balance, seed: int) -> Array:
-    """Return pressures along the directions in which they were driven, and what schedules."""
-    inputs, ways = motion(block.inverse(), (0.0, HIGHEST), seed), len(block.drive[0]) - 1
-    steps = wander(-0.5 * np.ones(ways), 0.5 * np.ones(ways), np.random.default_rng(seed), 8, 20)
-    inputs[:, : len(block.given)] = along(block.drive, np.resize(steps, (len(inputs), ways)))
+    """Return pressures up to 1.5 bar from their middle as driven, and what schedules."""
+    inputs, ways = motion(block.inverse(), (0.0, HIGHEST), seed), np.array(block.drive)[:, 1:]
+    reach = np.full(ways.shape[1], 1.5 / np.abs(ways).sum(axis=1).max())
+    steps = wander(-reach, reach, np.random.default_rng(seed), 8, 20)
+    inputs[:, : len(block.given)] = along(block.drive, np.resize(steps, (len(inputs), reach.size)))
     return inputs
 
 

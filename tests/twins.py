@@ -896,6 +896,8 @@ class _Parallel:
             wanted = [min(-self.outer(k, q, x), self.push(k)) for k in range(self.n)]
             found = [self.pressure(k, q, x, wanted[k]) for k in range(self.n)]
             return [min(max(p, low), high) for p in found]
+        if self.block.drive:
+            return self.along_the_drive(q, x, low, high)
         shared = min(max(self.block.preload, low), high)
         p, free = [shared] * self.n, set(range(self.n))
         while True:
@@ -920,6 +922,40 @@ class _Parallel:
                 return [min(max(value, low), high) for value in p]
             p[worst] = ends[worst]
             free.remove(worst)
+
+    def along_the_drive(
+        self, q: list[float], x: list[float], low: float, high: float
+    ) -> list[float]:
+        """Return the least steps along directions; one that ends a muscle's range is taken out."""
+        from scipy.optimize import root
+
+        table, pull = np.array(self.block.drive), np.array(self.ways)
+        middle, ways = table[:, 0], table[:, 1:]
+        sizes, areas = (
+            (ways**2).sum(axis=1),
+            [self.area(k, self.shortening(k, q)) for k in range(self.n)],
+        )
+        p = middle
+        for n_free in range(ways.shape[1], -1, -1):
+            if n_free >= self.m:
+                steps = ways @ ways.T @ (np.array(areas)[:, None] * pull)
+
+                def missed(at: Any, middle: Any = middle, steps: Any = steps) -> list[float]:
+                    given = (middle + steps @ at).tolist()
+                    return [self.excess(j, q, x, given) for j in range(self.m)]
+
+                p = middle + steps @ root(missed, np.zeros(self.m), tol=1e-14).x
+            own = np.where((ways**2).sum(axis=1) > 1e-9 * sizes, (ways**2).sum(axis=1), np.inf)
+            ends = np.clip(p, low, high)
+            worst = int(np.argmax((p - ends) ** 2 / own))
+            if abs(p[worst] - ends[worst]) <= 1e-9 or not own[worst] < np.inf:
+                break
+            along = ways[worst] / np.sqrt(own[worst])
+            shift = ways @ along / np.sqrt(own[worst])
+            p = p + shift * (ends[worst] - p[worst])
+            middle = middle + shift * (ends[worst] - middle[worst])
+            ways = ways - np.outer(ways @ along, along)
+        return [min(max(float(value), low), high) for value in p]
 
     def found(self, p: list[float], x: list[float]) -> list[float]:
         from scipy.optimize import root

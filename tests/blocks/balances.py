@@ -41,10 +41,12 @@ def balances(
     n_lags: int | None = None,
     heavy: bool = False,
     crowded: bool = False,
+    driven: int | None = None,
 ) -> Balance:
     """Draw a balance whose energy is convex: stiffness of 14 N/mm and more outweighs what is lost.
 
-    Of n coordinates, which, ``crowded``, n + 1 muscles move, from evenly spread directions.
+    Of n coordinates, which, ``crowded``, n + 1 muscles move, from evenly spread directions; their
+    pressures were ``driven`` in 0 directions more than coordinates, or in 1.
     """
     n = draw(st.integers(1, 2 if crowded else 3)) if n is None else n
     n_loads = draw(st.integers(0, 1)) if n_loads is None else n_loads
@@ -59,6 +61,12 @@ def balances(
         return mix @ mix.T + least * np.eye(n)
 
     matrices = [stiff(14.0), *(0.3 * stiff(0.0) for _ in range(n_x * degree))]
+
+    def drive() -> Array:
+        ways = directions[:, :n] @ stiff(0.5) + rng.uniform(-0.1, 0.1, (muscles, n))
+        common = rng.uniform(0.2, 0.5, (muscles, driven or 0))
+        return np.column_stack([rng.uniform(1.5, 2.5, muscles), ways, common])
+
     constants = rng.uniform(-4.0, 4.0, (n, len(matrices), 1))
     springs = np.concatenate([constants, np.array(matrices).transpose(1, 0, 2)], axis=2)
     turned = 2.0 * np.pi * (np.arange(muscles) + rng.uniform(-0.1, 0.1, muscles)) / muscles
@@ -98,6 +106,7 @@ def balances(
         obstacles=rows(obstacles.reshape(n, -1)) if draw(st.booleans()) else (),
         directions=rows(directions[:, :n]) if crowded else (),
         preload=draw(numbers(0.0, 2.0)) if crowded else 0.0,
+        drive=() if driven is None else rows(drive()),
     )
 
 

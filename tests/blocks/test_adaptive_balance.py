@@ -30,7 +30,11 @@ def path(balance: Balance, seed: int, n: int) -> Array:
 
 
 @settings(max_examples=15)
-@given(balances() | balances(crowded=True), st.integers(0, 1000), st.booleans())
+@given(
+    balances() | balances(crowded=True) | balances(crowded=True, driven=0),
+    st.integers(0, 1000),
+    st.booleans(),
+)
 def test_model_and_inverse_match_at_every_step(balance: Balance, seed: int, wild: bool) -> None:
     """Whatever is measured: of a muscle that drifts, or garbage, or nothing."""
     block = Adaptive(Inverse(balance), 2.0, 0.05)

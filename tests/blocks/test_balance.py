@@ -17,6 +17,7 @@ from mckibben import ModelWarning
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
+from mckibben.blocks.laws import wander
 from tests.blocks.balances import (
     ALONE,
     FURTHEST,
@@ -24,6 +25,7 @@ from tests.blocks.balances import (
     SEEDS,
     STEP,
     balances,
+    channels,
     motion,
     run,
     undone,
@@ -42,7 +44,8 @@ def beside(driven: Array, block: Block, inputs: Array) -> Array:
 # -- exact both ways -----------------------------------------------------------------------------
 
 
-ANY = balances() | balances(heavy=True) | balances(crowded=True)
+DRIVEN = balances(crowded=True, driven=0) | balances(crowded=True, driven=1)
+ANY = balances() | balances(heavy=True) | balances(crowded=True) | DRIVEN
 
 
 @given(ANY, SEEDS, st.sampled_from(["first_sample", "virgin"]))
@@ -57,6 +60,76 @@ def test_motion_tells_the_pressures_that_made_it(block: Balance, seed: int) -> N
     inputs = motion(block.inverse(), (0.0, HIGHEST), seed)
     found = undone(block.inverse(), inputs)
     np.testing.assert_allclose(found, inputs[:, : len(block.given)], atol=1e-9 * HIGHEST)
+
+
+def along(drive: Any, steps: Array) -> Array:
+    """Return pressures at steps along the directions in which they were driven."""
+    table = np.array(drive)
+    return np.asarray(table[:, 0] + steps @ table[:, 1:].T)
+
+
+def driven_motion(block: Balance, seed: int) -> Array:
+    """Return pressures up to 1.5 bar from their middle as driven, and what schedules."""
+    inputs, ways = motion(block.inverse(), (0.0, HIGHEST), seed), np.array(block.drive)[:, 1:]
+    reach = np.full(ways.shape[1], 1.5 / np.abs(ways).sum(axis=1).max())
+    steps = wander(-reach, reach, np.random.default_rng(seed), 8, 20)
+    inputs[:, : len(block.given)] = along(block.drive, np.resize(steps, (len(inputs), reach.size)))
+    return inputs
+
+
+@given(balances(crowded=True, driven=0), SEEDS, st.booleans())
+def test_motion_tells_the_pressures_that_were_driven(
+    block: Balance, seed: int, slack: bool
+) -> None:
+    """As many directions as coordinates leave no choice, of muscles that go slack either."""
+    if slack:
+        n = len(block.given)
+        block = replace(block, bladders=(2.0, 3.0, 1.0)[:n], pushes=(60.0, 50.0, 40.0)[:n])
+    inputs = driven_motion(block, seed)
+    found = undone(block.inverse(), inputs)
+    np.testing.assert_allclose(found, inputs[:, : len(block.given)], atol=1e-9 * HIGHEST)
+
+
+def test_a_bundle_that_is_slack_at_its_middle_is_driven() -> None:
+    """Two muscles side by side, whose pressures rose together, held where they need more."""
+    two = {
+        name: 2 * getattr(ALONE, name)
+        for name in (
+            "elasticity",
+            "areas",
+            "friction",
+            "relaxation",
+            "damping",
+            "lines",
+            "walls",
+            "hull",
+        )
+    }
+    block = replace(
+        ALONE, **two, given=channels("pressure", "bar", 2), directions=((1.0,), (1.0,)),
+        bladders=(8.0, 8.0), pushes=(5.0, 5.0), drive=((1.0, 0.5), (1.0, 0.5)),
+    )  # fmt: skip
+    pressures = np.repeat(1.0 + np.sin(np.arange(100) / 9.0)[:, np.newaxis] ** 2, 2, axis=1) + 1.0
+    inputs = np.column_stack([pressures, np.zeros(100)])
+    np.testing.assert_allclose(undone(block.inverse(), inputs), pressures, atol=1e-9)
+
+
+@given(DRIVEN, SEEDS)
+def test_pressures_stay_along_the_directions_in_which_they_were_driven(
+    block: Balance, seed: int
+) -> None:
+    """Also where they are clipped, which is what other muscles take part in."""
+    limited = replace(block, pressure_range=(1.0, 3.0))
+    inputs = motion(block, (-5.0, FURTHEST), seed)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        pressures = limited.simulate(inputs, sample_time=STEP)
+    assert pressures.min() >= 1.0
+    assert pressures.max() <= 3.0
+    table = np.array(block.drive)
+    away, ways = pressures - table[:, 0], table[:, 1:]
+    steps = np.linalg.lstsq(ways, away.T, rcond=None)[0]
+    np.testing.assert_allclose(ways @ steps, away.T, atol=1e-9 * HIGHEST)
 
 
 @given(balances() | balances(heavy=True), SEEDS)
@@ -106,7 +179,7 @@ def test_any_pressures_find_their_equilibrium(block: Balance, seed: int) -> None
 # -- what is out of reach --------------------------------------------------------------------------
 
 
-@given(balances(n=2) | balances(crowded=True), SEEDS, st.booleans())
+@given(balances(n=2) | balances(crowded=True) | DRIVEN, SEEDS, st.booleans())
 def test_what_cannot_be_reached_is_told(block: Balance, seed: int, slack: bool) -> None:
     """Muscles that would have to push harder than they can, or pressures out of their range."""
     n, m = len(block.given), len(block.driven)

@@ -354,6 +354,25 @@ def test_muscles_that_are_alike_come_out_alike_at_a_joint() -> None:
     assert turned.diagnostics_.rmse == pytest.approx(estimator.diagnostics_.rmse, rel=0.05)
 
 
+def test_a_differential_drive_is_stored_and_any_pressures_are_not() -> None:
+    time, none = np.arange(600) * STEP, np.zeros(600)
+    swing = random_wave(time, 0.3, 1.5, -1.5, seed=3)
+    sums = 4.0 + random_wave(time, 0.2, 1.0, -1.0, seed=4)
+
+    def found(both: Any, **settings: Any) -> Balance:
+        p = np.column_stack([0.5 * both + swing, 0.5 * both - swing])
+        y = JOINT.inverse().simulate(np.column_stack([p, none]), sample_time=STEP)[:, 0]
+        run = Recording({"pressure_1": p[:, 0], "pressure_2": p[:, 1], "displacement": y}, STEP)
+        return balance_of(BalanceEstimator(steps=1, n_stops=2, terms=(), **settings).fit(run))
+
+    line = np.array(found(4.0 + none).drive)
+    np.testing.assert_allclose(line[:, 0], 2.0 + swing.mean() * np.array([1.0, -1.0]))
+    np.testing.assert_allclose(np.abs(line[:, 1]), swing.std())
+    assert line[0, 1] == pytest.approx(-line[1, 1])
+    assert found(4.0 + none, drive="any").drive == ()
+    assert found(sums).drive == ()
+
+
 def test_fronts_of_several_muscles_stand_before_each() -> None:
     lost = (
         PiecewiseLinear((0.0, 0.3, 0.6), (0.0, 0.006, 0.306), channel, channel)

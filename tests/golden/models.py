@@ -166,6 +166,10 @@ def _crowded(**changes: Any) -> Any:
     )
 
 
+DRIVE = ((2.0, 1.0, 0.0), (2.5, -0.5, 0.8), (2.2, -0.5, -0.9))
+"""The middle of pressures, and two directions in which they were driven [bar]."""
+
+
 def _crowded_series() -> Block:
     """Return those behind valves with dead times and dead zones, and before sensors."""
     balance = _crowded()
@@ -236,6 +240,7 @@ def _compositions() -> dict[str, Block]:
         "slack muscles": example("balance", pushes=(8.0, 2.0)),
         "limited muscles": example("balance", pressure_range=(0.0, 1.2)),
         "crowded muscles": _crowded(),
+        "driven muscles": _crowded(drive=DRIVE),
         "adaptive crowded muscles": block("adaptive", _crowded_series(), 20.0, 0.1),
         "predictive crowded muscles": block("predictive", _crowded(), 4, 40.0),
         "adaptive gpi": block("adaptive", gpi, 20.0, 0.05),

@@ -9,12 +9,15 @@ import pytest
 
 from mckibben import GPI, PI, ModelError, PiecewiseLinear, RateDependentPI, Recording, study
 from mckibben.blocks.base import Block
+from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.fields import Channel
+from mckibben.blocks.memoryless import Affine
 from mckibben.comparison.splits import given_split
 from mckibben.signals import triangle
 from mckibben.studying.inverting import checked, made
 from mckibben.studying.recorded_inputs import RecordedInputs
 from mckibben.studying.static_map import static_error
+from tests.blocks.balances import CROWDED
 
 TIME = np.arange(0, 24, 0.02)
 RISE = triangle(TIME, 4.0, [5.0, 4.2, 3.4, 2.6, 1.8, 1.0])
@@ -96,6 +99,21 @@ def test_inputs_driven_in_opposition_fill_a_line() -> None:
     assert space.outside(on) == 0.0
     assert space.outside(on + 1.0) == 1.0
     assert space.outside(1.5 * (on - 3.0) + 3.0) > 0.2
+
+
+def test_a_model_is_inverted_along_the_line_on_which_it_was_driven() -> None:
+    """Its stored range would allow other pressures, whose motion that line does not reach."""
+    drive = ((2.5, 1.0, 0.2), (2.5, -1.0, 0.8), (2.5, -0.2, -1.0))
+    driven = replace(CROWDED, pressure_range=(0.0, 5.0), drive=drive)
+    gauges = tuple(Affine(2.0, 1.0, c, Channel(f"gauge_{c.name}", "V")) for c in driven.driven)
+    model = Series((driven.inverse(), PerChannel(gauges)))
+    space = RecordedInputs.known(model)
+    assert space is not None
+    away = space.motion(1.0, 0).matrix(space.names)[:, :3] - 2.5
+    ways = np.array(drive)[:, 1:]
+    np.testing.assert_allclose(away @ np.linalg.svd(ways)[0][:, 2], 0.0, atol=1e-12)
+    assert (np.ptp(away, axis=0) > np.sqrt(3.0) * np.abs(ways).max(axis=1)).all()
+    assert made(model) == model.inverse()
 
 
 def test_the_static_map_is_a_polynomial_of_all_inputs() -> None:

@@ -57,6 +57,7 @@ def scaled(balance: Balance, of: Sheet, to: Sheet) -> Balance:
         friction_slopes=vector(pressure * np.array(balance.friction_slopes)),
         obstacles=times(balance.obstacles, np.tile((1.0, length, per_length), balance.n_obstacles)),
         preload=balance.preload * pressure,
+        drive=times(balance.drive, pressure),
         hull=times(balance.hull, length),
         scale=balance.scale * length,
         bladders=vector(per_length * np.array(balance.bladders)),

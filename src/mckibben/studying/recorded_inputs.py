@@ -10,6 +10,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.coupled.balance import balance_in
 from mckibben.blocks.laws import wander
 from mckibben.control.identified import BEYOND, known_ranges
 from mckibben.recording import Recording
@@ -22,6 +23,9 @@ STRIDES = (4, 1000)
 
 SAMPLES, STEP = 100, 0.02
 """Of the motion of a model whose recordings are not at hand: samples, and the time between them [s]."""
+
+EVEN = 3.0**0.5
+"""Reach of an even distribution, in standard deviations."""
 
 TURNS = 24
 """Turning points of a random motion."""
@@ -71,7 +75,8 @@ class RecordedInputs:
         scale = np.where(high > low, high - low, 1.0)
         middle = (low + high) / 2
         shares = (every - middle) / scale
-        directions = np.linalg.svd(shares - shares.mean(axis=0), full_matrices=True)[2].T
+        few = len(shares) < len(names)  # whose directions lack some
+        directions = np.linalg.svd(shares - shares.mean(axis=0), full_matrices=few)[2].T
         along = shares @ directions
         steps = np.concatenate([np.abs(np.diff(table, axis=0)) / scale for table in tables]).max(
             axis=1
@@ -93,10 +98,10 @@ class RecordedInputs:
 
     @classmethod
     def known(cls, block: Block) -> Self | None:
-        """Return the inputs that a model was identified for, in any combination; None if it says none.
+        """Return the inputs that a model was identified for; None if it says none.
 
-        Inputs whose range is not known are 0. The fastest motion runs through the range in 100 samples
-        of 20 ms.
+        They are in any combination, but along the drive of a balance that has one. Inputs whose range
+        is not known are 0. The fastest motion runs through the range in 100 samples of 20 ms.
         """
         ranges = known_ranges(block)
         if not any(channel.name in ranges for channel in block.inputs):
@@ -106,8 +111,17 @@ class RecordedInputs:
         units = {channel.name: channel.unit for channel in block.inputs}
         rise = np.linspace(low, high, SAMPLES + 1)
         box = cls.of([Recording(dict(zip(names, rise.T, strict=True)), STEP, units)], names)
-        ends = (box.ends - box.middle) / box.scale
-        return replace(box, directions=np.eye(len(names)), extent=ends)
+        directions, extent = np.eye(len(names)), (box.ends - box.middle) / box.scale
+        placed = balance_in(block)
+        if placed is not None and placed.solved and placed.balance.drive:
+            drive, n = np.array(placed.balance.drive), len(placed.balance.given)
+            middle = (drive[:, 0] - box.middle[:n]) / box.scale[:n]
+            ways = drive[:, 1:] / box.scale[:n, np.newaxis]
+            own = np.linalg.qr(ways, mode="complete").Q
+            reach = EVEN * np.sqrt(((own.T @ ways) ** 2).sum(axis=1))
+            directions[:n, :n] = own
+            extent[:, :n] = middle @ own + [-reach, reach]
+        return replace(box, directions=directions, extent=extent)
 
     def motion(self, slowness: float, seed: int) -> Recording:
         """Return a random motion, so many times slower than the fastest recorded."""

@@ -171,6 +171,11 @@ class Balance(Invertible):
     preload : float
         Pressure that muscles share where they are more than coordinates [bar]; the compensator departs
         from it as little as it can.
+    drive : sequence of n sequences of 1 + r float
+        How muscles that are more than coordinates were driven: the middle of their pressures, then how
+        far these went along each of r directions, m or more; standard deviations [bar]. The compensator
+        departs from that middle along those directions alone, in proportion to how far they went.
+        Default none: any pressures, about the ``preload``.
     """
 
     kind: ClassVar[str] = "balance"
@@ -211,6 +216,7 @@ class Balance(Invertible):
         obstacles="o_{ki}",
         directions="W_{ki}",
         preload="p_s [bar]",
+        drive="D_{ki} [bar]",
         driven="y_i",
         given="p_i",
     )
@@ -245,6 +251,7 @@ class Balance(Invertible):
     obstacles: Rows = ()
     directions: Rows = ()
     preload: FiniteFloat = 0.0
+    drive: Rows = ()
 
     def __post_init__(self) -> None:
         self.check_channels()
@@ -266,6 +273,11 @@ class Balance(Invertible):
                 remedy="give a pressure for every coordinate, or, of more muscles, their "
                 "directions",
             )
+        if self.drive and m == n:
+            raise ModelError(
+                f"{self.kind!r} has a drive, and no more muscles than coordinates",
+                remedy="leave it out: their pressures follow from the coordinates",
+            )
         widths = {
             "springs": (m, (1 + n_x * self.degree) * (1 + m)),
             "elasticity": (n, len(self.elasticity[0]) if self.elasticity else 0),
@@ -279,6 +291,8 @@ class Balance(Invertible):
             widths["obstacles"] = (m, self.n_obstacles * (3 + n_x))
         if self.directions:
             widths["directions"] = (n, m)
+        if self.drive:
+            widths["drive"] = (n, max(len(self.drive[0]), 1 + m))
         if self.known:
             widths["known"] = (len(self.scheduled), 2)
         for name, (count, width) in widths.items():
@@ -413,7 +427,7 @@ class Balance(Invertible):
         """Scratch: coordinates, pressures, four vectors and a matrix, terms and shares of a muscle."""
         n, m, row = len(self.given), len(self.driven), (self.elasticity, self.areas)
         terms = 4 + sum(len(table[0]) for table in row) + len(self.limits) + len(self.lags)
-        return 3 * n + 5 * m + m * m + 2 * terms
+        return 3 * n + 5 * m + m * m + 2 * terms + (n * n + n * m + m if self.drive else 0)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return the coefficients described in `mckibben.blocks.coupled.balance_law`.
@@ -426,6 +440,7 @@ class Balance(Invertible):
         step = needs_sample_time(self.kind, sample_time) if self.rate_dependent else np.inf
         n, m, n_x = len(self.given), len(self.driven), self.n_schedules
         low, high = self.pressure_range or (-np.inf, np.inf)
+        middle, ways = np.split(np.reshape(self.drive, (n, -1)), [1], axis=1)
         head = [
             *(n, m, n_x, self.degree, self.n_loads, len(self.limits), len(self.lags)),
             *(len(self.elasticity[0]), len(self.areas[0]), self.n_obstacles, self.scale),
@@ -439,6 +454,7 @@ class Balance(Invertible):
                 not self.settled,
             ),
             *(bool(self.mass), self.preload, bool(self.directions)),
+            ways.shape[1],
         ]
         lags = np.array(self.lags)
         gains = lags / step * -np.expm1(-step / lags)
@@ -448,6 +464,7 @@ class Balance(Invertible):
             np.exp(-step / lags),
             gains,
             self.friction_slopes or n_x * (0.0,),
+            *((middle.ravel(), (ways @ ways.T).ravel()) if self.drive else ()),
         )
         obstacles = self.obstacles or m * ((),)
         tables = zip(self.springs, self.loads, obstacles, strict=True)

@@ -15,14 +15,19 @@ area of the last sample; accelerations are Houbolt's differences of four samples
 stable, and without echo in pressures.
 
 Pressures follow from coordinates muscle by muscle; coordinates from pressures as the minimum of a convex
-energy, by Newton's method with a search along every step.
+energy, by Newton's method with a search along every step. Muscles that are more than coordinates take
+the pressures nearest to the middle of those that were recorded, in the metric of their covariance C:
 
-Coefficients: the head, r (m), decays and gains of the lags (l each), g (schedules); of every coordinate
-its springs (powers of what schedules by 1 + coordinates), loads, and of every obstacle its side (1 or
--1), place and stiffness; of every muscle lowest and highest shortening known, w, b, W, then the
-coefficients of its terms: d, l, m, own spring, elasticity, area, friction, relaxation. State:
-coordinates, stretches, stops (muscle by muscle), lags (the same), with mass the last two moves of each
-muscle, the tare of coordinates, whether this is the first sample, number of failed samples.
+    p = p_0 + C A W lambda,
+
+with one lambda a coordinate. So they stay on the line on which a differential drive was recorded.
+
+Coefficients: the head, r (m), decays and gains of the lags (l each), g (schedules); with a drive, p_0
+and C; of every coordinate its springs (powers of what schedules by 1 + coordinates), loads, and of every
+obstacle its side (1 or -1), place and stiffness; of every muscle lowest and highest shortening known, w,
+b, W, then the coefficients of its terms: d, l, m, own spring, elasticity, area, friction, relaxation.
+State: coordinates, stretches, stops (muscle by muscle), lags (the same), with mass the last two moves of
+each muscle, the tare of coordinates, whether this is the first sample, number of failed samples.
 """
 
 from __future__ import annotations
@@ -33,11 +38,12 @@ from mckibben.arrays import Array
 from mckibben.blocks.kernels import DERIVED, kernel, short_kernel
 from mckibben.blocks.solving import eliminate
 
-HEAD = 21
+HEAD = 22
 """Muscles, coordinates, schedules, degree, loads, stops, lags, elastic terms, area's terms, obstacles of
 a coordinate, scale, p_0, ratio of lower to upper limits, lowest and highest pressure, samples a second,
 whether there is a tare, what is left at the start to relax (1, or 0 if settled), whether there is mass,
-pressure shared by muscles that are more than coordinates, whether they are."""
+pressure shared by muscles that are more than coordinates, whether they are, and in how many directions
+their pressures were driven, 0 for any."""
 
 OWN, DYNAMIC = 4, 4
 """Coefficients of a muscle before its directions; terms before elasticity."""
@@ -72,11 +78,20 @@ SINGLE = {"BALANCED": 1e-6, "NEARLY": 1e-4, "SURE": 1e-5, "HAIR": 1e-6}
 
 
 @kernel
+def drive_at(c: Array) -> int:
+    """Return the index of the middle of the recorded pressures, behind which is their covariance."""
+    return HEAD + int(c[5]) + 2 * int(c[6]) + int(c[2])
+
+
+@kernel
 def coordinate_at(c: Array, j: int) -> int:
     """Return the index of the first coefficient of a coordinate."""
     springs = (1 + int(c[2]) * int(c[3])) * (1 + int(c[1]))
     width = springs + int(c[4]) + int(c[9]) * (3 + int(c[2]))
-    return HEAD + int(c[5]) + 2 * int(c[6]) + int(c[2]) + j * width
+    place = drive_at(c)
+    if c[21] != 0.0:
+        place += int(c[0]) * (1 + int(c[0]))
+    return place + j * width
 
 
 @kernel
@@ -491,6 +506,18 @@ def start_at_rest(c: Array, state: Array, x: Array, q: Array, p: Array, work: Ar
 
 
 @kernel
+def held_force(c: Array, k: int, state: Array, way: int, y: float, x: Array, terms: Array) -> float:
+    """Return what muscle k resists with at no pressure, without friction."""
+    width, place = n_terms(c), terms_at(c, k)
+    first, held = DYNAMIC + int(c[7]), 0.0
+    resistance(c, k, state, way, y, 0.0, x, terms[:width], terms[width : 2 * width])
+    for i in range(width):
+        if i < first or i >= width - int(c[6]):
+            held += c[place + i] * terms[i]
+    return held
+
+
+@kernel
 def pressure_for(
     c: Array, k: int, state: Array, way: int, y: float, wanted: float, x: Array, terms: Array
 ) -> float:
@@ -499,13 +526,9 @@ def pressure_for(
     It is the one root of a function that falls piecewise straight, since areas are larger than what
     friction grows with pressure.
     """
-    width, place = n_terms(c), terms_at(c, k)
-    first, slopes = DYNAMIC + int(c[7]), terms[width : 2 * width]
-    resistance(c, k, state, way, y, 0.0, x, terms[:width], slopes)
-    held = -wanted
-    for i in range(width):
-        if i < first or i >= width - int(c[6]):
-            held += c[place + i] * terms[i]
+    width = n_terms(c)
+    slopes = terms[width : 2 * width]
+    held = held_force(c, k, state, way, y, x, terms) - wanted
     a = area(c, k, y)[0]
     low, high = -NEVER, NEVER
     p = held / a
@@ -526,6 +549,171 @@ def pressure_for(
 
 
 @kernel
+def undriven(
+    c: Array,
+    state: Array,
+    way: int,
+    q: Array,
+    x: Array,
+    p: Array,
+    held: Array,
+    ways: Array,
+    taut: bool,
+    lacks: Array,
+    sizes: Array,
+    matrix: Array,
+    terms: Array,
+) -> float:
+    """Fill what every coordinate lacks at pressures, and its slopes; return the largest relative one.
+
+    That is infinite where forces are. ``held`` has the forces of `held_force`; slopes are by lambda, and
+    those of the pressures are ``ways``. No muscle goes slack where they are ``taut``.
+    """
+    m, width = int(c[1]), n_terms(c)
+    for j in range(m):
+        pulled = coupling_force(c, j, q, x, matrix[j])
+        lacks[j], sizes[j] = -pulled, abs(pulled)
+        for i in range(m):
+            sizes[j] += abs(matrix[j, i] * q[i])
+            matrix[j, i] = 0.0
+    for k in range(int(c[0])):
+        own, y = muscle_at(c, k), shortening(c, k, q)
+        a = area(c, k, y)[0]
+        rubbed, by_p = friction(
+            c, k, state, way, y, p[k], x, terms[:width], terms[width : 2 * width]
+        )
+        force, slope = held[k] + rubbed - p[k] * a, by_p - a
+        size = abs(held[k]) + abs(rubbed) + abs(p[k] * a)
+        if force > c[own + 3] and not taut:
+            force, slope = c[own + 3], 0.0
+        for j in range(m):
+            pull = c[own + OWN + j]
+            lacks[j] -= pull * force
+            sizes[j] += abs(pull) * size
+            for i in range(m):
+                matrix[j, i] -= pull * slope * ways[k, i]
+    left = 0.0
+    for j in range(m):
+        if not sizes[j] < np.inf:
+            return np.inf
+        if sizes[j] > 0.0:
+            left = max(left, abs(lacks[j]) / sizes[j])
+    return left
+
+
+@kernel
+def combine(middle: Array, ways: Array, at: Array, p: Array) -> None:
+    """Fill the pressures that are so far along their ways from the middle."""
+    for k in range(p.size):
+        p[k] = middle[k]
+        for j in range(at.size):
+            p[k] += ways[k, j] * at[j]
+
+
+@kernel
+def balance_driven(
+    c: Array,
+    state: Array,
+    way: int,
+    q: Array,
+    x: Array,
+    p: Array,
+    middle: Array,
+    spread: Array,
+    work: Array,
+) -> bool:
+    """Fill the pressures that balance nearest to a middle, by a covariance; return whether they do.
+
+    They are found by Newton's method, with a step halved while it does not help; forces are piecewise
+    straight in pressure.
+    """
+    n, m = int(c[0]), int(c[1])
+    lacks, step = work[:m], work[m : 2 * m]
+    start, sizes = work[2 * m : 3 * m], work[3 * m : 4 * m]
+    matrix, terms = work[4 * m : 4 * m + m * m].reshape((m, m)), work[4 * m + m * m :]
+    rest = work[work_size(c) :]
+    held, ways, at = rest[:n], rest[n : n + n * m].reshape((n, m)), rest[n + n * m : n + n * m + m]
+    for k in range(n):
+        held[k] = held_force(c, k, state, way, shortening(c, k, q), x, terms)
+        for j in range(m):
+            ways[k, j] = 0.0
+    for i in range(n):
+        a = area(c, i, shortening(c, i, q))[0]
+        for k in range(n):
+            for j in range(m):
+                ways[k, j] += spread[k, i] * a * c[muscle_at(c, i) + OWN + j]
+    for j in range(m):
+        start[j] = 0.0
+        step[j] = 0.0
+    left, before = np.inf, np.inf
+    for turn in range(MOST_STEPS):
+        first = turn == 0  # from where all muscles are taut, since slack ones do not answer
+        for j in range(m):
+            at[j] = start[j] + step[j]
+        combine(middle, ways, at, p)
+        left = undriven(c, state, way, q, x, p, held, ways, first, lacks, sizes, matrix, terms)
+        if not first and (left <= BALANCED or (not left < before and before < NEARLY)):
+            break
+        if left < before:
+            before = np.inf if first else left
+            eliminate(matrix, lacks)
+            for j in range(m):
+                start[j] = at[j]
+                step[j] = -lacks[j]
+        else:
+            for j in range(m):
+                step[j] *= 0.5
+    if not left <= before:
+        combine(middle, ways, start, p)
+    return min(left, before) < NEARLY
+
+
+@kernel
+def drive_pressures(
+    c: Array, state: Array, way: int, q: Array, x: Array, p: Array, work: Array
+) -> bool:
+    """Fill the pressures, combined as recorded, that hold the muscles; return whether they exist.
+
+    A muscle beyond the range of pressures stays at its end, and takes the others along as they were
+    recorded together; while these are driven in more directions than coordinates, they take its part.
+    """
+    n, m, n_free = int(c[0]), int(c[1]), int(c[21])
+    at, shares, rest = drive_at(c), work[work_size(c) :], work[work_size(c) + n + n * m + m :]
+    recorded = c[at + n : at + n + n * n].reshape((n, n))
+    middle, spread = rest[:n], rest[n : n + n * n].reshape((n, n))
+    for k in range(n):
+        middle[k] = c[at + k]
+        for i in range(n):
+            spread[k, i] = recorded[k, i]
+    reached = False
+    for _ in range(n):
+        if n_free >= m:
+            reached = balance_driven(c, state, way, q, x, p, middle, spread, work)
+        worst, furthest, end = -1, 0.0, 0.0
+        for k in range(n):
+            inside = min(max(p[k], c[13]), c[14])
+            beyond = abs(p[k] - inside)
+            moves = spread[k, k] > HAIR * recorded[k, k]
+            if moves and beyond > HAIR * (1.0 + abs(p[k])):
+                beyond *= beyond / spread[k, k]
+                if beyond > furthest:
+                    worst, furthest, end = k, beyond, inside
+        if worst < 0:
+            return reached
+        more, shift, size = end - p[worst], end - middle[worst], spread[worst, worst]
+        for k in range(n):
+            shares[k] = spread[k, worst] / size
+            p[k] += shares[k] * more
+            middle[k] += shares[k] * shift
+        for k in range(n):
+            for i in range(n):
+                spread[k, i] -= shares[k] * shares[i] * size
+        n_free -= 1
+        reached = False
+    return False
+
+
+@kernel
 def solve_pressures(
     c: Array, state: Array, way: int, q: Array, x: Array, p: Array, work: Array
 ) -> bool:
@@ -533,9 +721,11 @@ def solve_pressures(
 
     Muscles that are more than coordinates take the forces that they rest with at the pressure they
     share, and the least changes of them that balance; those that would leave the range of pressures, or
-    go slack, stay at its end, one by one, and the others take their part. ``work`` has two numbers a
-    muscle more than `work_size`.
+    go slack, stay at its end, one by one, and the others take their part; with a drive, see
+    `drive_pressures`. ``work`` has two numbers a muscle more than `work_size`, or what a drive needs.
     """
+    if c[21] != 0.0:
+        return drive_pressures(c, state, way, q, x, p, work)
     n, m = int(c[0]), int(c[1])
     lacks, gradient = work[:m], work[m : 2 * m]
     matrix, terms = work[4 * m : 4 * m + m * m].reshape((m, m)), work[4 * m + m * m :]

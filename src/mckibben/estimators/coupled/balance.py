@@ -32,6 +32,7 @@ from mckibben.estimators.coupled.balance_bench import (
     bench_of,
     check_numbers,
     directions,
+    drive_of,
     from_zero,
     in_one_order,
     one_speed,
@@ -145,6 +146,10 @@ class BalanceEstimator(CoupledEstimator):
     of_force : bool
         Whether errors of the one load are made least, not those of displacements: so they are where
         nothing moves in any recording.
+    drive : {"recorded", "any"}
+        Pressures that the compensator combines, of muscles that are more than coordinates: along the
+        directions in which they were recorded, so that a differential drive stays on its line, or any
+        in their range.
     steps : int
         Most Gauss-Newton steps.
     prior : str, Path, Sheet or Prior, optional
@@ -203,6 +208,7 @@ class BalanceEstimator(CoupledEstimator):
     tare: bool | None = None
     unknown_load: bool | None = None
     of_force: bool = False
+    drive: Literal["recorded", "any"] = "recorded"
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
     prior: PriorLike = None
 
@@ -291,14 +297,23 @@ class BalanceEstimator(CoupledEstimator):
             place = search.problem.loads_at(structure, run)
             if place.stop > place.start:
                 self.loads_[run.recording] = z[place] * balance.areas[0][0]
+        static = [b for b in front(structure, values, data.inputs[0]) if not b.rate_dependent]
+
+        def acting_in_muscles(given: Array) -> Array:
+            for block in static:
+                given = block.simulate(given)
+            return given
+
         given_range = None
         if data.inputs[0].unit in LIMITED:
             given_range = min(float(data.lowest.min()), 0.0), float(data.highest.max())
-            ends = np.array(given_range)
-            for block in front(structure, values, data.inputs[0]):
-                if not block.rate_dependent:
-                    ends = block.simulate(ends)
-            balance = replace(balance, pressure_range=(float(ends[0]), float(ends[1])))
+            low, high = acting_in_muscles(np.array(given_range)).tolist()
+            balance = replace(balance, pressure_range=(low, high))
+        if structure.n > structure.m and self.drive == "recorded":
+            pressures = [acting_in_muscles(given) for given in data.stacked("driven").T]
+            drive = drive_of(np.column_stack(pressures))
+            if structure.m < drive.shape[1] <= structure.n:  # not any, and enough to balance along
+                balance = replace(balance, drive=rows(drive))
         x = of_channels(data, balance.scheduling).stacked("scheduled")
         balance = replace(balance, known=rows(np.column_stack([x.min(axis=0), x.max(axis=0)])))
 

@@ -29,6 +29,9 @@ compared.
 LEAST_MOVED = 0.02
 """Motion due to a pressure, relative to the largest, below which the pressure has no effect."""
 
+LEAST_DRIVEN = 0.05
+"""Spread of pressures along a direction, relative to the widest, below which it is noise."""
+
 STILL = 0.005
 """Motion of an output, relative to the largest, below which it counts as constant."""
 
@@ -189,6 +192,19 @@ def directions(data: TrainingData) -> Array:
             remedy="leave out all but one, or record runs in which pressures move independently",
         )
     return ways
+
+
+def drive_of(pressures: Array) -> Array:
+    """Return the middle of pressures, shape (k, n), and their spread along directions, (n, 1 + r).
+
+    Directions are principal ones of the pressures over their ranges, spreads standard deviations.
+    """
+    middle, span = pressures.mean(axis=0), np.ptp(pressures, axis=0)
+    shares = (pressures - middle) / (np.where(span > 0, span, 1.0) * np.sqrt(len(pressures)))
+    sizes, ways = np.linalg.svd(shares, full_matrices=False)[1:]
+    driven = sizes > LEAST_DRIVEN * sizes[0]
+    spread = span[:, np.newaxis] * (ways[driven].T * sizes[driven])
+    return np.column_stack([middle, spread])
 
 
 def from_zero(data: TrainingData, ways: Array) -> tuple[TrainingData, list[Block], Array]:

@@ -75,7 +75,7 @@ class Repetition(Block):
     )
 
     corrections: Rows
-    sample_time: Annotated[FiniteFloat, Gt(0)]  # type: ignore[assignment]
+    sample_time: Annotated[FiniteFloat, Gt(0)]
     driven: Channels = (DISPLACEMENT,)
     given: Channels = (DISPLACEMENT,)
     repeats: bool = False

@@ -24,8 +24,10 @@ The repetition with the least error is kept.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -86,6 +88,16 @@ class Learned:
     convergence: Mapping[str, float]
     runs: tuple[Recording, ...] = field(repr=False)
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the errors and how they converge, for JSON."""
+        return {
+            "best_repetition": self.best_repetition,
+            "rmse": {name: list(errors) for name, errors in self.rmse.items()},
+            "cutoff": dict(self.cutoff),
+            "expected": dict(self.expected),
+            "convergence": dict(self.convergence),
+        }
+
 
 def learn(
     compensator: Block,
@@ -93,6 +105,7 @@ def learn(
     repetitions: int = 10,
     *,
     ahead: int = 0,
+    settle: int = 0,
     repeats: bool = False,
 ) -> Learned:
     """Repeat a motion, and correct the reference of its compensator by the errors.
@@ -106,7 +119,7 @@ def learn(
         recording; see `learned`.
     repetitions : int
         After the first run; at least 1.
-    ahead, repeats
+    ahead, settle, repeats
         As for `learned`.
 
     Returns
@@ -123,13 +136,18 @@ def learn(
     )
     runs = [run(compensator)]
     for _ in range(repetitions):
-        found = learned(compensator, runs, ahead=ahead, repeats=repeats)
+        found = learned(compensator, runs, ahead=ahead, settle=settle, repeats=repeats)
         runs.append(run(found.next))
-    return learned(compensator, runs, ahead=ahead, repeats=repeats)
+    return learned(compensator, runs, ahead=ahead, settle=settle, repeats=repeats)
 
 
 def learned(
-    compensator: Block, runs: Sequence[Recording], *, ahead: int = 0, repeats: bool = False
+    compensator: Block,
+    runs: Sequence[Recording],
+    *,
+    ahead: int = 0,
+    settle: int = 0,
+    repeats: bool = False,
 ) -> Learned:
     """Return the corrections of a compensator after recorded repetitions of one motion.
 
@@ -142,7 +160,10 @@ def learned(
         ones due at the same samples. The first is that of ``compensator``, every other that of `next`
         as found from those before it.
     ahead : int
-        How many samples before it is due the compensator is given the reference.
+        How many samples before it is due the compensator is given the reference; 1 in a loop of
+        `track`, or the preview, if that is longer.
+    settle : int
+        Samples at the beginning that are not scored.
     repeats : bool
         Whether each repetition follows the one before without a pause, in a state left by it. If not,
         the controller is started anew with every repetition.
@@ -159,13 +180,16 @@ def learned(
     if not runs:
         raise DataError("there is no repetition", remedy="give the recording of at least one")
     step = sample_time_of(runs[0], "be a repetition")
+    length = len(runs[0])
+    require(0 <= ahead < length, "ahead", ahead, f"0 to {length - 1} samples")
+    require(0 <= settle < length, "settle", settle, f"0 to {length - 1} samples")
     channels = compensator.inputs[: compensator.n_driven]
     desired, measured = (_outputs(compensator, runs, prefix) for prefix in (DESIRED, ""))
     if not np.array_equal(desired, np.broadcast_to(desired[0], desired.shape)):
         raise DataError("repetitions have different references", remedy="repeat one motion")
     reached = ends(compensator.forward_model, channels, runs[0].rest_length)
     lessons = [
-        _Lesson.of(desired[0, :, k], measured[:, :, k], reached.get(channel.name), repeats=repeats)
+        _Lesson.of(desired[0, :, k], measured[:, :, k], reached.get(channel.name), settle, repeats)
         for k, channel in enumerate(channels)
     ]
     errors = np.array([lesson.errors for lesson in lessons])
@@ -230,15 +254,22 @@ class _Lesson:
 
     @classmethod
     def of(
-        cls, desired: Array, measured: Array, reached: tuple[float, float] | None, *, repeats: bool
+        cls,
+        desired: Array,
+        measured: Array,
+        reached: tuple[float, float] | None,
+        settle: int,
+        repeats: bool,
     ) -> _Lesson:
         """Return it, from the desired output, (n,), and the measured ones, (n_runs, n)."""
-        low, high = (-np.inf, np.inf) if reached is None else reached
-        low, high = np.minimum(low - desired, 0.0), np.maximum(high - desired, 0.0)
+        lowest, highest = (-np.inf, np.inf) if reached is None else reached
+        low, high = np.minimum(lowest - desired, 0.0), np.maximum(highest - desired, 0.0)
         delay = _delay(desired, measured[0])
         cutoff, expected = _cutoff(desired, _earlier(desired - measured[0], delay, repeats))
-        width = np.sqrt(2 * np.log(2)) / (2 * np.pi * cutoff)  # of a Gaussian that is 1/2 there
-        errors = np.sqrt(np.mean((desired - measured) ** 2, axis=1))
+        width = math.sqrt(2 * math.log(2)) / (
+            2 * math.pi * cutoff
+        )  # of a Gaussian that is 1/2 there
+        errors = np.sqrt(np.mean((desired - measured)[:, settle:] ** 2, axis=1))
         corrections, gain = [np.zeros(len(desired))], np.ones(len(desired))
         before: Array | None = None
         for k, output in enumerate(measured):
@@ -270,20 +301,21 @@ def _cutoff(desired: Array, error: Array) -> tuple[float, float]:
 
     The frequency is relative to the sampling rate; the ratio is weighted by the error.
     """
-    from scipy.signal import welch
+    from scipy.signal import detrend, welch
+
+    def spectrum(samples: Array) -> Array:
+        found: Array = welch(samples, nperseg=length, detrend=detrend)[1]
+        return found
 
     length = max(len(desired) // SEGMENTS, 2)
-    (frequencies, motion), (_, missed) = (
-        welch(samples, nperseg=length, detrend="linear") for samples in (desired, error)
-    )
+    motion, missed = spectrum(desired), spectrum(error)
+    frequencies = np.fft.rfftfreq(length)
     beyond = np.flatnonzero(missed[1:] >= motion[1:])
     end = 1 + int(beyond[0]) if beyond.size else len(frequencies) - 1
-    shrinks = missed[:end] < motion[:end]
-    ratio = np.sqrt(missed[:end][shrinks] / motion[:end][shrinks])
-    weight = np.sqrt(missed[:end][shrinks])
-    expected = (
-        float(np.sqrt(np.sum((ratio * weight) ** 2) / np.sum(weight**2))) if weight.any() else 0.0
-    )
+    missed, motion = missed[:end], motion[:end]
+    ratio = np.divide(missed, motion, out=np.ones(end), where=missed < motion)
+    total = float(missed.sum())
+    expected = math.sqrt(float(ratio @ missed) / total) if total > 0 else 0.0
     return float(frequencies[end]), expected
 
 

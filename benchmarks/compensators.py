@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -51,16 +51,23 @@ def inverse_law(plant: Plant, inverse: Block) -> Law:
     return lambda desired: inverse.simulate(desired.select(names)).matrix(plant.bench.pressures)
 
 
-def followed(plant: Plant, other: Plant, law: Law) -> float:
-    """Return the mean RMSE over outputs of a plant that follows the test runs of another seed."""
-    bench, errors = plant.bench, []
+def motions(plant: Plant, other: Plant) -> Iterator[tuple[Recording, Array]]:
+    """Yield what a plant does, without noise, in the test runs of another seed, and the loads."""
+    bench, names = plant.bench, plant.bench.outputs + plant.bench.loads
     for run in (run for runs in other.test.values() for run in runs):
         loads = np.column_stack([np.empty((len(run), 0)), *(run[name] for name in bench.loads)])
         desired = plant.respond(run.matrix(bench.pressures), loads)
-        names = bench.outputs + bench.loads
         columns = dict(zip(names, np.column_stack([desired, loads]).T, strict=True))
-        asked = Recording(columns, bench.sample_time, {name: run.units[name] for name in names})
-        errors.append(plant.respond(bench.allowed(law(asked)), loads) - desired)
+        units = {name: run.units[name] for name in names}
+        yield Recording(columns, bench.sample_time, units, meta={"name": run.name}), loads
+
+
+def followed(plant: Plant, other: Plant, law: Law) -> float:
+    """Return the mean RMSE over outputs of a plant that follows the test runs of another seed."""
+    bench, errors = plant.bench, []
+    for asked, loads in motions(plant, other):
+        found = plant.respond(bench.allowed(law(asked)), loads)
+        errors.append(found - asked.matrix(bench.outputs))
     return float(np.sqrt((np.concatenate(errors) ** 2).mean(axis=0)).mean())
 
 

@@ -363,6 +363,9 @@ class TrackOptions:
     controller: Annotated[
         str, Option("feedforward, feedforward-pid, observer, or pid (no inverse).", "NAME")
     ] = "feedforward"
+    repetitions: Annotated[
+        int, Option("Learn from that many repetitions of the reference.", "N")
+    ] = 0
     approach: Annotated[float, Option("Time to reach the first reference [s].", "S")] = 20.0
     settle: Annotated[float, Option("Time after that not scored [s].", "S")] = 0.0
     noise: Annotated[float, Option("Standard deviation of measurement noise [mm or N].", "X")] = 0.0
@@ -377,6 +380,21 @@ class TrackOptions:
     ] = True
     fields: Fields = field(default_factory=dict)
     seed: Seed = 0
+
+
+@dataclass(frozen=True)
+class LearnOptions:
+    """Options of `learn`: how the motion is repeated."""
+
+    ahead: Annotated[
+        int, Option("Samples by which the reference is given before it is due.", "N")
+    ] = 0
+    repeats: Annotated[
+        bool, Option("Repetitions follow each other without a pause or a new start.")
+    ] = False
+    best: Annotated[
+        bool, Option("Write the compensator of the best repetition, not the next one to try.")
+    ] = False
 
 
 @dataclass(frozen=True)

@@ -66,6 +66,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "recurrent-fuzzy-network": (
             "mckibben.blocks.coupled.recurrent_fuzzy_network:RecurrentFuzzyNetwork"
         ),
+        "repetition": "mckibben.blocks.repetition:Repetition",
         "series": "mckibben.blocks.compose:Series",
         "state-network": "mckibben.blocks.dynamics.state_network:StateNetwork",
         "tondu-lopez": "mckibben.blocks.force.laws:TonduLopez",

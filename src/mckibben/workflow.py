@@ -1,4 +1,4 @@
-"""Operations of users: fit, study, track, invert, check, plan, review, export.
+"""Operations of users: fit, study, track, learn, invert, check, plan, review, export.
 
 The command line, the workbench and Python call these. Each takes recordings, or files with some, and
 returns a result that has numbers as ``to_dict()``. Parameters that they have in common:
@@ -24,6 +24,8 @@ import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
+from functools import cache
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_type_hints
 
@@ -36,6 +38,7 @@ from mckibben.options import (
     FitOptions,
     FMUOptions,
     InvertOptions,
+    LearnOptions,
     MJCFOptions,
     Options,
     PlanOptions,
@@ -61,6 +64,7 @@ if TYPE_CHECKING:
 
     from mckibben.blocks.base import Block
     from mckibben.comparison.leaderboard import Leaderboard
+    from mckibben.control import Learned
     from mckibben.diagnosis.check import Validation
     from mckibben.diagnosis.review import Review
     from mckibben.outputs import Results
@@ -325,9 +329,17 @@ def track(
     from mckibben.blocks.base import Block
     from mckibben.blocks.feedback import FeedforwardFeedback
     from mckibben.blocks.fields import drives
-    from mckibben.control import BlockController, before, control_law, preview_time, tune_pid
+    from mckibben.control import (
+        BlockController,
+        before,
+        control_law,
+        learn,
+        preview_time,
+        tune_pid,
+    )
     from mckibben.control import track as close
     from mckibben.control.identified import beyond_known
+    from mckibben.control.preview import samples_ahead
     from mckibben.control.roles import asked, offered
     from mckibben.control.suiting import flatters_feedback, kind_of
     from mckibben.control.twin import COMMAND
@@ -356,11 +368,27 @@ def track(
     arguments: dict[str, Any] = {name: getattr(chosen, name) for name in copied}
     arguments["pressure_loop"] = chosen.pressure_loop and not commanded
     with telling(progress, f"{chosen.controller} on {plant.name}") as tell:
-        law = control_law(
-            chosen.controller,
-            block,
-            lambda: tune_pid(plant, sample_time=step, scheduled=held, references=block.inputs),
+        taught = None
+        tuned = cache(
+            lambda: tune_pid(plant, sample_time=step, scheduled=held, references=block.inputs)
         )
+        if chosen.repetitions:
+            ahead = preview_time(block) if chosen.preview is None else chosen.preview
+            numbers = count(chosen.seed)  # noise differs between repetitions
+
+            def repeat(corrected: Block) -> Recording:
+                law = control_law(chosen.controller, corrected, tuned)
+                again = arguments | {"seed": next(numbers)}
+                return close(law, plant, wanted, preview=chosen.preview, **again).recording
+
+            taught = learn(
+                block,
+                repeat,
+                chosen.repetitions,
+                ahead=max(samples_ahead(ahead, step), 1) + block.samples_ahead,
+                settle=round(chosen.approach / step) + round(chosen.settle / step),
+            )
+        law = control_law(chosen.controller, taught.best if taught else block, tuned)
         if controller_file is not None:
             ahead = preview_time(block) if chosen.preview is None else chosen.preview
             ahead += block.samples_ahead * step
@@ -392,7 +420,34 @@ def track(
         notes=(*beyond_known(block, wanted), *without.notes),
         file=file,
         controller_file=controller_file,
+        repetitions=taught,
     )
+
+
+def learn(
+    compensator: Block | str | Path,
+    runs: Data,
+    options: LearnOptions | None = None,
+    *,
+    reading: ReadOptions | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    **given: Any,
+) -> Learned:
+    """Learn from recorded repetitions of one motion; see `mckibben.control.learned`.
+
+    ``runs`` are all of them, in order, and ``compensator`` that of the first. ``out`` is the compensator
+    to run next.
+    """
+    from mckibben.control import learned
+
+    chosen, reading = _chosen(LearnOptions, options, reading, given)
+    file = _claim(out, _paths(compensator, *files_of(runs)), force)
+    recordings = read_files(runs, None, reading)
+    found = learned(saved(compensator), recordings, ahead=chosen.ahead, repeats=chosen.repeats)
+    if file is not None:
+        (found.best if chosen.best else found.next).save(file)
+    return found
 
 
 def _half(tell: Tell | None, start: float) -> Callable[[float], None] | None:

@@ -54,6 +54,7 @@ CALLS: dict[str, Call] = {
     "calibrate": call_of(f"{MODEL} {RUN} two.csv -o out.json", MODEL, RUN),
     "invert": call_of(f"{MODEL} --predictive -o out.json", MODEL),
     "track": call_of(f"{INVERSE} --rig {RIG} --reference {RUN} -o out.csv", INVERSE, RUN, RIG),
+    "learn": call_of(f"{INVERSE} loop.csv -o out.json", INVERSE, "loop.csv"),
     "plan": call_of(f"{RUN} --minutes 0.5 -o out.csv", RUN),
     "plot": call_of(f"{RUN} --model {MODEL} -o out.png", RUN, MODEL),
     "reproduce": call_of("multistate --quick --jobs 1"),
@@ -81,6 +82,11 @@ def files(folder: Path) -> None:
         y = GPI.example().simulate(u)
         channels = {"pressure": u, "displacement": y, "voltage": u / 10, "force": 20 + u}
         write(Recording(channels, 0.02), folder / name)
+    loop, units = (
+        {"reference_displacement": y, "displacement": y + 0.1},
+        {"reference_displacement": "mm"},
+    )
+    write(Recording(loop, 0.02, units), folder / "loop.csv")
     (folder / "sets").mkdir()
     shutil.copy(folder / RUN, folder / "sets")
     GPI.example().save(folder / MODEL)

@@ -260,6 +260,10 @@ class Series(Composition):
     def outputs(self) -> tuple[Channel, ...]:
         return self.parts[-1].outputs
 
+    @property
+    def samples_ahead(self) -> int:  # type: ignore[override]
+        return sum(part.samples_ahead for part in self.parts)
+
     def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
         by_name = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
         signals = list(taken)

@@ -35,8 +35,8 @@ class Argument:
 
 COMMANDS = (
     *("study", "characterize", "fit", "compare", "check", "calibrate", "simulate", "invert"),
-    *("track", "plan", "plot", "reproduce", "measured", "info", "link", "example", "export"),
-    *("rig", "muscles", "app"),
+    *("track", "learn", "plan", "plot", "reproduce", "measured", "info", "link", "example"),
+    *("export", "rig", "muscles", "app"),
 )
 """Commands: each is a module of `mckibben.cli.commands` of its name, whose docstring is its help.
 """

@@ -21,7 +21,7 @@ from mckibben.report.drawing import POINTS
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
     from mckibben.comparison.leaderboard import Leaderboard, Row
-    from mckibben.control import Tracked
+    from mckibben.control import Learned, Tracked
     from mckibben.diagnosis.bands import Calibration
     from mckibben.diagnosis.characterization import Characterization
     from mckibben.diagnosis.check import OutputCheck, Validation
@@ -410,7 +410,18 @@ def tracking(found: Tracking) -> list[Item]:
     ways = {found.law: found.tracked, "no compensation": found.uncompensated.tracked}
     items: list[Item] = [Text(found.notes, "note", listed=True) if found.notes else None]
     items += loops({name: one for name, one in ways.items() if one is not None})
+    items += [] if found.learned is None else learned(found.learned)
     return [*items, Text(words.tracked(found))]
+
+
+def learned(found: Learned) -> list[Item]:
+    """Return the tracking errors of repetitions, and how they converge."""
+    n = len(found.runs)
+    rows = [[k, *(errors[k] for errors in found.rmse.values())] for k in range(n)]
+    return [
+        Table(["Repetition", *(f"RMSE {name}" for name in found.rmse)], rows),
+        Text(words.learned(found)),
+    ]
 
 
 # --- Checks and reviews -----------------------------------------------------------------------------

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from mckibben.comparison.choosing import Against
     from mckibben.comparison.doubts import Span
     from mckibben.comparison.leaderboard import Leaderboard
+    from mckibben.control import Learned
     from mckibben.diagnosis.bands import Calibration
     from mckibben.diagnosis.causes import Cause
     from mckibben.diagnosis.characterization import Characterization
@@ -600,6 +601,19 @@ def tracked(found: Tracking) -> list[str]:
     ]
     median, largest = (1e6 * seconds for seconds in one.step_time)
     return [*said, f"Controller: {median:.0f} µs a step (median), {largest:.0f} µs (99.9 %)."]
+
+
+def learned(found: Learned) -> list[str]:
+    """Return which repetition is kept, and how errors converge."""
+    return [
+        f"Corrections of repetition {found.best_repetition} are kept.",
+        *(
+            f"{name}: learned up to {numeral(found.cutoff[name], 2)} Hz; the error falls by a factor of "
+            f"{numeral(found.convergence[name], 2)} per repetition ({numeral(found.expected[name], 2)} "
+            "if the plant were linear and without noise)."
+            for name in found.rmse
+        ),
+    ]
 
 
 def duration(recording: Recording) -> str:

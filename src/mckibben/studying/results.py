@@ -11,7 +11,7 @@ from mckibben.blocks.equations import quantities
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
-    from mckibben.control import Before, Tracked
+    from mckibben.control import Before, Learned, Tracked
     from mckibben.control.roles import Plant
     from mckibben.control.suiting import Kind
     from mckibben.estimators.core.estimator import Estimator
@@ -97,6 +97,9 @@ class Tracking:
     notes : tuple of str
     file, controller_file : Path or None
         Recording and controller, where they were written.
+    learned : Learned or None
+        From repetitions of the reference, if there were any; the controller has the corrections of
+        the best one.
     """
 
     tracked: Tracked = field(repr=False)
@@ -111,6 +114,7 @@ class Tracking:
     notes: tuple[str, ...] = field(default=(), repr=False)
     file: Path | None = None
     controller_file: Path | None = None
+    learned: Learned | None = field(default=None, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the errors, for JSON."""
@@ -120,6 +124,7 @@ class Tracking:
             "plant": {"name": self.plant.name, "kind": self.plant_kind},
             "flatters_feedback": self.flatters_feedback,
             **_errors(found),
+            "learned": None if self.learned is None else self.learned.to_dict(),
             "out_of_reach": {name: far._asdict() for name, far in found.beyond.items()},
             "uncompensated": None if without is None else _errors(without),
             "step_time": dict(zip(("median", "p99.9"), found.step_time, strict=True)),

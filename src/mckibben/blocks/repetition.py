@@ -1,0 +1,111 @@
+"""Corrections of a motion that repeats, learned from its repetitions, as a table.
+
+y(t) = u(t) + c(t),
+
+with t in samples since the start. In front of a compensator it plays what
+`mckibben.control.iterative_learning` has learned, in step with the motion: the start is that of the
+motion, so on a robot the controller is started with it.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block, Ports, Start, own_sample_time
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, Channels, Rows, vector
+from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.errors import ModelError
+
+
+@step
+def repetition_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Add the corrections of a sample; coefficients are [whether it repeats, a table a channel]."""
+    n = (coefficients.size - 1) // outputs.size
+    place = int(state[0])
+    for k in range(outputs.size):
+        outputs[k] = inputs[k] + coefficients[1 + k * n + place]
+    if place + 1 < n:
+        state[0] += 1.0
+    elif coefficients[0] > 0.0:
+        state[0] = 0.0
+
+
+@kernel
+def repetition_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with the motion."""
+    state[0] = 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class Repetition(Block):
+    """Corrections of a motion that repeats, by sample since the start.
+
+    Parameters
+    ----------
+    corrections : sequence of rows, shape (n_channels, n)
+        What is added to each channel, in its unit; at least one sample.
+    sample_time : float
+        Time between samples [s]; positive.
+    driven, given : sequence of Channel
+        References, and the corrected ones.
+    repeats : bool
+        Whether the motion begins again after n samples without a new start. If not, the last
+        correction is held.
+    """
+
+    kind: ClassVar[str] = "repetition"
+    ports: ClassVar[Ports] = ("driven",), (), ("given",)
+    kernel: ClassVar[Step] = repetition_step
+    start_kernel: ClassVar[Start] = repetition_start
+    rate_dependent: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("corrections",)
+    notation: ClassVar[Notation] = Notation(
+        r"y_i(t) = u_i(t) + c_{i,t}",
+        corrections="c_{i,t} [{out0}]",
+        sample_time="T_s [s]",
+        driven="u_i",
+        given="y_i",
+    )
+
+    corrections: Rows
+    sample_time: Annotated[FiniteFloat, Gt(0)]
+    driven: Channels = (DISPLACEMENT,)
+    given: Channels = (DISPLACEMENT,)
+    repeats: bool = False
+
+    def __post_init__(self) -> None:
+        self.check_channels()
+        sizes = {len(row) for row in self.corrections}
+        counts = {len(self.corrections), len(self.driven), len(self.given)}
+        if len(counts) > 1 or len(sizes) > 1 or 0 in sizes:
+            raise ModelError(
+                f"{self.kind!r} has {len(self.corrections)} rows of {sorted(sizes)} corrections for "
+                f"{len(self.driven)} inputs and {len(self.given)} outputs",
+                remedy="give a row a channel, all of the same length",
+            )
+
+    @property
+    def n_states(self) -> int:
+        """Sample since the start."""
+        return 1
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        own_sample_time(self.kind, self.sample_time, sample_time)
+        return np.concatenate([[float(self.repeats)], *map(np.asarray, self.corrections)])
+
+    def inverse(self) -> Repetition:
+        rows = tuple(vector(-np.asarray(row)) for row in self.corrections)
+        return Repetition(rows, self.sample_time, self.given, self.driven, self.repeats)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return corrections of half a millimetre, over two seconds that repeat."""
+        time = np.arange(200) / 200
+        return cls((vector(0.5 * np.sin(2 * np.pi * time)),), 0.01, repeats=True)

@@ -225,7 +225,7 @@ class Block(DrawsItself, Parametrised):
         What is reachable from every state where that is finite, else the range at rest.
         """
         found = np.stack(self.reachable(), axis=1)
-        return found if np.isfinite(found).all() else at_rest(self)
+        return found if np.isfinite(found).all() else at_rest(self, own_time(self) or 1.0)
 
     @property
     def n_missable(self) -> int:
@@ -613,6 +613,14 @@ def needs_sample_time(kind: str, sample_time: float | None) -> float:
             remedy="read the recording with a column of times or `rate`, or give `sample_time`",
         )
     return sample_time
+
+
+def own_time(block: Block) -> float | None:
+    """Return the fixed sample time of a block or one of its parts [s]; None if it has none."""
+    if block.sample_time is not None:
+        return block.sample_time
+    steps = (own_time(part) for part in getattr(block, "parts", ()))
+    return next((step for step in steps if step is not None), None)
 
 
 def rate_filter(time_constant: float, step: float) -> tuple[float, float]:

@@ -47,10 +47,11 @@ def by_name(
     return found
 
 
-def at_rest(block: Block) -> Array:
+def at_rest(block: Block, sample_time: float) -> Array:
     """Return the range of outputs at rest over the identified inputs, shape (n_outputs, 2).
 
-    All inputs are at their lowest, highest or middle, then each alone is at an end.
+    All inputs are at their lowest, highest or middle, then each alone is at an end. The sample time [s]
+    matters to none at rest, but to a block that has its own.
     """
     low, high = block.known_inputs.T
     if not np.isfinite([low, high]).all():
@@ -58,11 +59,10 @@ def at_rest(block: Block) -> Array:
     middle = low + 0.5 * (high - low)
     alone = [np.where(np.eye(low.size, dtype=bool), end, middle) for end in (low, high)]
     outputs = np.empty((0, len(block.outputs)))
-    step = block.sample_time or 1.0  # at rest none matters
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for row in np.vstack([low, high, middle, *alone]):
-            given = block.simulate(row[np.newaxis], initial="first_sample", sample_time=step)
+            given = block.simulate(row[np.newaxis], initial="first_sample", sample_time=sample_time)
             outputs = np.vstack([outputs, given])
     ends = np.stack([outputs.min(axis=0), outputs.max(axis=0)], axis=1)
     return np.where(np.isfinite(ends), ends, unknown(len(ends)))
@@ -71,9 +71,9 @@ def at_rest(block: Block) -> Array:
 def input_bounds(block: Block) -> Array:
     """Return the lowest and highest value of every input that is no fault, shape (n_inputs, 2).
 
-    An identified range is widened at both ends by its width, or by its largest size if that is more: a
-    model that was identified from 180 to 200 mm may go from rest. Where none is known, the plausible
-    range of its unit counts; without either, all finite values pass.
+    The identified range, or where none is known the plausible one of its unit, is widened at both ends
+    by its width, or by its largest size if that is more: a model that was identified from 180 to 200 mm
+    may go from rest. Of a channel without either, all finite values pass.
 
     Examples
     --------
@@ -81,13 +81,14 @@ def input_bounds(block: Block) -> Array:
     >>> input_bounds(PI.example()).tolist()
     [[-5.0, 10.0]]
     """
-    bounds = np.empty((len(block.inputs), 2))
-    for place, (channel, ends) in enumerate(zip(block.inputs, block.known_inputs, strict=True)):
-        low, high = ends
-        with np.errstate(over="ignore", invalid="ignore"):
-            margin = max(high - low, abs(low), abs(high))
-            known = 0.0 < margin < np.inf
-            bounds[place] = (low - margin, high + margin) if known else plausible(channel)
+    known = block.known_inputs
+    likely = np.reshape([plausible(channel) for channel in block.inputs], known.shape)
+    # from 0 to 0 is no range
+    moves = np.isfinite(known).all(axis=1, keepdims=True) & known.any(axis=1, keepdims=True)
+    low, high = np.where(moves, known, likely).T
+    with np.errstate(over="ignore"):
+        margin = np.maximum(high - low, np.maximum(np.abs(low), np.abs(high)))
+        bounds = np.stack([low - margin, high + margin], axis=1)
     return np.clip(bounds, -LARGEST, LARGEST)
 
 

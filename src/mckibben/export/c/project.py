@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, own_time
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.kernels import in_scratch
 from mckibben.blocks.laws import input_limits, wander
@@ -292,14 +292,6 @@ def checked_sample_time(block: Block, sample_time: float | None) -> float | None
         )
     block.check_time(step)
     return step
-
-
-def own_time(block: Block) -> float | None:
-    """Return the fixed sample time of a block or one of its parts."""
-    if block.sample_time is not None:
-        return block.sample_time
-    steps = (own_time(part) for part in getattr(block, "parts", ()))
-    return next((step for step in steps if step is not None), None)
 
 
 def _call(call: Call, index: int, translation: Translation) -> dict[str, Any]:

@@ -70,7 +70,7 @@ class Stream:
 
     def reset(self) -> None:
         """Reset to the initial state."""
-        self._started = False
+        self._started, self._clipped = False, 0.0
         self._last = [nan] * self._input.size
         self._kept: float | list[float] = 0.0
         self.status = self.GOOD
@@ -105,14 +105,14 @@ class Stream:
             return self._held(status)
         if not self._started:
             self.state[:] = self.block.initial_state(self._input, self.initial)
+            self._clipped = sum(map(self._counted.__getitem__, self._counts))
             self._started = True
+        self._run()
         if self._counts:
-            before = sum([self._counted[place] for place in self._counts])
-            self._run()
-            if sum([self._counted[place] for place in self._counts]) > before:
+            clipped = sum(map(self._counted.__getitem__, self._counts))
+            if clipped > self._clipped:
                 status |= self.CLIPPED
-        else:
-            self._run()
+            self._clipped = clipped
         kept: Any = gives[0] if self._one_gives else gives.tolist()
         # a sum is finite only if all terms are; it may overflow, and infinity less itself is NaN
         total = kept if self._one_gives else sum(kept)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar, SupportsFloat, SupportsIndex
+from typing import Any, ClassVar, NamedTuple, SupportsFloat, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +32,34 @@ STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
 )
 """Units of the standard channels; ``pressure_2`` and ``pressure_extensor`` follow ``pressure``."""
 
+
+class Plausible(NamedTuple):
+    """Plausible values of a standard channel or of time; others suggest another unit.
+
+    ``typical`` is a common size, by which another unit is proposed; a channel without a unit that
+    reaches less than ``least`` or more than ``most`` may well be in another.
+    """
+
+    low: float
+    high: float
+    typical: float = 1.0
+    least: float = 0.0
+    most: float = math.inf
+
+
+PLAUSIBLE = {
+    "bar": Plausible(-1.1, 60.0, 5.0, 0.6, 12.0),
+    "mm": Plausible(-2e4, 2e4, 30.0, 0.5, 3e3),
+    "N": Plausible(-1e5, 1e5, 300.0),
+    "N*m": Plausible(-1e5, 1e5),
+    "s": Plausible(-1e11, 1e11, 1.7e9),  # since 1970
+    "rad": Plausible(-1e4, 1e4, 1.0, 0.0, 7.0),
+    "V": Plausible(-1e3, 1e3, 5.0),
+    "mm/s": Plausible(-1e5, 1e5, 100.0),
+    "degC": Plausible(-100.0, 1e3),
+    "": Plausible(-1e4, 1e4, 0.2, 0.0, 1.5),
+}
+"""Plausible range, by the package's unit."""
 
 PERIODIC = "periodic"
 """Entry of ``meta`` of a recording that is one period of a motion that repeats."""

@@ -25,7 +25,8 @@ from mckibben import (
 )
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.feedback import MEASURED, FeedforwardFeedback, PIDFeedback
+from mckibben.blocks.feedback import FeedforwardFeedback, PIDFeedback
+from mckibben.blocks.fields import MEASURED
 from mckibben.blocks.laws import examples
 from mckibben.blocks.running import Stream
 from mckibben.control import (

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from mckibben import Block, DataError, ModelError
 from mckibben.blocks.laws import examples
+from mckibben.blocks.running import Stream
 from mckibben.export import export_fmu
 from mckibben.export.fmu.unit import own_platform
 from tests.export.building import SAMPLE_TIME
@@ -121,6 +122,36 @@ def test_state_is_kept_and_restored(tmp_path: Path) -> None:
     unit.setFMUstate(saved)
     unit.freeFMUstate(saved)
     assert run(inputs[20:], 20) == first
+    unit.terminate()
+    unit.freeInstance()
+    shutil.rmtree(place)
+
+
+@needs_compiler
+def test_the_first_command_comes_before_the_first_step(tmp_path: Path) -> None:
+    """From the initial inputs, and without a step of the model; the status is an output."""
+    fmpy = pytest.importorskip("fmpy")
+    block, inputs = MODELS["creep"], path_for(MODELS["creep"], 1, 40) + 1.0
+    expected = simulated(block, inputs)
+    path = str(exported(block, tmp_path))
+    place, description = fmpy.extract(path), fmpy.read_model_description(path)
+    outputs = [each.name for each in description.modelVariables if each.causality == "output"]
+    assert outputs == ["displacement_output", "status"]
+    unit = fmpy.instantiate_fmu(place, description, "CoSimulation")
+    unit.setupExperiment(startTime=0.0)
+    unit.enterInitializationMode()
+    unit.setReal([0], [inputs[0, 0]])
+    unit.exitInitializationMode()
+    found = [unit.getReal([1])[0]]
+    for k, (value,) in enumerate(inputs):
+        unit.setReal([0], [value])
+        unit.doStep(k * SAMPLE_TIME, SAMPLE_TIME)
+        found.append(unit.getReal([1])[0])
+        assert unit.getInteger([2]) == [Stream.GOOD]
+    np.testing.assert_allclose(found, [expected[0, 0], *expected[:, 0]], rtol=1e-12)
+    unit.setReal([0], [1e30])
+    unit.doStep(len(inputs) * SAMPLE_TIME, SAMPLE_TIME)
+    assert unit.getInteger([2]) == [Stream.BAD_INPUT]
     unit.terminate()
     unit.freeInstance()
     shutil.rmtree(place)

@@ -13,6 +13,7 @@ import pytest
 from mckibben import GPI, ModelError, muscles
 from mckibben.blocks.base import Block
 from mckibben.blocks.laws import examples
+from mckibben.blocks.running import Stream
 from mckibben.export import export_ros2
 from mckibben.export.ros2.package import ros2_files
 from tests.tools import needs
@@ -100,6 +101,17 @@ def test_numbers_that_are_none_are_not_applied(program: Path) -> None:
     assert len(set(pressures(driven(program, lines)[1:]))) == 1
     chained = driven(program, ["chained 1", "reference 5", "update", "reference nan", "update"])
     assert pressures(chained[1:])[1] == 0.0
+
+
+@needs("g++")
+def test_the_status_is_published(program: Path) -> None:
+    """All bits since the last message: a glitch of one step is not missed."""
+    lines = ["chained 1", "reference 5", "update", "status", "reference 1e6", "update"]
+    lines += ["reference 5", "update", "status", "status", "reference 20", "update", "status"]
+    found = pressures(driven(program, lines)[1:])
+    first, good, glitch, after, bad, none, _, clipped = found
+    assert first == glitch == after
+    assert [good, bad, none, clipped] == [0, Stream.BAD_INPUT, 0, Stream.CLIPPED]
 
 
 @pytest.mark.long

@@ -34,9 +34,9 @@ from mckibben.blocks.base import (
     needs_sample_time,
 )
 from mckibben.blocks.compose import Layout, Series
-from mckibben.blocks.feedback import MEASURED
 from mckibben.blocks.fields import (
     LONGEST_DELAY,
+    MEASURED,
     STRICT,
     Channel,
     ChannelField,
@@ -375,9 +375,7 @@ class Adaptive(Block):
         Without ``memory`` of the hysteresis only the adaptive part is stored, as after venting.
         """
         numbers = np.array(state, dtype=np.float64)
-        for part, own in self.shares(numbers) or [(self, numbers)]:
-            if part.n_clipped(own):  # in the run before, by the last number of an inverse
-                own[getattr(part, "fixed", part).n_states - 1] = 0.0
+        numbers[[*self.clip_counts]] = 0.0  # of the run before
         return replace(
             self, memory=vector(numbers if memory else self._core_state(numbers)[-self.n_adapted :])
         )
@@ -440,10 +438,9 @@ class Adaptive(Block):
         else:
             self.fixed.report(state[: self.fixed.n_states])
 
-    def n_clipped(self, state: Array) -> int:
-        if self.parts:
-            return super().n_clipped(state)
-        return self.fixed.n_clipped(state[: self.fixed.n_states])
+    @property
+    def clip_counts(self) -> tuple[int, ...]:
+        return super().clip_counts if self.parts else self.fixed.clip_counts
 
     # -- present model ------------------------------------------------------------------------
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
 from reprlib import Repr
@@ -21,9 +23,10 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.blocks import saving
-from mckibben.blocks.fields import Channel, Initial
+from mckibben.blocks.fields import Channel, Initial, drives
 from mckibben.blocks.kernels import Step, in_scratch
 from mckibben.blocks.parameters import Parametrised, gathered
+from mckibben.blocks.ranges import at_rest, by_name
 from mckibben.blocks.running import Stream, refuse_time, run_many
 from mckibben.blocks.starts import start_state
 from mckibben.errors import DataError, ModelError
@@ -193,6 +196,36 @@ class Block(DrawsItself, Parametrised):
         """Lowest and highest identified driven input; None if it is not known."""
         parts: tuple[Block, ...] = getattr(self, "parts", ())
         return parts[0].driven_range if parts else getattr(self, "input_range", None)
+
+    @cached_property
+    def known_inputs(self) -> Array:
+        """Lowest and highest identified value of every input, shape (n_inputs, 2).
+
+        Infinite where none is known. Those of a compensator are outputs of the model that it inverts.
+        """
+        compensates = self.inverts and drives(self.outputs[0]) and not drives(self.inputs[0])
+        forward = self.forward_model if compensates else None
+        if forward is not None:
+            outputs, inputs = forward.known_outputs, forward.known_inputs
+            return by_name(self.inputs, [(forward.outputs, outputs), (forward.inputs, inputs)])
+        parts: tuple[Block, ...] = getattr(self, "parts", ())
+        found = by_name(self.inputs, [(part.inputs, part.known_inputs) for part in parts])
+        driven = found[: self.n_driven]
+        if not parts and self.driven_range is not None:
+            driven[:] = self.driven_range
+        if not np.isfinite(driven).any():
+            with suppress(ModelError):
+                driven[:] = np.transpose(self.inverse().reachable())
+        return found
+
+    @cached_property
+    def known_outputs(self) -> Array:
+        """Lowest and highest output over the identified inputs, shape (n_outputs, 2).
+
+        What is reachable from every state where that is finite, else the range at rest.
+        """
+        found = np.stack(self.reachable(), axis=1)
+        return found if np.isfinite(found).all() else at_rest(self, own_time(self) or 1.0)
 
     @property
     def n_missable(self) -> int:
@@ -477,9 +510,19 @@ class Block(DrawsItself, Parametrised):
         for part, own in self.shares(state):
             part.report(own)
 
+    @property
+    def clip_counts(self) -> tuple[int, ...]:
+        """Places in the state that count samples that were clipped, or not solved."""
+        places: list[int] = []
+        first = 0
+        for part in getattr(self, "parts", ()):
+            places += (first + place for place in part.clip_counts)
+            first += part.n_states
+        return tuple(places)
+
     def n_clipped(self, state: Array) -> int:
         """Return the number of samples that were clipped, or not solved, from the final state."""
-        return sum(part.n_clipped(own) for part, own in self.shares(state))
+        return int(sum(max(state[place], 0.0) for place in self.clip_counts))
 
     def _inputs_from(self, recording: Recording) -> Array:
         check_units(recording, self.inputs)
@@ -570,6 +613,14 @@ def needs_sample_time(kind: str, sample_time: float | None) -> float:
             remedy="read the recording with a column of times or `rate`, or give `sample_time`",
         )
     return sample_time
+
+
+def own_time(block: Block) -> float | None:
+    """Return the fixed sample time of a block or one of its parts [s]; None if it has none."""
+    if block.sample_time is not None:
+        return block.sample_time
+    steps = (own_time(part) for part in getattr(block, "parts", ()))
+    return next((step for step in steps if step is not None), None)
 
 
 def rate_filter(time_constant: float, step: float) -> tuple[float, float]:

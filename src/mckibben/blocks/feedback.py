@@ -22,15 +22,12 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Block, Ports, Start, needs_sample_time
 from mckibben.blocks.compose import Composition, Layout
-from mckibben.blocks.fields import STRICT, Channel, Channels, Vector
+from mckibben.blocks.fields import MEASURED, STRICT, Channel, Channels, Vector
 from mckibben.blocks.kernels import Step, accumulate, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
-
-MEASURED = "_measured"
-"""Suffix of the name of a measured channel."""
 
 BASE = "_base"
 """Suffix of the name of the command that feedback is added to."""

@@ -7,6 +7,7 @@ driven inputs. Its state begins with the forward block's, unless it is shorter.
 from __future__ import annotations
 
 import warnings
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
@@ -231,8 +232,18 @@ class Inverse(Block):
         if self.n_clipped(state):
             warnings.warn(self.forward.inverse_complaint(state), ModelWarning, stacklevel=4)
 
-    def n_clipped(self, state: Array) -> int:
-        return int(state[-1]) if self.forward.counts_clipped and state[-1] > 0 else 0
+    @property
+    def clip_counts(self) -> tuple[int, ...]:
+        return (self.n_states - 1,) if self.forward.counts_clipped else ()
+
+    @cached_property
+    def known_inputs(self) -> Array:
+        forward = self.forward
+        return np.vstack([forward.known_outputs, forward.known_inputs[forward.n_driven :]])
+
+    @cached_property
+    def known_outputs(self) -> Array:
+        return self.forward.known_inputs[: self.forward.n_driven]
 
     def equations(self) -> tuple[str, ...]:
         """Return the equation of the inverse; those of the forward block follow."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from math import isfinite
+from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.blocks.fields import Initial
+from mckibben.blocks.ranges import input_bounds
 from mckibben.errors import DataError, require
 from mckibben.system.threads import cores
 
@@ -22,10 +23,12 @@ if TYPE_CHECKING:
 class Stream:
     """A block running sample by sample.
 
-    An input that is not finite, and may not be missing, changes nothing, and outputs are always finite:
-    after a bad input, memory is untouched and the outputs are those of the last good step, 0 before the
-    first. Where a huge input gives an output that is not finite, the outputs are those of the last good
-    step too, and memory that is lost with it starts afresh at the next step. Exported C does the same.
+    An input that is NaN, infinite, or beyond what it was identified for with a margin
+    (`mckibben.blocks.ranges.input_bounds`) is a fault: the last good value of that input is held, and
+    the block steps on with it, so that the fault never reaches memory. A measurement that may be
+    missing is then missing. Before every input has had a good value, nothing happens and outputs are 0.
+    Outputs are always finite: where one would not be, they are those of the last good step, and memory
+    that is lost starts afresh at the next. Exported C does the same.
 
     Parameters
     ----------
@@ -41,10 +44,11 @@ class Stream:
     state : array, shape (n_states,)
         Memory; of no meaning before the first step.
     status : int
-        Of the last step: `GOOD`, `BAD_INPUT` or `BAD_OUTPUT`.
+        Of the last step: `GOOD`, or a sum of `BAD_INPUT`, an input was held; `BAD_OUTPUT`, the outputs
+        were; and `CLIPPED`, what was asked for is out of reach.
     """
 
-    GOOD, BAD_INPUT, BAD_OUTPUT = 0, 1, 2
+    GOOD, BAD_INPUT, BAD_OUTPUT, CLIPPED = 0, 1, 2, 4
 
     def __init__(
         self, block: Block, sample_time: float | None = None, initial: Initial | None = None
@@ -60,11 +64,14 @@ class Stream:
         self._given, self._gives = _scalars(self._input), _scalars(self._output)
         self._needed = self._input.size - block.n_missable
         self._one_given, self._one_gives = self._input.size == 1, self._output.size == 1
+        self._bounds: list[tuple[float, float]] = [(a, b) for a, b in input_bounds(block).tolist()]
+        self._counts, self._counted = block.clip_counts, _scalars(self.state)
         self.reset()
 
     def reset(self) -> None:
         """Reset to the initial state."""
-        self._started = False
+        self._started, self._clipped = False, 0.0
+        self._last = [nan] * self._input.size
         self._kept: float | list[float] = 0.0
         self.status = self.GOOD
 
@@ -74,10 +81,8 @@ class Stream:
         The array returned is reused by the next step: copy what you keep.
         """
         given, gives = self._given, self._gives
-        # a sum is finite only if all terms are; it may overflow, and infinity less itself is NaN
         if self._one_given and isinstance(inputs, float):  # also NumPy's
             given[0] = inputs
-            total = given[0]
         else:
             try:
                 self._input[...] = inputs
@@ -85,21 +90,38 @@ class Stream:
                 raise self._misfit(error) from None
             if not self._one_given and np.size(inputs) != self._input.size:  # spread, not given
                 raise self._misfit(ValueError(f"{np.size(inputs)} number(s)"))
-            total = given[0] if self._one_given else sum(given)
-        if total - total and not all(map(isfinite, given[: self._needed])):
-            return self._held(self.BAD_INPUT)
+        status, last = self.GOOD, self._last
+        for place, (low, high) in enumerate(self._bounds):
+            value = given[place]
+            if low <= value <= high:
+                last[place] = value
+            elif place >= self._needed:  # missing
+                status |= self.BAD_INPUT * (value == value)
+                given[place] = nan
+            else:
+                status |= self.BAD_INPUT
+                given[place] = last[place]
+        if status and not all(map(isfinite, last[: self._needed])):
+            return self._held(status)
         if not self._started:
             self.state[:] = self.block.initial_state(self._input, self.initial)
+            self._clipped = sum(map(self._counted.__getitem__, self._counts))
             self._started = True
         self._run()
+        if self._counts:
+            clipped = sum(map(self._counted.__getitem__, self._counts))
+            if clipped > self._clipped:
+                status |= self.CLIPPED
+            self._clipped = clipped
         kept: Any = gives[0] if self._one_gives else gives.tolist()
+        # a sum is finite only if all terms are; it may overflow, and infinity less itself is NaN
         total = kept if self._one_gives else sum(kept)
         if total - total and not all(map(isfinite, gives)):
             if not np.isfinite(self.state).all():
                 self._started = False
-            return self._held(self.BAD_OUTPUT)
+            return self._held(status | self.BAD_OUTPUT)
         self._kept = kept
-        self.status = self.GOOD
+        self.status = status
         return self._output
 
     def _held(self, status: int) -> Array:

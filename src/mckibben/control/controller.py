@@ -9,8 +9,8 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.feedback import BASE, MEASURED, FeedforwardFeedback
-from mckibben.blocks.fields import Channel
+from mckibben.blocks.feedback import BASE, FeedforwardFeedback
+from mckibben.blocks.fields import MEASURED, Channel
 from mckibben.control.connecting import Offer
 from mckibben.control.preview import preview_time
 

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.bands import Banded, inside
 from mckibben.blocks.base import Block
-from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.balance import Placed, balance_in
-from mckibben.blocks.fields import Channel
+from mckibben.blocks.fields import Channel, drives
 from mckibben.blocks.running import run_many
-from mckibben.errors import ModelError
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
@@ -26,8 +21,7 @@ Checked = list[tuple[Channel, Array, tuple[float, float]]]
 def known_ranges(model: Block) -> dict[str, tuple[float, float]]:
     """Return the lowest and highest identified value of a model's inputs, by name.
 
-    Sources are its input range or its inverse's, ranges stored in a balance, and those of its band.
-    Inputs without a known range are absent.
+    Of a compensator also of the commands that it gives. Channels without a known range are absent.
 
     Examples
     --------
@@ -35,31 +29,15 @@ def known_ranges(model: Block) -> dict[str, tuple[float, float]]:
     >>> known_ranges(PI.example())
     {'pressure': (0.0, 5.0)}
     """
-    known: dict[str, tuple[float, float]] = {}
-    if isinstance(model, Banded):
-        ends = zip(model.band.driving, *model.band.ends, strict=False)
-        known = {channel.name: (low, high) for channel, low, high in ends}
-    model = inside(model)
-    placed = balance_in(model)
-    if placed is not None:
-        balance = placed.balance
-        if balance.pressure_range is not None:
-            known |= {channel.name: balance.pressure_range for channel in balance.given}
-        for channel, (low, high) in zip(balance.scheduled, balance.known, strict=False):
-            known[channel.name] = (low, high)
-    first = model
-    while isinstance(first, Series):
-        first = first.parts[0]
-    own = getattr(first, "input_range", None)
-    if own is not None:
-        known[model.inputs[0].name] = (float(own[0]), float(own[1]))
-        return known
-    with suppress(ModelError):
-        inverse = model.inverse()
-        for channel, low, high in zip(inverse.outputs, *inverse.reachable(), strict=True):
-            if np.isfinite([low, high]).all():
-                known[channel.name] = (float(low), float(high))
-    return known
+    inputs = zip(model.inputs, model.known_inputs, strict=True)
+    commands = [
+        pair for pair in zip(model.outputs, model.known_outputs, strict=True) if drives(pair[0])
+    ]
+    return {
+        channel.name: (float(low), float(high))
+        for channel, (low, high) in (*commands, *inputs)
+        if np.isfinite([low, high]).all()
+    }
 
 
 def beyond_known(model: Block, recording: Recording) -> list[str]:

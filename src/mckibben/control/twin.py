@@ -261,9 +261,9 @@ class Twin:
         assert self._stream is not None
         low, high = self._clips
         found = self._stream.step(np.minimum(np.maximum(row, low), high))
-        if self._stream.status != Stream.GOOD:
+        if self._stream.status & (Stream.BAD_INPUT | Stream.BAD_OUTPUT):
             raise ModelError(
-                f"{self.forward.title!r} gives no finite output at "
+                f"{self.forward.title!r} is far beyond its identified range, or not finite, at "
                 f"{', '.join(f'{x:g}' for x in row)}",
                 remedy="stay where it was identified, or identify it again",
             )

@@ -17,8 +17,8 @@ import numpy as np
 from mckibben.arrays import Array, true_runs
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
-from mckibben.blocks.feedback import MEASURED, FeedforwardFeedback
-from mckibben.blocks.fields import Channel
+from mckibben.blocks.feedback import FeedforwardFeedback
+from mckibben.blocks.fields import MEASURED, Channel
 from mckibben.blocks.starts import start_state
 from mckibben.control.twin import COMMAND
 from mckibben.diagnosis.refit import Refit, refitted

@@ -18,7 +18,7 @@ from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.table import Column
 from mckibben.files.units import COUNTS, Unit, convert, find, weight
-from mckibben.recording import REST_LENGTH, conversion, standard_unit
+from mckibben.recording import PLAUSIBLE, REST_LENGTH, conversion, standard_unit
 
 ASSUMED = "no unit is given, so these are assumed: "
 """Beginning of a note on assumed units."""
@@ -307,7 +307,7 @@ def _assumed(channel: str, column: Column, values: Array, source: Source) -> Uni
             channel,
         )
     largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
-    plausible = quality.PLAUSIBLE[expected]
+    plausible = PLAUSIBLE[expected]
     if 0 < largest < plausible.least or largest > plausible.most:
         units = quality.fitting_units(largest, expected, expected)
         options = " or ".join(f"`units[{channel}]={unit}`" for unit in units)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,35 +11,7 @@ from mckibben.files.headers import unit_of
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.units import SPELLINGS, convert
-
-
-class Plausible(NamedTuple):
-    """Plausible values of a standard channel or of time; others suggest another unit.
-
-    ``typical`` is a common size, by which another unit is proposed; a channel without a unit that
-    reaches less than ``least`` or more than ``most`` may well be in another.
-    """
-
-    low: float
-    high: float
-    typical: float = 1.0
-    least: float = 0.0
-    most: float = math.inf
-
-
-PLAUSIBLE = {
-    "bar": Plausible(-1.1, 60.0, 5.0, 0.6, 12.0),
-    "mm": Plausible(-2e4, 2e4, 30.0, 0.5, 3e3),
-    "N": Plausible(-1e6, 1e6, 300.0),
-    "N*m": Plausible(-1e6, 1e6),
-    "s": Plausible(-1e11, 1e11, 1.7e9),  # since 1970
-    "rad": Plausible(-1e4, 1e4, 1.0, 0.0, 7.0),
-    "V": Plausible(-1e3, 1e3, 5.0),
-    "mm/s": Plausible(-1e5, 1e5, 100.0),
-    "degC": Plausible(-100.0, 1e3),
-    "": Plausible(-1e4, 1e4, 0.2, 0.0, 1.5),
-}
-"""Plausible range, by the package's unit."""
+from mckibben.recording import PLAUSIBLE
 
 TOO_SMALL = {"bar": (1e-12, 1e-7)}
 """By the package's unit: largest values that suggest another unit, and are more than rounding of 0.

@@ -32,7 +32,7 @@ ROOM = PAYLOAD - HEAD.size - CHECK.size  # bytes of a body, at most
 STATUSES = ("ok", "malformed", "beyond limits", "another model is there")
 
 Kind = IntEnum("Kind", "IDENTIFY STATE READ INPUTS RESET RELEASE SAMPLE")
-Note = IntFlag("Note", "RUNNING TRIPPED LIMITED BAD_INPUT BAD_OUTPUT RESUMED")
+Note = IntFlag("Note", "RUNNING TRIPPED LIMITED BAD_INPUT BAD_OUTPUT RESUMED CLIPPED")
 
 
 class LinkError(DataError):

@@ -1,6 +1,6 @@
 // Steps a controller as the controller manager would: commands from standard input, pressures to output.
 // A line is "configure", "activate", "deactivate", "chained K", "say X ...", "reference X ...", "state X ..."
-// or "update".
+// "update" or "status", which the timer publishes.
 #include <cstdio>
 #include <iostream>
 #include <sstream>
@@ -65,6 +65,8 @@ int main(int argc, char ** argv)
     } else if (what == "state") {
       const auto given = numbers(line);
       std::copy(given.begin(), given.end(), states.begin());
+    } else if (what == "status") {
+      controller.get_node()->timer->callback();
     } else if (what == "update") {
       controller.update(rclcpp::Time(), rclcpp::Duration(0.01));
     }

@@ -21,6 +21,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Mapping
+from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, ClassVar, NamedTuple, Self
 
@@ -50,6 +51,7 @@ from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.learning import Learnable
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.ranges import unknown
 from mckibben.errors import ModelError, ModelWarning
 
 
@@ -483,6 +485,17 @@ class Balance(Invertible):
         """Lowest and highest identified pressure."""
         return self.pressure_range
 
+    @cached_property
+    def known_inputs(self) -> Array:
+        """Ranges of coordinates, and of what schedules and loads."""
+        scheduled = np.reshape(self.known, (-1, 2)) if self.known else unknown(len(self.scheduled))
+        return np.vstack([self.known_coordinates, scheduled])
+
+    @cached_property
+    def known_outputs(self) -> Array:
+        """Ranges of pressures."""
+        return np.stack(self.reachable(), axis=1)
+
     def reachable(self) -> tuple[Array, Array]:
         """Return the lowest and highest pressures."""
         if self.pressure_range is None:
@@ -507,9 +520,10 @@ class Balance(Invertible):
             stacklevel=4,
         )
 
-    def n_clipped(self, state: Array) -> int:
-        """Return the number of samples that needed pressures out of range."""
-        return int(state[-1]) if state[-1] > 0 else 0
+    @property
+    def clip_counts(self) -> tuple[int, ...]:
+        """Place of the count of samples that needed pressures out of range."""
+        return (self.n_states - 1,)
 
     solved: ClassVar[bool] = True
 

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, own_time
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.kernels import in_scratch
 from mckibben.blocks.laws import input_limits, wander
+from mckibben.blocks.ranges import input_bounds
 from mckibben.blocks.saving import to_text
 from mckibben.errors import ModelError, ModelWarning, require
 from mckibben.export.c.serving import Serving, served, served_files
@@ -212,6 +213,10 @@ def described(
         "steps": steps,
         "given": wiring.outputs,
         "n_needed": len(inputs) - block.n_missable,
+        "bound_rows": [literals(ends, single=single) for ends in input_bounds(block)],
+        "bounds": [[f"{end:.6g}" for end in ends] for ends in input_bounds(block)],
+        "clip_places": wiring.clip_counts,
+        "clip_counts": [f"numbers[{place}]" for place in wiring.clip_counts],
         "n_signals": wiring.n_signals,
         "n_numbers": n_numbers,
         "n_memory": wiring.n_numbers,
@@ -220,8 +225,8 @@ def described(
         "zero": "0.0f" if single else "0.0",
         "shared": (SHARED,),
         "sources": [f"{name}.c"],
-        "ram": size * (n_numbers + len(outputs)) + size,
-        "flash": size * constants + 32 * len(calls),
+        "ram": size * (n_numbers + len(inputs) + len(outputs)) + size,
+        "flash": size * (constants + 2 * len(inputs)) + 32 * len(calls),
     }
 
 
@@ -287,14 +292,6 @@ def checked_sample_time(block: Block, sample_time: float | None) -> float | None
         )
     block.check_time(step)
     return step
-
-
-def own_time(block: Block) -> float | None:
-    """Return the fixed sample time of a block or one of its parts."""
-    if block.sample_time is not None:
-        return block.sample_time
-    steps = (own_time(part) for part in getattr(block, "parts", ()))
-    return next((step for step in steps if step is not None), None)
 
 
 def _call(call: Call, index: int, translation: Translation) -> dict[str, Any]:

@@ -66,8 +66,7 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
                 remedy=f"name one of {', '.join(allowed)}",
             )
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
-    driven = slice(0, n_in - len(block.scheduling))
-    low[driven], high[driven] = _known(block)
+    low[:n_in], high[:n_in] = block.known_inputs.T
     low[n_in:], high[n_in:] = block.reachable()
     for place, name in enumerate(names):
         if name in serving.limits:
@@ -93,17 +92,6 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
                 remedy="give one within",
             )
     return low, high, safe
-
-
-def _known(block: Block) -> tuple[Array, Array]:
-    """Return the driven inputs' range, if the block has one."""
-    if hasattr(block, "input_range"):
-        return np.array([block.input_limits[0]]), np.array([block.input_limits[1]])
-    n = len(block.inputs) - len(block.scheduling)
-    try:
-        return block.inverse().reachable()
-    except ModelError:
-        return np.full(n, -np.inf), np.full(n, np.inf)
 
 
 def served(

@@ -71,7 +71,7 @@ class Wiring:
 
         self.steps: list[Call | Sum] = []
         self.outputs, self.n_signals = list(named(layout.given)), layout.n_signals - n
-        self.n_numbers = 0
+        self.n_numbers, self.clip_counts = 0, list[int]()
         for step in layout.steps:
             part, taken, first = step.block, named(step.taken), step.given[0] - n
             if part is None:
@@ -86,6 +86,10 @@ class Wiring:
             state = step.state
             if state is None and not isinstance(part.start, str):
                 state = part.initial_state(np.zeros(len(part.inputs)))
+            self.clip_counts += [self.n_numbers + place for place in part.clip_counts]
+            if state is not None:  # what was clipped before is not counted again
+                state = state.copy()
+                state[[*part.clip_counts]] = 0.0
             self.steps.append(Call(part, numbers, state, taken, first, self.n_numbers))
             self.n_numbers += part.n_states + part.n_scratch
         self.calls = [step for step in self.steps if isinstance(step, Call)]

@@ -33,6 +33,23 @@ struct Subscription
   using SharedPtr = std::shared_ptr<Subscription<Message>>;
   std::function<void(std::shared_ptr<Message>)> callback;
 };
+template <typename Message>
+struct Publisher
+{
+  using SharedPtr = std::shared_ptr<Publisher<Message>>;
+  void publish(const Message & message) { std::printf("%d\n", static_cast<int>(message.data)); }
+};
+template <typename Message, typename Node>
+typename Publisher<Message>::SharedPtr create_publisher(
+  const Node &, const std::string &, const SystemDefaultsQoS &)
+{
+  return std::make_shared<Publisher<Message>>();
+}
+struct TimerBase
+{
+  using SharedPtr = std::shared_ptr<TimerBase>;
+  std::function<void()> callback;
+};
 struct Parameter
 {
   std::vector<std::string> words;

@@ -35,7 +35,15 @@ public:
     subscription = made;
     return made;
   }
+  template <typename Period, typename Callback>
+  rclcpp::TimerBase::SharedPtr create_wall_timer(Period, Callback && callback)
+  {
+    timer = std::make_shared<rclcpp::TimerBase>();
+    timer->callback = callback;
+    return timer;
+  }
   std::map<std::string, rclcpp::Parameter> parameters;
+  rclcpp::TimerBase::SharedPtr timer;
   std::shared_ptr<void> subscription;
 };
 }  // namespace rclcpp_lifecycle

@@ -13,7 +13,7 @@
 enum { IDENTIFY = 1, STATE, READ, INPUTS, RESET, RELEASE, SAMPLE };
 enum { OK, MALFORMED, BEYOND_LIMITS, OTHER_MODEL };
 
-enum { RUNNING = 1, TRIPPED = 2, LIMITED = 4, BAD_INPUT = 8, BAD_OUTPUT = 16, RESUMED = 32 };
+enum { RUNNING = 1, TRIPPED = 2, LIMITED = 4, BAD_INPUT = 8, BAD_OUTPUT = 16, RESUMED = 32, CLIPPED = 64 };
 
 #ifdef MCK_FLOAT32
 typedef uint32_t bits;
@@ -131,7 +131,7 @@ static void step(mck_server *self)
 {
     const mck_channel *outputs = self->served->channels + self->served->n_inputs;
     const int status = self->served->step(self->model, self->in, self->out);
-    int found = status == 0 ? 0 : status == 1 ? BAD_INPUT : BAD_OUTPUT;
+    int found = (status & 1 ? BAD_INPUT : 0) | (status & 2 ? BAD_OUTPUT : 0) | (status & 4 ? CLIPPED : 0);
     for (int i = 0; i < self->served->n_outputs; i++) {
         const mck_real limited = mck_min(mck_max(self->out[i], outputs[i].low), outputs[i].high);
         if (limited < self->out[i] || limited > self->out[i]) {

@@ -22,7 +22,7 @@ typedef struct {
     double start;
     double time;
     double steps; /* taken since the start */
-    int status;   /* of the last step: 0 good, 1 bad input, 2 bad output */
+    int status;   /* of the steps in the last communication step: all bits that were set */
     int phase;
 } unit;
 
@@ -45,11 +45,21 @@ static void take_step(unit *self)
     for (int i = 0; i < UNIT_N_INPUTS; i++) {
         in[i] = (mck_real)self->inputs[i];
     }
-    self->status = UNIT_STEP(&self->model, in, out);
+    self->status |= UNIT_STEP(&self->model, in, out);
     for (int i = 0; i < UNIT_N_OUTPUTS; i++) {
         self->outputs[i] = (double)out[i];
     }
     self->steps += 1.0;
+}
+
+/* Give the outputs of the first step, which is not taken yet: a unit that drives a valve has no output
+ * before its first command. */
+static void show_first(unit *self)
+{
+    self->status = 0;
+    take_step(self);
+    UNIT_INIT(&self->model);
+    self->steps = 0.0;
 }
 
 /* Return whether a unit can be like this, as far as that is used: numbers of the model's memory may be
@@ -58,7 +68,7 @@ static int possible(const unit *self)
 {
     return isfinite(self->start) && isfinite(self->time) && isfinite(self->steps) &&
            self->steps >= 0.0 && self->phase >= IS_NEW && self->phase <= HAS_ENDED &&
-           self->status >= 0 && self->status <= 2;
+           self->status >= 0 && self->status <= 7;
 }
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -111,7 +121,14 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
     return fmi2OK;
 }
 
-fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return enter(c, IS_NEW, IS_STARTING); }
+fmi2Status fmi2EnterInitializationMode(fmi2Component c)
+{
+    const fmi2Status status = enter(c, IS_NEW, IS_STARTING);
+    if (status == fmi2OK) {
+        show_first(c);
+    }
+    return status;
+}
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return enter(c, IS_STARTING, IS_RUNNING); }
 
@@ -152,6 +169,9 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
         }
         self->inputs[vr[i]] = value[i];
     }
+    if (self != NULL && self->phase == IS_STARTING) {
+        show_first(self);
+    }
     return fmi2OK;
 }
 
@@ -187,14 +207,18 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
     if (!(due - self->steps <= MOST_STEPS)) {
         return fmi2Error;
     }
+    if (self->steps < due) {
+        self->status = 0;
+    }
     while (self->steps < due) {
         take_step(self);
     }
 #else
+    self->status = 0;
     take_step(self);
 #endif
     self->time = time + h;
-    return self->status == 0 ? fmi2OK : fmi2Warning;
+    return (self->status & (UNIT_BAD_INPUT | UNIT_BAD_OUTPUT)) == 0 ? fmi2OK : fmi2Warning;
 }
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)

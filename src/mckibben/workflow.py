@@ -420,7 +420,7 @@ def track(
         notes=(*beyond_known(block, wanted), *without.notes),
         file=file,
         controller_file=controller_file,
-        repetitions=taught,
+        learned=taught,
     )
 
 

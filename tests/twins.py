@@ -1106,6 +1106,16 @@ def banded_pi(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return band(block.band, stepping(_PI)(block.forward, inputs, sample_time), sample_time)
 
 
+def repetition(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    tables = block.corrections
+    n = len(tables[0])
+    places = [t % n if block.repeats else min(t, n - 1) for t in range(len(inputs))]
+    return [
+        [u + table[place] for u, table in zip(row, tables, strict=True)]
+        for row, place in zip(inputs, places, strict=True)
+    ]
+
+
 TWINS: dict[str, Twin] = {
     "band": band,
     "pi-banded": banded_pi,
@@ -1151,6 +1161,7 @@ TWINS: dict[str, Twin] = {
     "state-network": state_network,
     "tondu-lopez": memoryless(_tondu_lopez),
     "recurrent-fuzzy-network": recurrent_fuzzy_network,
+    "repetition": repetition,
     "transfer-function": transfer_function,
 }
 """Kind of block -> its twin."""

@@ -190,7 +190,9 @@ def test_what_cannot_be_reached_is_told(block: Balance, seed: int, slack: bool) 
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         pressures = limited.simulate(inputs, sample_time=STEP)
-    found = run(limited.inverse(), beside(pressures, limited, inputs))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore" if told else "error")  # no balance at what was not solved
+        found = run(limited.inverse(), beside(pressures, limited, inputs))
     if not told:
         np.testing.assert_allclose(found, inputs[:, :m], atol=1e-8)
     else:

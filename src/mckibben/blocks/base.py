@@ -209,7 +209,7 @@ class Block(DrawsItself, Parametrised):
             outputs, inputs = forward.known_outputs, forward.known_inputs
             return by_name(self.inputs, [(forward.outputs, outputs), (forward.inputs, inputs)])
         parts: tuple[Block, ...] = getattr(self, "parts", ())
-        found = by_name(self.inputs, [(part.inputs, part.known_inputs) for part in parts])
+        found = by_name(self.inputs, self._known_of_parts())
         driven = found[: self.n_driven]
         if not parts and self.driven_range is not None:
             driven[:] = self.driven_range
@@ -217,6 +217,10 @@ class Block(DrawsItself, Parametrised):
             with suppress(ModelError):
                 driven[:] = np.transpose(self.inverse().reachable())
         return found
+
+    def _known_of_parts(self) -> list[tuple[tuple[Channel, ...], Array]]:
+        """Return channels of parts that are inputs of the block, with their identified ranges."""
+        return [(part.inputs, part.known_inputs) for part in getattr(self, "parts", ())]
 
     @cached_property
     def known_outputs(self) -> Array:

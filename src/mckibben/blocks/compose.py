@@ -264,6 +264,14 @@ class Series(Composition):
     def samples_ahead(self) -> int:  # type: ignore[override]
         return sum(part.samples_ahead for part in self.parts)
 
+    def _known_of_parts(self) -> list[tuple[tuple[Channel, ...], Array]]:
+        """Return those of the first part, and of what schedules others: the rest is within."""
+        first, *others = self.parts
+        scheduled = [
+            (part.inputs[part.n_driven :], part.known_inputs[part.n_driven :]) for part in others
+        ]
+        return [(first.inputs, first.known_inputs), *scheduled]
+
     def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
         by_name = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
         signals = list(taken)

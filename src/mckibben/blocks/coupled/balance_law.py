@@ -528,7 +528,8 @@ def pressure_for(
     """
     width = n_terms(c)
     slopes = terms[width : 2 * width]
-    held = held_force(c, k, state, way, y, x, terms) - wanted
+    held = held_force(c, k, state, way, y, x, terms)
+    held -= wanted
     a = area(c, k, y)[0]
     low, high = -NEVER, NEVER
     p = held / a

@@ -124,8 +124,9 @@ def channels_of(
 ) -> Channels:
     """Return the channels of a comparison: as named, otherwise by names and units.
 
-    A force is a load if there are other inputs. Force is modelled over length or displacement, where
-    that varies and nothing else is moved; models of it find the pressure themselves.
+    A force is a load if there are other inputs. Where the length (or displacement) differs between
+    recordings, force is modelled from the pressure, with the length as a scheduling input; or over the
+    length, if that was named as the input or the pressure is what is constant in every recording.
 
     Raises
     ------
@@ -135,7 +136,10 @@ def channels_of(
     asked = [(names,) if isinstance(names, str) else names for names in (inputs, outputs)]
     over = None if load else _force_over(recordings, *asked)
     if over is not None:
-        return Channels((over,), (FORCE,))
+        alone = asked[0] is not None and set(asked[0]) == {over}
+        if alone or not any_moves(recordings, (PRESSURE,)) or held_at_levels(recordings, PRESSURE):
+            return Channels((over,), (FORCE,))
+        return Channels((PRESSURE,), (FORCE,), (over,))
     every = list(dict.fromkeys(name for recording in recordings for name in recording.channels))
     found = _by_name(every, _units(recordings, every))
     usual = FORCE if lacks_displacement(recordings) else OF_FORCE[-1]
@@ -249,7 +253,7 @@ def _force_over(
     """Return the length or displacement of a force law with pressure, or None."""
     meant = lacks_displacement(recordings) if outputs is None else tuple(outputs) == (FORCE,)
     for name in OF_FORCE if meant else ():
-        asked = inputs is None or set(inputs) in ({name}, {name, PRESSURE})
+        asked = inputs is None or set(inputs) <= {name, PRESSURE}
         there = all({name, PRESSURE, FORCE} <= {*one.channels} for one in recordings)
         if asked and there and varies([one[name] for one in recordings]):
             return name

@@ -171,6 +171,9 @@ class Balance(Invertible):
     preload : float
         Pressure that muscles share where they are more than coordinates [bar]; the compensator departs
         from it as little as it can.
+    held : bool
+        Whether a machine holds the muscles where the first sample finds them before their pressure
+        rises; else they rest, without pressure, where their loads let them.
     """
 
     kind: ClassVar[str] = "balance"
@@ -245,6 +248,7 @@ class Balance(Invertible):
     obstacles: Rows = ()
     directions: Rows = ()
     preload: FiniteFloat = 0.0
+    held: bool = False
 
     def __post_init__(self) -> None:
         self.check_channels()
@@ -325,6 +329,11 @@ class Balance(Invertible):
             raise ModelError(
                 f"{self.kind!r} has mass and muscles that go slack",
                 remedy="give one of mass and pushes",
+            )
+        if self.held and self.tare:
+            raise ModelError(
+                f"{self.kind!r} has a tare and starts held",
+                remedy="give one of tare and held",
             )
         if any(not low < high for low, high in self.hull):
             raise ModelError(f"hull of {self.kind!r} is {self.hull}", remedy="lower ends first")
@@ -438,7 +447,7 @@ class Balance(Invertible):
                 self.tare,
                 not self.settled,
             ),
-            *(bool(self.mass), self.preload, bool(self.directions)),
+            *(bool(self.mass), self.preload, bool(self.directions), self.held),
         ]
         lags = np.array(self.lags)
         gains = lags / step * -np.expm1(-step / lags)

@@ -82,7 +82,9 @@ class BalanceForceEstimator(SearchEstimator):
         outputs: Sequence[str],
         scheduling: Sequence[str] | None = None,
     ) -> str | None:
-        kinds = [name.partition("_")[0] for name in (*inputs, *outputs)]
+        kinds = [
+            name.partition("_")[0] for name in (*cls.own_roles(inputs, scheduling)[0], *outputs)
+        ]
         if kinds not in (["length", "force"], ["displacement", "force"]):
             return "it maps length, or displacement, to force"
         return super().objection(recordings, inputs, outputs, scheduling)

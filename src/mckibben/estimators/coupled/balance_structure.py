@@ -38,6 +38,9 @@ LEAST_AREA = 1e-9
 LEAST_STIFF = 1e-3
 """Smallest stiffness, relative to the force at the highest pressure over the stroke."""
 
+MOST_STRETCH = 0.1
+"""Largest stretch of the wall at the highest pressure, relative to the largest shortening."""
+
 LOGARITHMIC = ("lags", "asymmetry", "venting")
 """Nonlinear parameters that are stored as logarithms."""
 
@@ -330,12 +333,16 @@ class Structure:
         n = self.mix.shape[1]
         return np.concatenate([self.base + self.mix @ free[:n], free[n:]])
 
-    def initial(self, friction_offset: float) -> Array:
-        """Return initial free parameters: all terms without effect, except the friction offset."""
+    def initial(self, friction_offset: float, stretch: float = 0.0) -> Array:
+        """Return initial free parameters: all terms without effect, except the friction offset.
+
+        ``stretch`` of the wall is relative to the largest.
+        """
         low = self.bench.lowest[:, np.newaxis]
         positions = low + np.outer(self.bench.travel, [position for _, position in self.obstacles])
         free = np.zeros(len(self.terms))
         free[self.free("friction_offset")] = friction_offset
+        free[self.free("walls")] = stretch * MOST_STRETCH * self.bench.scale / self.bench.highest
         free[self.free("lags")] = np.log(self.lags)
         free[self.free("pushes")] = NEVER
         free[self.free("places")] = positions.ravel()
@@ -389,7 +396,7 @@ class Structure:
             "friction_slopes": (0.0, 4.0 * per_x, per_x),
             "asymmetry": (-log_ratio, log_ratio, 1.0),
             "lags": (shortest, longest, 1.0),
-            "walls": (0.0, 0.1 * per_bar, 0.2 * 0.1 * per_bar),
+            "walls": (0.0, MOST_STRETCH * per_bar, 0.2 * MOST_STRETCH * per_bar),
             "pushes": (0.0, 1.1 * NEVER, bench.highest * bench.unit),
             "places": (-np.inf, np.inf, 0.2 * bench.travel.repeat(len(self.obstacles))),
             "filling": (0.0, 2.0, max(4.0 * bench.step, 1e-9)),
@@ -461,6 +468,7 @@ class Structure:
             mass=vector(muscles["mass"][:, 0]) if heavy and bench.step and taut else (),
             directions=rows(bench.directions) if bench.directed else (),
             preload=bench.preload if bench.directed else 0.0,
+            held=bench.of_force,
         )
 
     def obstacle_values(self, values: Array, j: int) -> Array:

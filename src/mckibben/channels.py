@@ -124,9 +124,9 @@ def channels_of(
 ) -> Channels:
     """Return the channels of a comparison: as named, otherwise by names and units.
 
-    A force is a load if there are other inputs. Where the length (or displacement) differs between
-    recordings, force is modelled from the pressure, with the length as a scheduling input; or over the
-    length, if that was named as the input or the pressure is what is constant in every recording.
+    A force is a load if there are other inputs. Force is modelled over length or displacement, where
+    that varies and nothing else is moved; models of it find the pressure themselves. A length that is
+    constant in every recording schedules instead, and the pressure drives.
 
     Raises
     ------
@@ -136,10 +136,9 @@ def channels_of(
     asked = [(names,) if isinstance(names, str) else names for names in (inputs, outputs)]
     over = None if load else _force_over(recordings, *asked)
     if over is not None:
-        alone = asked[0] is not None and set(asked[0]) == {over}
-        if alone or not any_moves(recordings, (PRESSURE,)) or held_at_levels(recordings, PRESSURE):
-            return Channels((over,), (FORCE,))
-        return Channels((PRESSURE,), (FORCE,), (over,))
+        if _only_schedules(recordings, over) and asked[0] != (over,):
+            return Channels((PRESSURE,), (FORCE,), (over,))
+        return Channels((over,), (FORCE,))
     every = list(dict.fromkeys(name for recording in recordings for name in recording.channels))
     found = _by_name(every, _units(recordings, every))
     usual = FORCE if lacks_displacement(recordings) else OF_FORCE[-1]
@@ -253,11 +252,23 @@ def _force_over(
     """Return the length or displacement of a force law with pressure, or None."""
     meant = lacks_displacement(recordings) if outputs is None else tuple(outputs) == (FORCE,)
     for name in OF_FORCE if meant else ():
-        asked = inputs is None or set(inputs) <= {name, PRESSURE}
+        asked = inputs is None or set(inputs) in ({name}, {name, PRESSURE})
+        asked = asked or (set(inputs or ()) == {PRESSURE} and _only_schedules(recordings, name))
         there = all({name, PRESSURE, FORCE} <= {*one.channels} for one in recordings)
         if asked and there and varies([one[name] for one in recordings]):
             return name
     return None
+
+
+def _only_schedules(recordings: Sequence[Recording], name: str) -> bool:
+    """Return whether a channel is constant in every recording, where the pressure is not."""
+    there = all(name in one and PRESSURE in one for one in recordings)
+    return (
+        there
+        and held_at_levels(recordings, name)
+        and not held_at_levels(recordings, PRESSURE)
+        and any_moves(recordings, (PRESSURE,))
+    )
 
 
 def _over_held(recordings: Sequence[Recording], sides: Sides) -> Sides:

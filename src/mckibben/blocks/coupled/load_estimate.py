@@ -259,9 +259,6 @@ class ForceCompensator(Composition):
         """Return the identified pressures."""
         return self.parts[-1].reachable()
 
-    def inverse(self) -> Block:
-        return self.forward
-
     @classmethod
     def example(cls) -> Self:
         """Return that of a muscle behind a length."""

@@ -249,9 +249,15 @@ def moved_by(recordings: Sequence[Recording], given: str, channels: Sequence[str
 def _force_over(
     recordings: Sequence[Recording], inputs: Sequence[str] | None, outputs: Sequence[str] | None
 ) -> str | None:
-    """Return the length or displacement of a force law with pressure, or None."""
+    """Return the length or displacement of a force law with pressure, or None.
+
+    Where it is constant in every recording and the force is not, it is no output.
+    """
     meant = lacks_displacement(recordings) if outputs is None else tuple(outputs) == (FORCE,)
-    for name in OF_FORCE if meant else ():
+    free = all(FORCE in one for one in recordings) and not held_at_levels(recordings, FORCE)
+    for name in OF_FORCE:
+        if not meant and not (outputs is None and free and _only_schedules(recordings, name)):
+            continue
         asked = inputs is None or set(inputs) in ({name}, {name, PRESSURE})
         asked = asked or (set(inputs or ()) == {PRESSURE} and _only_schedules(recordings, name))
         there = all({name, PRESSURE, FORCE} <= {*one.channels} for one in recordings)

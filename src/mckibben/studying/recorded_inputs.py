@@ -71,7 +71,7 @@ class RecordedInputs:
         scale = np.where(high > low, high - low, 1.0)
         middle = (low + high) / 2
         shares = (every - middle) / scale
-        directions = np.linalg.svd(shares - shares.mean(axis=0), full_matrices=True)[2].T
+        directions = np.linalg.svd(shares - shares.mean(axis=0), full_matrices=False)[2].T
         along = shares @ directions
         steps = np.concatenate([np.abs(np.diff(table, axis=0)) / scale for table in tables]).max(
             axis=1

@@ -38,8 +38,11 @@ LEAST_AREA = 1e-9
 LEAST_STIFF = 1e-3
 """Smallest stiffness, relative to the force at the highest pressure over the stroke."""
 
-MOST_STRETCH = 0.1
-"""Largest stretch of the wall at the highest pressure, relative to the largest shortening."""
+MOST_STRETCH = {False: 0.1, True: 1.0}
+"""Largest stretch of the wall at the highest pressure, relative to the largest shortening, by whether
+errors are of force. At a held length stops feel only its ratio to their travel, and noise of the length
+is the less motion to them the larger it is.
+"""
 
 LOGARITHMIC = ("lags", "asymmetry", "venting")
 """Nonlinear parameters that are stored as logarithms."""
@@ -115,6 +118,11 @@ class Bench:
     def unit(self) -> float:
         """Typical area of a muscle."""
         return self.heaviest / self.highest if self.of_force else 1.0
+
+    @property
+    def most_stretch(self) -> float:
+        """Largest stretch of the wall by pressure [mm/bar]."""
+        return MOST_STRETCH[self.of_force] * self.scale / self.highest
 
     @property
     def scale(self) -> float:
@@ -342,7 +350,7 @@ class Structure:
         positions = low + np.outer(self.bench.travel, [position for _, position in self.obstacles])
         free = np.zeros(len(self.terms))
         free[self.free("friction_offset")] = friction_offset
-        free[self.free("walls")] = stretch * MOST_STRETCH * self.bench.scale / self.bench.highest
+        free[self.free("walls")] = stretch * self.bench.most_stretch
         free[self.free("lags")] = np.log(self.lags)
         free[self.free("pushes")] = NEVER
         free[self.free("places")] = positions.ravel()
@@ -396,7 +404,7 @@ class Structure:
             "friction_slopes": (0.0, 4.0 * per_x, per_x),
             "asymmetry": (-log_ratio, log_ratio, 1.0),
             "lags": (shortest, longest, 1.0),
-            "walls": (0.0, MOST_STRETCH * per_bar, 0.2 * MOST_STRETCH * per_bar),
+            "walls": (0.0, bench.most_stretch, 0.2 * bench.most_stretch),
             "pushes": (0.0, 1.1 * NEVER, bench.highest * bench.unit),
             "places": (-np.inf, np.inf, 0.2 * bench.travel.repeat(len(self.obstacles))),
             "filling": (0.0, 2.0, max(4.0 * bench.step, 1e-9)),

@@ -11,7 +11,9 @@ from mckibben.blocks.bands import Banded, inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.balance import Placed, balance_in
+from mckibben.blocks.coupled.load_estimate import ForceCompensator
 from mckibben.blocks.fields import Channel
+from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.running import run_many
 from mckibben.errors import ModelError
 from mckibben.numerals import numeral
@@ -55,7 +57,9 @@ def known_ranges(model: Block) -> dict[str, tuple[float, float]]:
         known[model.inputs[0].name] = (float(own[0]), float(own[1]))
         return known
     with suppress(ModelError):
-        inverse = model.inverse()
+        inverse = compensator(model)
+        if isinstance(inverse, ForceCompensator):
+            known[inverse.inputs[1].name] = inverse.known_place
         for channel, low, high in zip(inverse.outputs, *inverse.reachable(), strict=True):
             if np.isfinite([low, high]).all():
                 known[channel.name] = (float(low), float(high))

@@ -257,7 +257,21 @@ class ForceCompensator(Composition):
 
     def reachable(self) -> tuple[Array, Array]:
         """Return the identified pressures."""
-        return self.parts[-1].reachable()
+        return Series(self.parts[self._n_stages :]).reachable()
+
+    @property
+    def known_place(self) -> tuple[float, float]:
+        """Lowest and highest length or displacement that the muscle was identified at."""
+        assert self._estimate is not None
+        ends = self._estimate.forward.known_coordinates[0]
+        for stage in reversed(self.parts[: self._n_stages]):
+            ends = stage.inverse().simulate(ends)
+        low, high = sorted(ends.tolist())
+        return low, high
+
+    @property
+    def _n_stages(self) -> int:
+        return [part.kind for part in self.parts].index(Balance.kind)
 
     @classmethod
     def example(cls) -> Self:

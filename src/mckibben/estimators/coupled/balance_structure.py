@@ -396,7 +396,6 @@ class Structure:
     def nonlinear_bounds(self) -> tuple[Array, Array, Array]:
         """Return lower and upper bounds of the nonlinear parameters, and their scales."""
         bench = self.bench
-        per_bar = bench.scale / bench.highest
         per_x = bench.highest / bench.largest
         (shortest, longest), log_ratio = np.log(bench.lag_range), np.log(5.0)
         bounds: dict[str, tuple[ArrayLike, ArrayLike, ArrayLike]] = {

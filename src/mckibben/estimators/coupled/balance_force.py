@@ -1,7 +1,9 @@
 """Force by length, or displacement, and pressure: a force balance solved for its load.
 
 Unlike a static law it remembers: friction and what relaxes come from the balance, at held length
-through the stretch of the wall. Its errors of force are what is made least.
+through the stretch of the wall. Its errors of force are what is made least. Every run begins where a
+machine holds the muscle, without pressure. Solved for the pressure it is a compensator
+(`mckibben.blocks.coupled.load_estimate.ForceCompensator`).
 """
 
 from __future__ import annotations
@@ -58,6 +60,7 @@ class BalanceForceEstimator(SearchEstimator):
         "At constant length only friction makes loops; beyond the recorded lengths its area is "
         "extrapolated linearly."
     )
+    inverse_kind = "exact"
     quick = True
 
     input: str = "length"

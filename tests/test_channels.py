@@ -116,6 +116,23 @@ def test_force_is_of_length_and_models_find_the_pressure(
     assert found == Channels((over,), ("force",))
 
 
+@pytest.mark.parametrize("place", ["length", "displacement"])
+@pytest.mark.parametrize("inputs", [None, "pressure", ("pressure",)])
+@pytest.mark.parametrize("outputs", [None, "force"])
+def test_what_is_held_in_every_recording_schedules_and_pressure_drives(
+    place: str, inputs: str | tuple[str, ...] | None, outputs: str | None
+) -> None:
+    rng = np.random.default_rng(0)
+    runs = []
+    for level in (10.0, 14.0, 20.0):
+        one = run("pressure", place, "force")
+        runs.append(one.with_channels(**{place: level + 0.01 * rng.standard_normal(len(one))}))
+    assert channels_of(runs, inputs, outputs) == Channels(("pressure",), ("force",), (place,))
+    assert channels_of(runs, place, "force") == Channels((place,), ("force",))
+    moving = [run("pressure", place, "force")]
+    assert channels_of(moving, None, "force") == Channels((place,), ("force",))
+
+
 def test_force_is_not_modelled_unasked_where_anything_else_is() -> None:
     told = ["pressure", "length", "force"]
     assert channels_of([run(*told)], "pressure", "force", None).inputs == ("pressure",)

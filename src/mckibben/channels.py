@@ -125,7 +125,8 @@ def channels_of(
     """Return the channels of a comparison: as named, otherwise by names and units.
 
     A force is a load if there are other inputs. Force is modelled over length or displacement, where
-    that varies and nothing else is moved; models of it find the pressure themselves.
+    that varies and nothing else is moved; models of it find the pressure themselves. A length that is
+    constant in every recording schedules instead, and the pressure drives.
 
     Raises
     ------
@@ -135,6 +136,8 @@ def channels_of(
     asked = [(names,) if isinstance(names, str) else names for names in (inputs, outputs)]
     over = None if load else _force_over(recordings, *asked)
     if over is not None:
+        if _only_schedules(recordings, over) and asked[0] != (over,):
+            return Channels((PRESSURE,), (FORCE,), (over,))
         return Channels((over,), (FORCE,))
     every = list(dict.fromkeys(name for recording in recordings for name in recording.channels))
     found = _by_name(every, _units(recordings, every))
@@ -246,14 +249,32 @@ def moved_by(recordings: Sequence[Recording], given: str, channels: Sequence[str
 def _force_over(
     recordings: Sequence[Recording], inputs: Sequence[str] | None, outputs: Sequence[str] | None
 ) -> str | None:
-    """Return the length or displacement of a force law with pressure, or None."""
+    """Return the length or displacement of a force law with pressure, or None.
+
+    Where it is constant in every recording and the force is not, it is no output.
+    """
     meant = lacks_displacement(recordings) if outputs is None else tuple(outputs) == (FORCE,)
-    for name in OF_FORCE if meant else ():
+    free = all(FORCE in one for one in recordings) and not held_at_levels(recordings, FORCE)
+    for name in OF_FORCE:
+        if not meant and not (outputs is None and free and _only_schedules(recordings, name)):
+            continue
         asked = inputs is None or set(inputs) in ({name}, {name, PRESSURE})
+        asked = asked or (set(inputs or ()) == {PRESSURE} and _only_schedules(recordings, name))
         there = all({name, PRESSURE, FORCE} <= {*one.channels} for one in recordings)
         if asked and there and varies([one[name] for one in recordings]):
             return name
     return None
+
+
+def _only_schedules(recordings: Sequence[Recording], name: str) -> bool:
+    """Return whether a channel is constant in every recording, where the pressure is not."""
+    there = all(name in one and PRESSURE in one for one in recordings)
+    return (
+        there
+        and held_at_levels(recordings, name)
+        and not held_at_levels(recordings, PRESSURE)
+        and any_moves(recordings, (PRESSURE,))
+    )
 
 
 def _over_held(recordings: Sequence[Recording], sides: Sides) -> Sides:

@@ -37,6 +37,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "eupi": "mckibben.blocks.hysteresis.eupi:EUPI",
         "exponential": "mckibben.blocks.memoryless:Exponential",
         "feedforward-feedback": "mckibben.blocks.feedback:FeedforwardFeedback",
+        "force-compensator": "mckibben.blocks.coupled.load_estimate:ForceCompensator",
         "force-feedforward": "mckibben.blocks.force.feedforward:ForceFeedforward",
         "fuzzy-network": "mckibben.blocks.coupled.fuzzy_network:FuzzyNetwork",
         "generalized-bouc-wen": ("mckibben.blocks.hysteresis.differential:GeneralizedBoucWen"),

@@ -504,7 +504,7 @@ def _inverse(
     block: Block, chosen: InvertOptions, reading: ReadOptions | None, progress: Progress
 ) -> Inverse:
     from mckibben.blocks.adaptive import adaptive
-    from mckibben.blocks.coupled.load_estimate import load_of
+    from mckibben.blocks.coupled.load_estimate import ForceCompensator, load_of
     from mckibben.blocks.fields import drives
     from mckibben.blocks.force.feedforward import ForceFeedforward
     from mckibben.blocks.predictive import Predictive
@@ -523,7 +523,7 @@ def _inverse(
             return Inverse(block, "itself")
         return Inverse(load_of(block), "force")
     if not chosen.adaptive:
-        if ForceFeedforward.of(block) is not None:
+        if ForceFeedforward.of(block) or ForceCompensator.of(block):
             return Inverse(made(block), "feedforward")
         if not block.inverts and drives(block.outputs[0]) and not drives(block.inputs[0]):
             return Inverse(block, "itself")

@@ -68,6 +68,8 @@ NO_MODEL: list[tuple[str, dict[str, Any], str]] = [
         "load",
     ),
     ("force-feedforward", {"law": example("tondu-lopez")}, "'tondu-lopez'"),
+    ("force-compensator", {"forward": PI.example()}, "load"),
+    ("force-compensator", {"forward": example("load-estimate")}, "held"),
     (
         "predictive",
         {"compensator": example("pi", input_range=None).inverse(), "pressure_range": None},

@@ -24,6 +24,7 @@ EXAMPLES = examples()
 WITHOUT_TWIN = {
     "feedforward-feedback",
     "pi-adaptive",
+    "force-compensator",
     "force-feedforward",
     "predictive",
 }

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import DataError, Recording
+from mckibben import DataError, Recording, study
 from mckibben.blocks.force.activation import ActivationPressure
+from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.force.laws import ChouHannaford, TonduLopez
 from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
 from mckibben.estimators.coupled.balance_force import BalanceForceEstimator
@@ -141,6 +142,75 @@ class TestBalanceForce:
             for name in ("length", "displacement")
         ]
         np.testing.assert_allclose(np.concatenate(forces[0]), np.concatenate(forces[1]), atol=1e-6)
+
+
+class TestHeldLengths:
+    """Force of a muscle that is held at lengths, by a play of pressure that its contraction widens."""
+
+    LENGTHS = (200.0, 194.0, 188.0, 180.0)
+
+    @classmethod
+    def run(cls, length: float, noise: float, seed: int) -> Recording:
+        rng = np.random.default_rng(seed)
+        peaks = rng.uniform(0.3, 5.5, 12)
+        pressure = np.interp(np.arange(1200), np.linspace(0, 1199, 13), np.append(0.0, peaks))
+        contraction, play, force = 200.0 - length, 0.0, []
+        for p in pressure:
+            width = (0.05 + 0.03 * p) * (1.0 + 0.02 * contraction)
+            play = min(max(play, p - width), p + width)
+            force.append(play * (120.0 - 2.4 * contraction) - 2.0 * contraction)
+        channels = {
+            "pressure": pressure,
+            "length": length + noise * rng.standard_normal(1200),
+            "force": np.array(force) + 0.3 * rng.standard_normal(1200),
+        }
+        return Recording(channels, 0.02, meta={"name": f"{length:g} mm, {seed}"})
+
+    @classmethod
+    def fitted(cls, noise: float) -> tuple[Any, list[Recording]]:
+        train = [cls.run(length, noise, place) for place, length in enumerate(cls.LENGTHS)]
+        test = [cls.run(length, noise, 10 + place) for place, length in enumerate((197.0, 184.0))]
+        return BalanceForceEstimator(input="length").fit(train), test
+
+    @pytest.mark.parametrize("noise", [0.0, 0.01, 0.05])
+    def test_noise_of_the_length_leaves_the_friction(self, noise: float) -> None:
+        fit, test = self.fitted(noise)
+        found = [one - run["force"] for one, run in zip(fit.predict(test), test, strict=True)]
+        law: Any = PolynomialForceEstimator(law="petrovic").fit(
+            [self.run(length, noise, place) for place, length in enumerate(self.LENGTHS)]
+        )
+        static = [one - run["force"] for one, run in zip(law.predict(test), test, strict=True)]
+        assert np.std(np.concatenate(found)) < 0.4 * np.std(np.concatenate(static))
+
+    def test_the_compensator_is_exact(self) -> None:
+        fit, (run, _) = self.fitted(0.01)
+        inverse = compensator(fit.model_)
+        assert [c.name for c in inverse.inputs] == ["force", "length"]
+        assert inverse.forward_model == fit.model_
+        run = run.with_channels(pressure=0.9 * run["pressure"])  # within what was recorded
+        moving = run.with_channels(length=190.0 + 6.0 * np.sin(np.arange(len(run)) / 90.0))
+        for one in (run, moving):
+            force = fit.model_.simulate(one.select(["length", "pressure"]))["force"]
+            asked = one.with_channels(force=force).select(["force", "length"])
+            given = one.with_channels(pressure=inverse.simulate(asked)["pressure"])
+            again = fit.model_.simulate(given.select(["length", "pressure"]))["force"]
+            assert np.abs(again - force).max() <= 1e-9 * np.ptp(force)
+
+    def test_a_study_chooses_and_inverts_it(self) -> None:
+        _, test = self.fitted(0.01)
+        train = [self.run(length, 0.01, place) for place, length in enumerate(self.LENGTHS)]
+        found = study(train, test, models="balance-force,force-petrovic")
+        board, made = found.leaderboard, found.inverse
+        assert (board.inputs, board.outputs, board.loads) == (
+            ("pressure",),
+            ("force",),
+            ("length",),
+        )
+        assert board.best is not None
+        assert made is not None
+        assert board.best.model == made.model == "balance-force"
+        assert made.check.error <= 1e-9
+        assert made.following_error < 0.5 * made.static_error
 
 
 def test_elements_of_one_kind_are_ordered_by_strength() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass as plain_dataclass
 from dataclasses import replace
 from functools import cached_property, partial
@@ -21,6 +22,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Run, explicit_state
 from mckibben.blocks.fields import STRICT, Channel, Initial
+from mckibben.blocks.ranges import by_name
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 from mckibben.registry import load
@@ -265,12 +267,23 @@ class Series(Composition):
         return sum(part.samples_ahead for part in self.parts)
 
     def _known_of_parts(self) -> list[tuple[tuple[Channel, ...], Array]]:
-        """Return those of the first part, and of what schedules others: the rest is within."""
+        """Return those of the first part, and of what schedules others: the rest is within.
+
+        A first part that knows none, and has no memory, has those that the next one knows.
+        """
         first, *others = self.parts
-        scheduled = [
+        found = [(first.inputs, first.known_inputs)]
+        found += [
             (part.inputs[part.n_driven :], part.known_inputs[part.n_driven :]) for part in others
         ]
-        return [(first.inputs, first.known_inputs), *scheduled]
+        if others and not first.path_dependent and not first.rate_dependent:
+            with suppress(ModelError):
+                before = first.inverse()
+                behind = by_name(before.inputs, [(others[0].inputs, others[0].known_inputs)])
+                known = np.isfinite(behind)
+                ends = np.sort(before.simulate(np.where(known, behind, 0.0).T), axis=0).T
+                found.append((before.outputs, np.where(known, ends, behind)))
+        return found
 
     def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
         by_name = dict(zip((channel.name for channel in self.inputs), taken, strict=True))

@@ -178,6 +178,9 @@ class Balance(Invertible):
         far these went along each of r directions, m or more; standard deviations [bar]. The compensator
         departs from that middle along those directions alone, in proportion to how far they went.
         Default none: any pressures, about the ``preload``.
+    held : bool
+        Whether a machine holds the muscles where the first sample finds them before their pressure
+        rises; else they rest, without pressure, where their loads let them.
     """
 
     kind: ClassVar[str] = "balance"
@@ -254,6 +257,7 @@ class Balance(Invertible):
     directions: Rows = ()
     preload: FiniteFloat = 0.0
     drive: Rows = ()
+    held: bool = False
 
     def __post_init__(self) -> None:
         self.check_channels()
@@ -341,6 +345,11 @@ class Balance(Invertible):
             raise ModelError(
                 f"{self.kind!r} has mass and muscles that go slack",
                 remedy="give one of mass and pushes",
+            )
+        if self.held and self.tare:
+            raise ModelError(
+                f"{self.kind!r} has a tare and starts held",
+                remedy="give one of tare and held",
             )
         if any(not low < high for low, high in self.hull):
             raise ModelError(f"hull of {self.kind!r} is {self.hull}", remedy="lower ends first")
@@ -455,8 +464,7 @@ class Balance(Invertible):
                 self.tare,
                 not self.settled,
             ),
-            *(bool(self.mass), self.preload, bool(self.directions)),
-            ways.shape[1],
+            *(bool(self.mass), self.preload, bool(self.directions), ways.shape[1], self.held),
         ]
         lags = np.array(self.lags)
         gains = lags / step * -np.expm1(-step / lags)

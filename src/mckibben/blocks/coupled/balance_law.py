@@ -35,15 +35,15 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.kernels import DERIVED, kernel, short_kernel
+from mckibben.blocks.kernels import DERIVED, fill, kernel, short_kernel
 from mckibben.blocks.solving import eliminate
 
-HEAD = 22
+HEAD = 23
 """Muscles, coordinates, schedules, degree, loads, stops, lags, elastic terms, area's terms, obstacles of
 a coordinate, scale, p_0, ratio of lower to upper limits, lowest and highest pressure, samples a second,
 whether there is a tare, what is left at the start to relax (1, or 0 if settled), whether there is mass,
-pressure shared by muscles that are more than coordinates, whether they are, and in how many directions
-their pressures were driven, 0 for any."""
+pressure shared by muscles that are more than coordinates, whether they are, in how many directions their
+pressures were driven, 0 for any, and whether they start held."""
 
 OWN, DYNAMIC = 4, 4
 """Coefficients of a muscle before its directions; terms before elasticity."""
@@ -486,6 +486,17 @@ def solve_equilibrium(
 
 
 @kernel
+def start_held(c: Array, state: Array, x: Array, q: Array, p: Array) -> None:
+    """Start without pressure at given coordinates, whatever that takes."""
+    for i in range(state.size):
+        state[i] = 0.0
+    for k in range(p.size):
+        p[k] = 0.0
+    update_state(c, state, AT_REST, q, p, x)
+    state[state.size - 2] = 1.0
+
+
+@kernel
 def start_at_rest(c: Array, state: Array, x: Array, q: Array, p: Array, work: Array) -> None:
     """Start at rest without pressure, and set the tare there."""
     for i in range(state.size):
@@ -813,7 +824,11 @@ def start_balance(
     c = coefficients
     n, m, n_x = int(c[0]), int(c[1]), int(c[2]) + int(c[4])
     x, q, p, work = inputs[m : m + n_x], scratch[:m], scratch[m : m + n], scratch[m + n :]
-    start_at_rest(c, state, x, q, p, work)
+    if c[22] != 0.0:
+        fill(q, inputs)
+        start_held(c, state, x, q, p)
+    else:
+        start_at_rest(c, state, x, q, p, work)
     if virgin:
         for j in range(m):
             q[j] = inputs[j] + state[state.size - 2 - m + j]

@@ -7,12 +7,16 @@ Where displacements and pressures are known, all in the equation of
 
 n equations of as many loads or fewer, solved by least squares with the pseudo-inverse of C. Pressures
 must be measured, not those that a compensator asks for.
+
+Solved for the pressure, at given displacements and desired loads, the same equation is the balance
+itself: that is the compensator of a force.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
@@ -20,13 +24,14 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.compose import PerChannel, Series
+from mckibben.blocks.compose import Composition, Layout, PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance, balance_in
 from mckibben.blocks.coupled.balance_law import (
     AT_REST,
     FROM_REST,
     IN_TIME,
     start_at_rest,
+    start_held,
     unbalanced,
     update_state,
 )
@@ -35,6 +40,7 @@ from mckibben.blocks.kernels import fill, kernel, step
 from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
+from mckibben.blocks.ranges import by_name
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
@@ -89,9 +95,12 @@ def load_estimate_start(
         state[i] = 0.0
     fill(q, inputs)
     estimate(c, state, AT_REST, q, inputs, loads, scratch)
-    for i in range(n_loads):
-        loads[i] = loads[i] if c[16] == 0.0 else 0.0
-    start_at_rest(c, state, x, q, p, scratch[m + n :])
+    if c[22] != 0.0:
+        start_held(c, state, x, q, p)
+    else:
+        for i in range(n_loads):
+            loads[i] = loads[i] if c[16] == 0.0 else 0.0
+        start_at_rest(c, state, x, q, p, scratch[m + n :])
     if virgin:
         for j in range(m):
             q[j] = inputs[j] + state[state.size - 2 - m + j]
@@ -158,6 +167,21 @@ class LoadEstimate(Block):
         """The scheduling inputs other than loads."""
         return self.forward.scheduled[: len(self.forward.scheduled) - self.forward.n_loads]
 
+    @cached_property
+    def known_inputs(self) -> Array:
+        """Ranges of the balance's."""
+        return by_name(self.inputs, self._known_of_balance())
+
+    @cached_property
+    def known_outputs(self) -> Array:
+        """Ranges of loads."""
+        return by_name(self.outputs, self._known_of_balance())
+
+    def _known_of_balance(self) -> list[tuple[tuple[Channel, ...], Array]]:
+        """Return the balance's channels with their ranges."""
+        balance = self.forward
+        return [(balance.inputs, balance.known_inputs), (balance.outputs, balance.known_outputs)]
+
     @property
     def n_scratch(self) -> int:
         """Scratch of the balance, and the scheduling inputs."""
@@ -171,6 +195,121 @@ class LoadEstimate(Block):
         """Return the balance's coefficients, and the pseudo-inverse of its shares of loads."""
         solving = np.linalg.pinv(np.array(self.forward.loads))
         return np.concatenate([self.forward.coefficients(sample_time), solving.ravel()])
+
+
+@dataclass(frozen=True, config=STRICT)
+class ForceCompensator(Composition):
+    """Pressure for a desired force at a given length or displacement: a load estimate, solved for it.
+
+    Parameters
+    ----------
+    forward : Block
+        A load estimate of one muscle that starts held, alone or behind a series of blocks on its
+        displacement and on its pressure.
+    """
+
+    kind: ClassVar[str] = "force-compensator"
+    inverts: ClassVar[bool] = True
+    path_dependent: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("forward",)
+
+    forward: Annotated[InstanceOf[Block], BeforeValidator(nested)]
+
+    forward_model = same_as("forward")
+
+    def __post_init__(self) -> None:
+        if self._estimate is None:
+            raise ModelError(
+                f"{self.forward.title!r} estimates no load from a displacement and a pressure",
+                remedy="give a model that `balance-force` identified",
+            )
+        balance = self._estimate.forward
+        if len(balance.given) != 1 or balance.n_loads != 1 or not balance.held:
+            raise ModelError(
+                "pressures are solved for of one muscle under one load that starts held",
+                remedy="identify `balance-force`",
+            )
+
+    @classmethod
+    def of(cls, model: Block) -> Self | None:
+        """Return the compensator of a force model that starts held; None for other models."""
+        estimate = _estimate_in(model)
+        return cls(model) if estimate is not None and estimate.forward.held else None
+
+    @property
+    def _estimate(self) -> LoadEstimate | None:
+        return _estimate_in(self.forward)
+
+    @cached_property
+    def parts(self) -> tuple[Block, ...]:  # type: ignore[override]
+        """Blocks on the displacement, the balance, and the inverses of those on the pressure."""
+        assert self._estimate is not None
+        before = self.forward.parts[:-1] if isinstance(self.forward, Series) else ()
+        stages = [stage.parts for stage in before if isinstance(stage, PerChannel)]
+        acting = [pressure.inverse() for _, pressure in reversed(stages)]
+        return (*(place for place, _ in stages), self._estimate.forward, *acting)
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """The force, then the length or displacement, then what schedules."""
+        return (*self.forward.outputs, self.forward.inputs[0], *self.forward.inputs[2:])
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """All inputs but the force."""
+        return tuple(channel.name for channel in self.inputs[1:])
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        return (self.forward.inputs[1],)
+
+    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
+        force, place, *scheduled = taken
+        return Series(self.parts).wired(board, [place, *scheduled, force])
+
+    def joined(self, parts: Sequence[str]) -> str:
+        """Return the nested expression of the series."""
+        return rf"p = {'['.join(reversed(parts))}[x{']' * len(parts)}"
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the identified pressures."""
+        place = [part.kind for part in self.parts].index(Balance.kind)
+        return Series(self.parts[place:]).reachable()
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return that of a muscle behind a length."""
+        pressure, force = Channel("pressure", "bar"), Channel("force", "N")
+        displacement = Channel("displacement", "mm")
+        balance = Balance(
+            springs=((0.0, 12.0),),
+            elasticity=((6.0, 4.0),),
+            areas=((160.0, -60.0, -10.0),),
+            friction=((30.0, 8.0),),
+            relaxation=((2.0,),),
+            loads=((1.0,),),
+            damping=(0.1,),
+            walls=(0.3,),
+            limits=(0.05, 0.2),
+            friction_offset=0.5,
+            lags=(2.0,),
+            hull=((-5.0, 40.0),),
+            scale=40.0,
+            degree=1,
+            driven=(displacement,),
+            scheduled=(force,),
+            given=(pressure,),
+            held=True,
+        )
+        shortening = Affine(-1.0, 200.0, Channel("length", "mm"), displacement)
+        before = PerChannel((shortening, Affine(1.0, 0.0, pressure, pressure)))
+        return cls(Series((before, LoadEstimate(balance))))
+
+
+def _estimate_in(model: Block) -> LoadEstimate | None:
+    """Return the load estimate that a model is, or ends with; None if there is none."""
+    last = model.parts[-1] if isinstance(model, Series) else model
+    return last if isinstance(last, LoadEstimate) else None
 
 
 def load_of(model: Block) -> Block:

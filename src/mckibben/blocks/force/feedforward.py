@@ -18,6 +18,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Start
 from mckibben.blocks.compose import Parallel
+from mckibben.blocks.coupled.load_estimate import ForceCompensator
 from mckibben.blocks.fields import STRICT, Initial
 from mckibben.blocks.force.laws import ForceLaw, PolynomialForce
 from mckibben.blocks.force.multistate_friction import (
@@ -168,11 +169,11 @@ class ForceFeedforward(Block):
 
 
 def compensator(model: Block) -> Block:
-    """Return the compensator of a model: a force feedforward, or the inverse.
+    """Return the compensator of a model: of a force, from that and the length, or the inverse.
 
     Raises
     ------
     ModelError
         If there is none.
     """
-    return ForceFeedforward.of(model) or model.inverse()
+    return ForceFeedforward.of(model) or ForceCompensator.of(model) or model.inverse()

@@ -232,6 +232,7 @@ class Estimator(ABC):
         """Return why the model does not apply to recordings, or None."""
         if len(inputs) != 1 or len(outputs) != 1:
             return "it is of one input and one output"
+        inputs, scheduling = cls.own_roles(inputs, scheduling)
         if scheduling is not None:
             return "the load is not one of its inputs"
         (given,), (wanted,) = inputs, outputs
@@ -256,7 +257,31 @@ class Estimator(ABC):
         scheduling: Sequence[str] | None = None,
     ) -> dict[str, Any]:
         """Return the settings that select channels; None for the default choice."""
-        return {"input": inputs[0], "output": outputs[0]}
+        own, _ = cls.own_roles(inputs, scheduling)
+        further = (*inputs, *(scheduling or ())) if own != tuple(inputs) else ()
+        others = [name for name in further if name not in own]
+        return {
+            "input": own[0],
+            "output": outputs[0],
+            **dict(zip(cls.input_settings, others, strict=False)),
+        }
+
+    @classmethod
+    def own_roles(
+        cls, inputs: Sequence[str], scheduling: Sequence[str] | None
+    ) -> tuple[tuple[str, ...], Sequence[str] | None]:
+        """Return the channels of `input`, and those that schedule what is left.
+
+        A model that takes one further input does not mind which of the two drives: force by length and
+        pressure is one law, whichever is held.
+        """
+        if len(cls.input_settings) == len(inputs) == len(scheduling or ()) == 1:
+            (further,), (given,), (scheduled,) = cls.input_settings, inputs, scheduling or ()
+            if further == given.partition("_")[0]:
+                return (scheduled,), None
+            if further == scheduled.partition("_")[0]:
+                return (given,), None
+        return tuple(inputs), scheduling
 
     def channels(self, data: TrainingData) -> dict[str, Channel]:
         """Return the channels of the block to build, as keyword arguments."""

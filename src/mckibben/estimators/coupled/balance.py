@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import compress
+from itertools import compress, product
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -71,6 +71,9 @@ FRICTION_OFFSETS = (0.05, 0.3, 1.0, 4.0)
 """Initial friction offsets: pressures below zero, relative to the highest, at which friction
 vanishes.
 """
+
+STRETCHES = (0.0, 1.0)
+"""Initial stretch of the wall, relative to the largest, of models of force."""
 
 CONSTANT = 1e6
 """Friction offset so large that friction does not depend on pressure."""
@@ -429,12 +432,18 @@ class BalanceEstimator(CoupledEstimator):
         return (settled, found) if settled.cost(found) < search.cost(z) else (search, z)
 
     def _balanced(self, search: Search, tracker: Tracker) -> Array:
-        """Return the best linear force balance at measured positions, over several friction offsets."""
+        """Return the best linear force balance at measured positions, over several starts.
+
+        Where a muscle is held, stops move by the stretch of its wall alone: without it their friction is
+        no different from a constant force, and no slope leads from there to a stretch.
+        """
         structure, problem, starts = search.structure, search.problem, []
         offsets = FRICTION_OFFSETS[: None if structure.limits else 1]
-        for offset in offsets if self.friction == "pressure" else (CONSTANT,):
+        offsets = offsets if self.friction == "pressure" else (CONSTANT,)
+        stretches = STRETCHES if structure.bench.of_force and self.may("walls") else (0.0,)
+        for offset, stretch in product(offsets, stretches):
             z = np.zeros(problem.size(structure))
-            z[: len(structure.terms)] = structure.initial(offset * structure.bench.highest)
+            z[: len(structure.terms)] = structure.initial(offset * structure.bench.highest, stretch)
             z = problem.balanced(structure, z, search.active)
             starts.append((search.cost(z), z))
             tracker.update(z, starts[-1][0])

@@ -1,7 +1,9 @@
 """Force by length, or displacement, and pressure: a force balance solved for its load.
 
 Unlike a static law it remembers: friction and what relaxes come from the balance, at held length
-through the stretch of the wall. Its errors of force are what is made least.
+through the stretch of the wall. Its errors of force are what is made least. Every run begins where a
+machine holds the muscle, without pressure. Solved for the pressure it is a compensator
+(`mckibben.blocks.coupled.load_estimate.ForceCompensator`).
 """
 
 from __future__ import annotations
@@ -58,6 +60,7 @@ class BalanceForceEstimator(SearchEstimator):
         "At constant length only friction makes loops; beyond the recorded lengths its area is "
         "extrapolated linearly."
     )
+    inverse_kind = "exact"
     quick = True
 
     input: str = "length"
@@ -82,7 +85,9 @@ class BalanceForceEstimator(SearchEstimator):
         outputs: Sequence[str],
         scheduling: Sequence[str] | None = None,
     ) -> str | None:
-        kinds = [name.partition("_")[0] for name in (*inputs, *outputs)]
+        kinds = [
+            name.partition("_")[0] for name in (*cls.own_roles(inputs, scheduling)[0], *outputs)
+        ]
         if kinds not in (["length", "force"], ["displacement", "force"]):
             return "it maps length, or displacement, to force"
         return super().objection(recordings, inputs, outputs, scheduling)

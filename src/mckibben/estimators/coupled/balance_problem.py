@@ -184,8 +184,7 @@ class Problem:
             c[coordinate_at(c, j)] += load
         return follow(
             c, driven, run.outputs, run.scheduled, by_air,
-            held=held, rested=held and self.of_force and self._moves(run),
-            every=self.every, sloped=sloped,
+            held=held, every=self.every, sloped=sloped,
         )  # fmt: skip
 
     def errors_of(

@@ -31,7 +31,6 @@ from mckibben.blocks.coupled.balance_law import (
     n_terms,
     shortening,
     solve_equilibrium,
-    start_at_rest,
     unbalanced,
     update_state,
 )
@@ -355,7 +354,6 @@ def follow(
     x: Array,
     dp: Array,
     held: bool,
-    rested: bool,
     every: int,
     past: Array,
     rows: Array,
@@ -375,8 +373,6 @@ def follow(
         How pressures that act move with what acts on them.
     held : bool
         Whether muscles are where they were measured.
-    rested : bool
-        Whether those that are held come from rest without pressure; else nothing is loaded at first.
     every : int
     past, rows, scratch : arrays
         To compute in, all 0.
@@ -391,12 +387,10 @@ def follow(
     q, tare, last = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m]
     p, work = rest[3 * m : 3 * m + n], rest[3 * m + n :]
     tared = past[past.shape[0] - m :]
-    if held and rested:
-        start_at_rest(c, state, x[0], q, p, work)
-    for t in range(0 if held and rested else -1, driven.shape[0]):
+    for t in range(-1, driven.shape[0]):
         way = AT_REST if t < 0 else FROM_REST if t == 0 else IN_TIME
         now, place = max(t, 0), max(t, 0) // every
-        fill(p, driven[now] if held or t >= 0 else p)
+        fill(p, driven[now] if t >= 0 or (held and c[22] == 0.0) else p)
         for j in range(m):
             ahead = 2.0 * q[j] - last[j] if t > 0 else q[j]
             last[j] = q[j]
@@ -434,7 +428,6 @@ def run(
     dp: Array | None = None,
     *,
     held: bool,
-    rested: bool = False,
     every: int = 1,
     sloped: bool = True,
 ) -> tuple[Array, Array]:
@@ -450,5 +443,5 @@ def run(
     rows = np.zeros((2 * n + 2 * m + 1, max(n_c, m, n * n_l)))
     scratch = np.zeros(n_states + 3 * m + 2 * n + 5 * m + m * m + 2 * n_terms(c))
     p, y, x, dp = (np.ascontiguousarray(one) for one in (driven, measured, x, dp))
-    follow(c, p, y, x, dp, held, rested, every, past, rows, scratch, found, slopes)
+    follow(c, p, y, x, dp, held, every, past, rows, scratch, found, slopes)
     return found, slopes

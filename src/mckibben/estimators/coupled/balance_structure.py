@@ -38,6 +38,12 @@ LEAST_AREA = 1e-9
 LEAST_STIFF = 1e-3
 """Smallest stiffness, relative to the force at the highest pressure over the stroke."""
 
+MOST_STRETCH = {False: 0.1, True: 1.0}
+"""Largest stretch of the wall at the highest pressure, relative to the largest shortening, by whether
+errors are of force. At a held length stops feel only its ratio to their travel, and noise of the length
+is the less motion to them the larger it is.
+"""
+
 LOGARITHMIC = ("lags", "asymmetry", "venting")
 """Nonlinear parameters that are stored as logarithms."""
 
@@ -112,6 +118,11 @@ class Bench:
     def unit(self) -> float:
         """Typical area of a muscle."""
         return self.heaviest / self.highest if self.of_force else 1.0
+
+    @property
+    def most_stretch(self) -> float:
+        """Largest stretch of the wall by pressure [mm/bar]."""
+        return MOST_STRETCH[self.of_force] * self.scale / self.highest
 
     @property
     def scale(self) -> float:
@@ -330,12 +341,16 @@ class Structure:
         n = self.mix.shape[1]
         return np.concatenate([self.base + self.mix @ free[:n], free[n:]])
 
-    def initial(self, friction_offset: float) -> Array:
-        """Return initial free parameters: all terms without effect, except the friction offset."""
+    def initial(self, friction_offset: float, stretch: float = 0.0) -> Array:
+        """Return initial free parameters: all terms without effect, except the friction offset.
+
+        ``stretch`` of the wall is relative to the largest.
+        """
         low = self.bench.lowest[:, np.newaxis]
         positions = low + np.outer(self.bench.travel, [position for _, position in self.obstacles])
         free = np.zeros(len(self.terms))
         free[self.free("friction_offset")] = friction_offset
+        free[self.free("walls")] = stretch * self.bench.most_stretch
         free[self.free("lags")] = np.log(self.lags)
         free[self.free("pushes")] = NEVER
         free[self.free("places")] = positions.ravel()
@@ -381,7 +396,6 @@ class Structure:
     def nonlinear_bounds(self) -> tuple[Array, Array, Array]:
         """Return lower and upper bounds of the nonlinear parameters, and their scales."""
         bench = self.bench
-        per_bar = bench.scale / bench.highest
         per_x = bench.highest / bench.largest
         (shortest, longest), log_ratio = np.log(bench.lag_range), np.log(5.0)
         bounds: dict[str, tuple[ArrayLike, ArrayLike, ArrayLike]] = {
@@ -389,7 +403,7 @@ class Structure:
             "friction_slopes": (0.0, 4.0 * per_x, per_x),
             "asymmetry": (-log_ratio, log_ratio, 1.0),
             "lags": (shortest, longest, 1.0),
-            "walls": (0.0, 0.1 * per_bar, 0.2 * 0.1 * per_bar),
+            "walls": (0.0, bench.most_stretch, 0.2 * bench.most_stretch),
             "pushes": (0.0, 1.1 * NEVER, bench.highest * bench.unit),
             "places": (-np.inf, np.inf, 0.2 * bench.travel.repeat(len(self.obstacles))),
             "filling": (0.0, 2.0, max(4.0 * bench.step, 1e-9)),
@@ -461,6 +475,7 @@ class Structure:
             mass=vector(muscles["mass"][:, 0]) if heavy and bench.step and taut else (),
             directions=rows(bench.directions) if bench.directed else (),
             preload=bench.preload if bench.directed else 0.0,
+            held=bench.of_force,
         )
 
     def obstacle_values(self, values: Array, j: int) -> Array:

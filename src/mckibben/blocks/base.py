@@ -203,8 +203,7 @@ class Block(DrawsItself, Parametrised):
 
         Infinite where none is known. Those of a compensator are outputs of the model that it inverts.
         """
-        compensates = self.inverts and drives(self.outputs[0]) and not drives(self.inputs[0])
-        forward = self.forward_model if compensates else None
+        forward = self._compensated
         if forward is not None:
             outputs, inputs = forward.known_outputs, forward.known_inputs
             return by_name(self.inputs, [(forward.outputs, outputs), (forward.inputs, inputs)])
@@ -217,6 +216,12 @@ class Block(DrawsItself, Parametrised):
             with suppress(ModelError):
                 driven[:] = np.transpose(self.inverse().reachable())
         return found
+
+    @property
+    def _compensated(self) -> Block | None:
+        """The model whose compensator this is, from motion or force to pressure; None if it is none."""
+        compensates = self.inverts and drives(self.outputs[0]) and not drives(self.inputs[0])
+        return self.forward_model if compensates else None
 
     def _known_of_parts(self) -> list[tuple[tuple[Channel, ...], Array]]:
         """Return channels of parts that are inputs of the block, with their identified ranges."""

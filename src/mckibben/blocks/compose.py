@@ -269,14 +269,16 @@ class Series(Composition):
     def _known_of_parts(self) -> list[tuple[tuple[Channel, ...], Array]]:
         """Return those of the first part, and of what schedules others: the rest is within.
 
-        A first part that knows none, and has no memory, has those that the next one knows.
+        A first part that knows none has those that the next one knows, if it has no memory and no
+        schedule.
         """
         first, *others = self.parts
         found = [(first.inputs, first.known_inputs)]
         found += [
             (part.inputs[part.n_driven :], part.known_inputs[part.n_driven :]) for part in others
         ]
-        if others and not first.path_dependent and not first.rate_dependent:
+        bare = not (first.scheduling or first.path_dependent or first.rate_dependent)
+        if others and bare:
             with suppress(ModelError):
                 before = first.inverse()
                 behind = by_name(before.inputs, [(others[0].inputs, others[0].known_inputs)])

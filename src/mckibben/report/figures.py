@@ -215,7 +215,7 @@ def _block_loop(
     """Draw the loop of a block for a decreasing triangle of one input, others at mid-range."""
     names = [channel.name for channel in block.inputs]
     driven, given = input or names[0], output or block.outputs[0].name
-    ranges = known_ranges(block)
+    ranges = known_ranges(block) | _always_in_reach(block)
     if driven not in ranges and high is None:
         raise ModelError(
             f"the range of {driven} that the model was identified on is not known",
@@ -228,6 +228,15 @@ def _block_loop(
     units = {channel.name: channel.unit for channel in block.inputs}
     run = block.simulate(_triangle(block.title, driven, ends, middle, step, units))
     return subjects.loop([run], driven, given)
+
+
+def _always_in_reach(block: Block) -> dict[str, tuple[float, float]]:
+    """Return what a compensator may be asked for whatever happened before, by channel."""
+    forward = block.forward_model if block.inverts else None
+    if forward is None:
+        return {}
+    ends = zip(forward.outputs, *forward.reachable(), strict=True)
+    return {c.name: (low, high) for c, low, high in ends if np.isfinite([low, high]).all()}
 
 
 def _against(kind: str) -> Callable[..., Drawing]:

@@ -259,9 +259,12 @@ def _check(
 def _first_clipped(inverse: Block, asked: Recording) -> int:
     """Return the first sample of a motion at which a compensator clips; all if it never does."""
     done, rest = 0, len(asked)
+    needed = asked.matrix([channel.name for channel in inverse.inputs])
 
     def clips(n: int) -> bool:
-        return inverse.n_clipped(inverse.final_state(asked.slice(0, n))) > 0
+        state = inverse.start_on(asked)
+        inverse.bind(asked.sample_time, state, needed[:n], np.empty((n, len(inverse.outputs))))()
+        return inverse.n_clipped(state) > 0
 
     if not clips(rest):
         return rest

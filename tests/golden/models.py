@@ -23,6 +23,7 @@ RANGES: dict[str, tuple[tuple[float, float], ...]] = {
     "air": ((0.0, 10.0),),
     "braid-equilibrium": ((0.0, 8.0),),
     "chou-hannaford": ((3.0, 5.5), (0.0, 5.0)),
+    "exponential": ((0.0, 4.5),),
     "force-feedforward": ((-5.0, 100.0), (0.0, 2.0)),
     "inverse": ((4.5, 29.5),),
     "load-estimate": ((0.0, 8.0), (0.0, 8.0), (0.0, 4.0), (0.0, 4.0), (0.0, 3.0)),

@@ -24,6 +24,7 @@ RANGES: dict[str, tuple[tuple[float, float], ...]] = {
     "braid-equilibrium": ((0.0, 8.0),),
     "chou-hannaford": ((3.0, 5.5), (0.0, 5.0)),
     "force-compensator": ((100.0, 500.0), (180.0, 195.0)),
+    "exponential": ((0.0, 4.5),),
     "force-feedforward": ((-5.0, 100.0), (0.0, 2.0)),
     "inverse": ((4.5, 29.5),),
     "load-estimate": ((0.0, 8.0), (0.0, 8.0), (0.0, 4.0), (0.0, 4.0), (0.0, 3.0)),

@@ -26,7 +26,7 @@ from mckibben.blocks import saving
 from mckibben.blocks.fields import Channel, Initial, drives
 from mckibben.blocks.kernels import Step, in_scratch
 from mckibben.blocks.parameters import Parametrised, gathered
-from mckibben.blocks.ranges import at_rest, by_name
+from mckibben.blocks.ranges import SLOW_STEP, by_name, over_inputs
 from mckibben.blocks.running import Stream, refuse_time, run_many
 from mckibben.blocks.starts import start_state
 from mckibben.errors import DataError, ModelError
@@ -229,12 +229,8 @@ class Block(DrawsItself, Parametrised):
 
     @cached_property
     def known_outputs(self) -> Array:
-        """Lowest and highest output over the identified inputs, shape (n_outputs, 2).
-
-        What is reachable from every state where that is finite, else the range at rest.
-        """
-        found = np.stack(self.reachable(), axis=1)
-        return found if np.isfinite(found).all() else at_rest(self, own_time(self) or 1.0)
+        """Lowest and highest output over the identified inputs, shape (n_outputs, 2)."""
+        return over_inputs(self, own_time(self) or SLOW_STEP)
 
     @property
     def n_missable(self) -> int:

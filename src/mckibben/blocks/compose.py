@@ -269,22 +269,23 @@ class Series(Composition):
     def _known_of_parts(self) -> list[tuple[tuple[Channel, ...], Array]]:
         """Return those of the first part, and of what schedules others: the rest is within.
 
-        A first part that knows none has those that the next one knows, if it has no memory and no
-        schedule.
+        Where the first part knows none of a channel, it is that of the next one through the curve
+        between.
         """
         first, *others = self.parts
         found = [(first.inputs, first.known_inputs)]
         found += [
             (part.inputs[part.n_driven :], part.known_inputs[part.n_driven :]) for part in others
         ]
-        bare = not (first.scheduling or first.path_dependent or first.rate_dependent)
-        if others and bare:
-            with suppress(ModelError):
-                before = first.inverse()
-                behind = by_name(before.inputs, [(others[0].inputs, others[0].known_inputs)])
-                known = np.isfinite(behind)
-                ends = np.sort(before.simulate(np.where(known, behind, 0.0).T), axis=0).T
-                found.append((before.outputs, np.where(known, ends, behind)))
+        for curve in first.parts if isinstance(first, PerChannel) else (first,):
+            behind = by_name(
+                curve.outputs, [(part.inputs, part.known_inputs) for part in others[:1]]
+            )
+            bare = not (curve.path_dependent or curve.rate_dependent)
+            if bare and len(curve.inputs) == len(behind) == 1 and np.isfinite(behind).all():
+                with suppress(ModelError):
+                    ends = curve.inverse().simulate(behind[0])
+                    found.append((curve.inputs, np.sort(ends).reshape(1, 2)))
         return found
 
     def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:

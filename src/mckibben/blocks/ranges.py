@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 
 LARGEST = float(np.finfo(np.float64).max)
 
+SAMPLES_PER_LEG = 20
+
+SLOW_STEP = 1.0
+"""Sample time [s] of a slow way of blocks without one of their own."""
+
 
 def unknown(count: int) -> Array:
     """Return the ranges of channels of which none is known, shape (count, 2)."""
@@ -47,23 +52,28 @@ def by_name(
     return found
 
 
-def at_rest(block: Block, sample_time: float) -> Array:
-    """Return the range of outputs at rest over the identified inputs, shape (n_outputs, 2).
+def over_inputs(block: Block, sample_time: float) -> Array:
+    """Return the range of outputs over the identified inputs, shape (n_outputs, 2).
 
-    All inputs are at their lowest, highest or middle, then each alone is at an end. The sample time [s]
-    matters to none at rest, but to a block that has its own.
+    All inputs are at their lowest, highest or middle, then each alone is at an end: at rest there, and
+    on a slow way from one to the next from the block's own start. `Block.reachable` is less: it is what
+    every history leaves in reach.
     """
     low, high = block.known_inputs.T
     if not np.isfinite([low, high]).all():
         return unknown(len(block.outputs))
     middle = low + 0.5 * (high - low)
     alone = [np.where(np.eye(low.size, dtype=bool), end, middle) for end in (low, high)]
-    outputs = np.empty((0, len(block.outputs)))
+    corners = np.vstack([low, high, low, middle, *alone])
+    legs = np.linspace(0, len(corners) - 1, SAMPLES_PER_LEG * (len(corners) - 1) + 1)
+    way = np.stack([np.interp(legs, np.arange(len(corners)), line) for line in corners.T], axis=1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for row in np.vstack([low, high, middle, *alone]):
+        found = [block.simulate(way, sample_time=sample_time)]
+        for row in corners:
             given = block.simulate(row[np.newaxis], initial="first_sample", sample_time=sample_time)
-            outputs = np.vstack([outputs, given])
+            found.append(given)
+    outputs = np.vstack(found)
     ends = np.stack([outputs.min(axis=0), outputs.max(axis=0)], axis=1)
     return np.where(np.isfinite(ends), ends, unknown(len(ends)))
 

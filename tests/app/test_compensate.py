@@ -82,8 +82,14 @@ def test_what_a_model_is_used_as_and_reaches(workspace: Workspace) -> None:
     assert following.having(workspace, "inverse") == ["pi"]
     assert {"inverse", "adaptive", "predictive"} <= following.uses(workspace, "pi").keys()
     moved = np.concatenate([run["displacement"] for run in workspace.with_role("train")])
-    ((low, high),) = following.reach(workspace, "pi").values()
+    ((low, high),) = following.reach(workspace, "pi", {}).values()
     assert abs(low - moved.min()) < 0.2 * np.ptp(moved) > abs(high - moved.max())
+    wish, inverse = following.wish(workspace, "pi"), workspace.model("pi").inverse()
+    asked = following.reference(
+        following.points_of(wish), wish["held"], wish["step"], {"displacement": "mm"}
+    )
+    assert np.ptp(asked["displacement"]) > 0.5 * np.ptp(moved)
+    assert inverse.n_clipped(inverse.final_state(asked)) == 0
     first, *plants = following.plants(workspace, "pi")
     assert (first, plants[-1]) == ("model p2z", "model pi")  # itself last
     assert "rig soft-arm" not in plants

@@ -139,18 +139,24 @@ def asked_for(workspace: Workspace, name: str) -> tuple[dict[str, Channel], dict
 
 
 def pace(workspace: Workspace, name: str) -> tuple[float, float]:
-    """Return time between steps, and of a usual cycle of the recordings that a model is of [s]."""
+    """Return time between steps, and of a cycle over the range at the speed of the recordings [s]."""
     from mckibben.signals import cycles
 
-    block, steps, found = workspace.model(name), [], []
+    block = workspace.model(name)
+    steps: list[float] = []
+    seconds: list[float] = []
+    strokes: list[float] = []
+    ranges = {channel.name: np.ptp(recorded(workspace, channel.name)) for channel in block.outputs}
     for run in workspace.used().values():
         if run.sample_time:
             steps.append(run.sample_time)
-            for moved in (run[c.name] for c in block.outputs if c.name in run):
+            for key in ranges.keys() & run.channels:
                 with suppress(DataError):
-                    found += [run.sample_time * (c.stop - c.start - 1) for c in cycles(moved)]
+                    for cycle in cycles(run[key]):
+                        seconds.append(run.sample_time * (cycle.stop - cycle.start - 1))
+                        strokes.append(float(np.ptp(run[key][cycle]) / ranges[key]))
     step = block.sample_time or float(f"{np.median(steps or [STEP]):.3g}")
-    return step, float(np.median(found or [10.0]))
+    return step, sum(seconds) / sum(strokes) if seconds else 10.0
 
 
 def recorded(workspace: Workspace, name: str) -> Array:
@@ -159,43 +165,71 @@ def recorded(workspace: Workspace, name: str) -> Array:
     return np.concatenate(runs) if runs else np.array([0.0, 1.0])
 
 
-def reach(workspace: Workspace, name: str) -> dict[str, tuple[float, float]]:
-    """Return what of every channel of a reference can be reached; what is not known was recorded."""
+def reach(
+    workspace: Workspace, name: str, held: Mapping[str, float]
+) -> dict[str, tuple[float, float]]:
+    """Return what of every channel of a reference can be reached again and again.
+
+    It takes into account what is held meanwhile, hysteresis, and what creeps in cycles of the usual
+    pace; it is within what was recorded.
+    """
+    from mckibben.studying.recorded_inputs import RecordedInputs
 
     def make() -> dict[str, tuple[float, float]]:
-        block = workspace.model(name)
-        names = [channel.name for channel in block.outputs]
-        known, found = dict(zip(names, zip(*block.reachable(), strict=True), strict=True)), {}
+        block, runs = workspace.model(name), list(workspace.used().values())
+        driven = [channel.name for channel in made(workspace, name, "inverse", {}).outputs]
+        others = {c.name: held.get(c.name, 0.0) for c in block.inputs if c.name not in driven}
+        found: dict[str, tuple[float, float]] = {}
+        with suppress(MckibbenError):
+            recorded_inputs = RecordedInputs.of(runs, driven)
+            found = recorded_inputs.reached(block, others, pace(workspace, name)[1])
         for channel in asked_for(workspace, name)[0]:
-            low, high = map(float, known.get(channel, (np.nan, np.nan)))
-            if not -np.inf < low < high < np.inf:
-                values = recorded(workspace, channel)
-                low, high = float(values.min()), float(values.max())
+            values = recorded(workspace, channel)
+            low, high = found.get(channel, (-np.inf, np.inf))
+            low, high = max(low, float(values.min())), min(high, float(values.max()))
             found[channel] = low, high if high > low else low + 1.0
         return found
 
-    return dict(of_model(workspace, name, f"reach {workspace.digest()}", make))
+    return dict(of_model(workspace, name, f"reach {workspace.digest()} {held}", make))
 
 
 # -- motions ----------------------------------------------------------------------------------------
 
 
 def wish(workspace: Workspace, name: str) -> Json:
-    """Return a motion of the first channel that a model is asked for, from rest, well within reach."""
+    """Return a motion of the first channel that a model is asked for, from rest, within reach.
+
+    It is made smaller until the inverse clips nothing of it.
+    """
     step, cycle = pace(workspace, name)
     channels, held = asked_for(workspace, name)
     found: Json = {"seconds": float(f"{max(2 * cycle, 40 * step):.2g}"), "cycles": 2, "step": step}
     found |= {"stored": "", "now": next(iter(channels)), "channels": {}}
     found["held"] = {key: float(f"{np.median(recorded(workspace, key)):.4g}") for key in held}
-    for channel, (low, high) in reach(workspace, name).items():
-        digits, margin = 2 - math.floor(math.log10(high - low)), 0.1 * (high - low)
-        first = float(np.clip(recorded(workspace, channel)[0], low + margin, high - margin))
-        other = high - margin if high - first >= first - low else low + margin
-        own = {"first": round(first, digits), "other": round(other, digits), "points": []}
-        kind = "sine" if channel == found["now"] else "hold"
-        found["channels"][channel] = {"kind": kind, **own}
-    shape(found)
+    inverse, units = made(workspace, name, "inverse", {}), units_of(channels | held)
+    for margin in (0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4):
+        for channel, (low, high) in reach(workspace, name, found["held"]).items():
+            digits, least = 2 - math.floor(math.log10(high - low)), margin * (high - low)
+            first = float(np.clip(recorded(workspace, channel)[0], low + least, high - least))
+            other = high - least if high - first >= first - low else low + least
+            kind = "sine" if channel == found["now"] else "hold"
+            ends = {"first": round(first, digits), "other": round(other, digits)}
+            found["channels"][channel] = {"kind": kind, **ends, "points": []}
+        shape(found)
+        asked = reference(points_of(found), found["held"], step, units)
+        if not inverse.n_clipped(inverse.final_state(asked)):
+            break
     return found
+
+
+def units_of(channels: Mapping[str, Channel]) -> dict[str, str]:
+    """Return units by name."""
+    return {name: channel.unit for name, channel in channels.items()}
+
+
+def points_of(found: Json) -> dict[str, Points]:
+    """Return the points of a motion by channel."""
+    return {name: own["points"] for name, own in found["channels"].items()}
 
 
 def shape(found: Json) -> None:

@@ -27,6 +27,9 @@ SAMPLES, STEP = 100, 0.02
 EVEN = 3.0**0.5
 """Reach of an even distribution, in standard deviations."""
 
+CYCLES = 3
+"""Of inputs from end to end, after which outputs repeat."""
+
 TURNS = 24
 """Turning points of a random motion."""
 
@@ -131,6 +134,38 @@ class RecordedInputs:
         inputs = self.middle + self.scale * (along @ self.directions.T)
         inputs = np.clip(inputs, *self.ends)
         return Recording(dict(zip(self.names, inputs.T, strict=True)), self.sample_time, self.units)
+
+    def reached(
+        self, block: Block, held: Mapping[str, float], seconds: float
+    ) -> dict[str, tuple[float, float]]:
+        """Return the lowest and highest of a model's outputs that these inputs reach again and again.
+
+        They go from end to end along each direction, in cycles; what the first cycles leave behind, and
+        what creeps, has come by the last one.
+
+        Parameters
+        ----------
+        block : Block
+        held : mapping of str to float
+            All other inputs of the model, which stay.
+        seconds : float
+            Duration of a cycle [s].
+        """
+        step = block.sample_time or seconds / (2 * SAMPLES)
+        n = max(round(seconds / step), 4)
+        share = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(CYCLES * n + 1) / n)
+        others = {name: np.full(share.size, value) for name, value in held.items()}
+        units = {channel.name: channel.unit for channel in block.inputs}
+        low, high = self.extent
+        ends = []
+        for place, direction in enumerate(self.directions.T):
+            along = low[place] + share * (high[place] - low[place])
+            inputs = np.clip(self.middle + self.scale * np.outer(along, direction), *self.ends)
+            run = Recording({**dict(zip(self.names, inputs.T, strict=True)), **others}, step, units)
+            given = block.simulate(run).matrix([channel.name for channel in block.outputs])[-n:]
+            ends += [given.min(axis=0), given.max(axis=0)]
+        found = zip(np.min(ends, axis=0).tolist(), np.max(ends, axis=0).tolist(), strict=True)
+        return dict(zip([channel.name for channel in block.outputs], found, strict=True))
 
     def outside(self, inputs: Array) -> float:
         """Return the share of some inputs, shape (k, n), that are not as the recorded ones."""

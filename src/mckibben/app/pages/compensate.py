@@ -149,9 +149,8 @@ def _take(wish: Json, recording: Recording, stored: str = "") -> None:
 
 def _reference(state: State) -> Recording:
     wish, (channels, held) = _wish(state), following.asked_for(state.workspace, _able(state))
-    units = {name: channel.unit for name, channel in (channels | held).items()}
-    points = {name: own["points"] for name, own in wish["channels"].items()}
-    return following.reference(points, wish["held"], wish["step"], units)
+    units = following.units_of(channels | held)
+    return following.reference(following.points_of(wish), wish["held"], wish["step"], units)
 
 
 def _motion(state: State, names: list[str]) -> None:
@@ -280,7 +279,7 @@ async def _start(state: State, name: str) -> None:
 def followed(state: State) -> None:
     """Show the motion, the chosen run, and the errors of all runs of the model."""
     wish, runs, reference = _wish(state), _runs(state), _reference(state)
-    reach = following.reach(state.workspace, _able(state))
+    reach = following.reach(state.workspace, _able(state), wish["held"])
     of_it = [run for run, one in runs.items() if one["reference"] == wish["stored"]]
     chosen = state.chosen.get("compensate.run")
     chosen = chosen if chosen in of_it else next(iter(of_it), "")

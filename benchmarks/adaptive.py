@@ -112,9 +112,9 @@ def predicted(block: Block, forward: Block, pressures: Array, levels: Array, ste
     assert isinstance(block, Adaptive)
     n, found = block.fixed.n_states, np.empty(len(levels))
     inputs, outputs = np.zeros((1, 2)), np.zeros((1, 1))
-    state = block.initial_state(np.array([levels[0], np.nan]))
+    state = block.initial_state(np.array([levels[0], np.nan]), sample_time=step)
     if forward.n_states == n:
-        state[:n] = forward.initial_state(pressures[:1])
+        state[:n] = forward.initial_state(pressures[:1], sample_time=step)
     run = block.bind(step, state, inputs, outputs)
     for t, pressure in enumerate(pressures):
         before = state.copy()

@@ -51,7 +51,7 @@ def followed(
     ahead = held.copy()
     places = np.minimum(np.arange(len(held)) + block.samples_ahead, len(held) - 1)
     ahead[:, :n] = held[places, :n]
-    state = block.initial_state(held[0])
+    state = block.initial_state(held[0], sample_time=STEP)
     start = state[: block.forward_model.n_states].tolist()
     pressures = np.empty((len(held), n))
     block.bind(STEP, state, ahead, pressures)()
@@ -69,7 +69,7 @@ def clipped(inverse: Block, references: Array, **limits: float) -> Array:
     pressures = pressures.reshape(-1, n)
     change = limits.get("rate_limit", np.inf) * STEP
     clip_path(np.concatenate([[change], low, high]), pressures.reshape(-1))
-    start = block.initial_state(held[0])[: block.forward_model.n_states].tolist()
+    start = block.initial_state(held[0], sample_time=STEP)[: block.forward_model.n_states].tolist()
     driven = np.hstack([pressures, held[:, n:]])
     given = block.forward_model.simulate(driven, initial=start, sample_time=STEP)
     return np.asarray(given)[HORIZON:]

@@ -470,7 +470,7 @@ def process_model(block: Any, inputs: Rows, sample_time: float) -> Rows:
 def _narx(block: Any, inputs: Rows, function: Callable[[list[float]], float]) -> Rows:
     (uc, us), (yc, ys) = block.input_scale, block.output_scale
     x = [(row[0] - uc) / us for row in inputs]
-    start = block.initial_state(inputs[0])
+    start = block.initial_state(inputs[0], sample_time=block.sample_time)
     past = [float(value) for value in start[: block.output_lags]][::-1]
     operators = [x[0] - r for r in block.thresholds]
     outputs = []

@@ -142,7 +142,7 @@ def test_saved_and_resumed_it_goes_on_to_the_bit(model: Block, tmp_path: Path) -
     for y in asked:
         np.testing.assert_array_equal(again.step([y, y]), going_on.step([y, y]))
     vented = block.resumed(state, memory=False)  # what is learnt, and not where it was
-    begun = vented.initial_state(np.array([asked[0], asked[0]]))
+    begun = vented.initial_state(np.array([asked[0], asked[0]]), sample_time=STEP)
     assert str(vented.present(begun)) == str(block.present(state))
 
 
@@ -175,15 +175,15 @@ def test_clipped_samples_are_counted_as_by_the_inverse_that_does_not_learn(model
     low, high = (float(end[0]) for end in model.reachable())
     asked = low + (high - low) * (0.5 + 0.7 * np.sin(np.linspace(0.0, 9.0, 400)))
     fixed, block = model.inverse(), adaptive(model, 60.0)
-    state = fixed.initial_state(asked[:1])
+    state = fixed.initial_state(asked[:1], sample_time=STEP)
     fixed.bind(STEP, state, asked[:, np.newaxis], np.empty((400, 1)))()
     count = fixed.n_clipped(state)
     assert count > 100
     silent = np.column_stack([asked, np.full(400, np.nan)])
-    state = block.initial_state(silent[0])
+    state = block.initial_state(silent[0], sample_time=STEP)
     block.bind(STEP, state, silent, np.empty((400, 1)))()
     assert block.n_clipped(state) == count
     with pytest.warns(ModelWarning, match=f"^{count} sample"):
         block.report(state)
     resumed = block.resumed(state)
-    assert resumed.n_clipped(resumed.initial_state(silent[0])) == 0
+    assert resumed.n_clipped(resumed.initial_state(silent[0], sample_time=STEP)) == 0

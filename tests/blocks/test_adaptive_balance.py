@@ -40,7 +40,7 @@ def test_model_and_inverse_match_at_every_step(balance: Balance, seed: int, wild
     block = Adaptive(Inverse(balance), 2.0, 0.05)
     asked, n, own = path(balance, seed, 120), len(balance.driven), block.fixed.n_states
     stream, rng = block.stream(STEP), np.random.default_rng(seed)
-    measured, before = asked[0, :n], block.fixed.initial_state(asked[0])
+    measured, before = asked[0, :n], block.fixed.initial_state(asked[0], sample_time=STEP)
     for sample in asked:
         pressures = stream.step([*sample, *measured])
         forward, driven = block.present(stream.state), [[*pressures, *sample[n:]]]

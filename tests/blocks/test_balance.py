@@ -158,7 +158,7 @@ def test_drawn_balances_agree_with_their_twin(block: Balance, seed: int) -> None
 
 
 def state_after(block: Block, inputs: Array) -> Array:
-    state = block.initial_state(inputs[0])
+    state = block.initial_state(inputs[0], sample_time=STEP)
     block.bind(STEP, state, inputs, np.empty((len(inputs), len(block.outputs))))()
     return state
 

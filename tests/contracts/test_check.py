@@ -94,7 +94,9 @@ BROKEN: dict[str, tuple[Any, str, Make]] = {
     "inverts: an inverse deaf to states": (
         Inverse,
         "initial_state",
-        lambda original: lambda self, first, initial=None: original(self, first, None),
+        lambda original: lambda self, first, initial=None, step=None: original(
+            self, first, None, step
+        ),
     ),
     "inverts: nothing to reach": (
         PI,

@@ -335,7 +335,9 @@ class Adaptive(Block):
             return "first_sample"
         return self.forward.start if self.memory is None else self.memory
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+    def initial_state(
+        self, first: Array, initial: Initial | None = None, sample_time: float | None = None
+    ) -> Array:
         """Return the initial state: that of the inverse, with the fitted parameters.
 
         An explicit state may be this block's own or, but of a series, the inverse's or the forward
@@ -344,19 +346,19 @@ class Adaptive(Block):
         start = self.start if initial is None else initial
         if self.parts:
             named = initial is None and isinstance(start, str)  # each starts by a rule of its own
-            return Layout(self).initial_state(first, None if named else start)
+            return Layout(self).initial_state(first, None if named else start, sample_time)
         if isinstance(start, str):
-            return super().initial_state(first, start)
+            return super().initial_state(first, start, sample_time)
         asked = first[: len(first) - len(self.measured)]
         if len(start) == self.n_states:
             return explicit_state(self, start)
         if len(start) == self.n_adapted:
             adapted = np.array(start)
             self._split(adapted)[4][READY::SENSES] = 0.0  # the next measurement has no prediction
-            own = self.fixed.initial_state(asked, self.forward.start)
+            own = self.fixed.initial_state(asked, self.forward.start, sample_time)
             return np.concatenate([own, np.zeros(self.learnable.n_more_states), adapted])
-        state = self.initial_state(first, "first_sample")
-        state[: self.fixed.n_states] = self.fixed.initial_state(asked, start)
+        state = self.initial_state(first, "first_sample", sample_time)
+        state[: self.fixed.n_states] = self.fixed.initial_state(asked, start, sample_time)
         return state
 
     def _core_state(self, state: Array) -> Array:

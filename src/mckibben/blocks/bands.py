@@ -235,14 +235,16 @@ class Banded(Composition):
             self.inputs, [(forward.inputs, forward.known_inputs), (forward.inputs, calibrated)]
         )
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+    def initial_state(
+        self, first: Array, initial: Initial | None = None, sample_time: float | None = None
+    ) -> Array:
         """Return the model's initial state, and that of the band at rest.
 
         An explicit state may be this block's own, or the model's.
         """
         if initial is None or isinstance(initial, str) or len(initial) != self.forward.n_states:
-            return super().initial_state(first, initial)
-        own = self.forward.initial_state(first, initial)
+            return super().initial_state(first, initial, sample_time)
+        own = self.forward.initial_state(first, initial, sample_time)
         return np.concatenate([own, np.zeros(self.band.n_states)])
 
     def start_on(self, recording: Recording) -> Array:

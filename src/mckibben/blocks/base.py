@@ -262,7 +262,9 @@ class Block(DrawsItself, Parametrised):
         """Default start state."""
         return getattr(self, "initial", "first_sample")
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+    def initial_state(
+        self, first: Array, initial: Initial | None = None, sample_time: float | None = None
+    ) -> Array:
         """Return the state before the first sample, shape (n_states,), a new array.
 
         Parameters
@@ -281,12 +283,8 @@ class Block(DrawsItself, Parametrised):
         if kernel is not None:
             given = np.ascontiguousarray(first, dtype=np.float64)
             scratch = scratch_of(kernel, self.n_scratch)
-            kernel(self.start_numbers(), state, *scratch, given, VIRGIN[start])
+            kernel(self.coefficients(sample_time), state, *scratch, given, VIRGIN[start])
         return state
-
-    def start_numbers(self) -> Array:
-        """Return the coefficients for start kernels, which do not depend on the sample time."""
-        return self.coefficients(self.sample_time or 1.0)
 
     def state_at(self, first: Array, output: Array) -> Array | None:
         """Return the equilibrium state for a first input and output; None if outputs do not matter."""
@@ -480,12 +478,16 @@ class Block(DrawsItself, Parametrised):
     def final_state(self, data: Recording, *, initial: Initial | None = None) -> Array:
         """Return the state after a recording, shape (n_states,), to start the next one from."""
         inputs = self._inputs_from(data)
-        state = self.start_on(data) if initial is None else self.initial_state(inputs[0], initial)
+        state = (
+            self.start_on(data)
+            if initial is None
+            else self.initial_state(inputs[0], initial, data.sample_time)
+        )
         self.bind(data.sample_time, state, inputs, np.empty((len(inputs), len(self.outputs))))()
         return state
 
     def _run(self, inputs: Array, sample_time: float | None, initial: Initial | None) -> Array:
-        state = self.initial_state(inputs[0], initial)
+        state = self.initial_state(inputs[0], initial, sample_time)
         outputs = np.empty((inputs.shape[0], len(self.outputs)))
         refuse_time(sample_time)
         self.check_time(sample_time)

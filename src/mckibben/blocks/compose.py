@@ -83,7 +83,9 @@ class Layout:
         """Yield the calls of blocks, in order."""
         return ((step, step.block) for step in self.steps if step.block is not None)
 
-    def initial_state(self, first: Array, initial: Initial | None) -> Array:
+    def initial_state(
+        self, first: Array, initial: Initial | None, sample_time: float | None
+    ) -> Array:
         """Return the states of all blocks, each started from its first input sample."""
         signals = np.zeros(self.n_signals)
         signals[: self.n_inputs] = first
@@ -102,11 +104,10 @@ class Layout:
             start = initial if step.state is None or initial is not None else step.state.tolist()
             if left is not None:
                 start, left = left[: block.n_states], left[block.n_states :]
-            states.append(block.initial_state(sample, start))
+            states.append(block.initial_state(sample, start, sample_time))
             if not passed_on.isdisjoint(step.given):
                 outputs = np.empty((1, len(step.given)))
-                time = block.sample_time or 1.0
-                block.bind(time, states[-1].copy(), sample[np.newaxis], outputs)()
+                block.bind(sample_time, states[-1].copy(), sample[np.newaxis], outputs)()
                 signals[step.given] = outputs[0]
         return np.concatenate(states)
 
@@ -207,8 +208,10 @@ class Composition(Block):
         """The calls of the parts, in order."""
         return Layout(self)
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        return self.wiring.initial_state(first, initial)
+    def initial_state(
+        self, first: Array, initial: Initial | None = None, sample_time: float | None = None
+    ) -> Array:
+        return self.wiring.initial_state(first, initial, sample_time)
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         return self.wiring.bind(sample_time, state, inputs, outputs)

@@ -195,23 +195,22 @@ class Inverse(Block):
     def outputs(self) -> tuple[Channel, ...]:
         return self.forward.inputs[: self.forward.n_driven]
 
-    def start_numbers(self) -> Array:
-        return self.forward.inverse_numbers(self.forward.start_numbers())
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+    def initial_state(
+        self, first: Array, initial: Initial | None = None, sample_time: float | None = None
+    ) -> Array:
         """Return the initial state that corresponds to the forward block's.
 
         An explicit state may be this block's own, or the forward block's.
         """
         start: Initial = self.start if initial is None else initial
         if isinstance(start, str):
-            return super().initial_state(first, start)
+            return super().initial_state(first, start, sample_time)
         n = self.forward.n_states
         if len(start) == n != self.n_states:
-            return self.forward.inverse_state(self.forward.initial_state(first, start))
+            return self.forward.inverse_state(self.forward.initial_state(first, start, sample_time))
         state = explicit_state(self, start)
         if n <= self.n_states:
-            self.forward.initial_state(first, state[:n].tolist())  # which checks it
+            self.forward.initial_state(first, state[:n].tolist(), sample_time)  # which checks it
         return state
 
     def coefficients(self, sample_time: float | None) -> Array:

@@ -87,6 +87,7 @@ class Tangents:
         self.block = block
         values = block.pack()
         self._layout = _laid_out(block)
+        self._sample_time = sample_time
         own = [each.coefficients(sample_time) for _, each in self._layout.calls()]
         places = range(values.size) if places is None else places
         self.n_places = len(places)
@@ -107,7 +108,9 @@ class Tangents:
         Parameters are those of `Block.initial_state`.
         """
         rule = initial if initial is None or isinstance(initial, str) else None
-        given = None if initial is rule else self.block.initial_state(first, initial)
+        given = (
+            None if initial is rule else self.block.initial_state(first, initial, self._sample_time)
+        )
         states = np.zeros((len(self._numbers), self.block.n_states), np.complex128)
         for numbers, state in zip(self._numbers, states, strict=True):
             if given is not None:
@@ -127,7 +130,7 @@ class Tangents:
             if call.state is not None:
                 own[:] = call.state
             elif not isinstance(start, str):
-                own[:] = block.initial_state(inputs[0].real, start)
+                own[:] = block.initial_state(inputs[0].real, start, self._sample_time)
             elif own.size:
                 kernel = block.c_kernels[1]
                 room = [self._scratch[index]] if in_scratch(kernel) else []

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.blocks import saving
 from mckibben.blocks.base import Block
+from mckibben.blocks.compose import Composition
 from mckibben.blocks.fields import Initial
 from mckibben.blocks.inverse import Invertible
 from mckibben.errors import ContractError, DataError, ModelError, ModelWarning
@@ -36,7 +37,8 @@ def check_block(block: Block, *, sample_time: float = 0.01, seed: int = 0) -> No
     """Test a block against all laws of blocks.
 
     Sizes agree with what is declared; simulating is repeatable and leaves its arguments alone; a
-    stream, `Block.simulate_many` and a saved copy agree with `Block.simulate` to the last bit; a
+    stream, `Block.simulate_many` and a saved copy agree with `Block.simulate` to the last bit, and so do
+    the parts of a composition, run one after another; a
     recording gives what an array gives; bad input is refused by name; a rate-independent block sees
     neither the sample time nor the pace of its input; and the inverse, where there is one, is exact
     through minor loops, from a carried-over state, and again after references it could not reach.
@@ -190,7 +192,7 @@ def through(turns: Array, samples: NDArray[np.int64]) -> Array:
 
 def _sizes_agree(trial: Trial) -> None:
     block, packed = trial.block, trial.block.pack()
-    state = block.initial_state(trial.inputs[0])
+    state = block.initial_state(trial.inputs[0], sample_time=trial.sample_time)
     sized = packed.shape == (block.n_parameters,)
     trial.demand(sized, "pack returns n_parameters numbers in one vector")
     trial.demand(state.shape == (block.n_states,), "initial_state returns n_states numbers")
@@ -205,7 +207,7 @@ def _sizes_agree(trial: Trial) -> None:
 
 def _simulates(trial: Trial) -> None:
     given = trial.inputs.copy()
-    state = trial.block.initial_state(given[0]).tolist()
+    state = trial.block.initial_state(given[0], sample_time=trial.sample_time).tolist()
     kept = list(state)
     outputs = trial.run(given, state)
     shape = (len(given), len(trial.block.outputs))
@@ -241,6 +243,25 @@ def _simulates_many(trial: Trial) -> None:
     alone = np.array([trial.run(trial.inputs, block=block.unpack(row)) for row in sets])
     law = "simulate_many equals simulate of every parameter set"
     trial.same(many.reshape(len(sets), *trial.outputs.shape), alone, law)
+
+
+def _equals_its_parts(trial: Trial) -> None:
+    if not isinstance(trial.block, Composition):
+        return
+    wiring = trial.block.wiring
+    starts: tuple[Initial | None, ...] = (None, "first_sample", "virgin")
+    for initial in starts:
+        signals = [*trial.inputs.T]
+        for call in wiring.steps:
+            taken = [signals[place] for place in call.taken]
+            if call.block is None:
+                signals.append(sum(taken, np.zeros(len(trial.inputs))))
+                continue
+            own = call.state.tolist() if initial is None and call.state is not None else initial
+            signals += [*trial.run(np.column_stack(taken), own, call.block).T]
+        apart = np.column_stack([signals[place] for place in wiring.given])
+        law = "a composition equals its parts, run one after another"
+        trial.same(trial.run(trial.inputs, initial), apart, law)
 
 
 def _saves(trial: Trial) -> None:
@@ -383,7 +404,7 @@ def _late(trial: Trial, inverse: Block) -> int:
 
 
 def _state_after(block: Block, inputs: Array, sample_time: float) -> list[float]:
-    state = block.initial_state(inputs[0])
+    state = block.initial_state(inputs[0], sample_time=sample_time)
     block.bind(sample_time, state, inputs, np.empty((len(inputs), len(block.outputs))))()
     return list(map(float, state))
 
@@ -393,6 +414,7 @@ LAWS: tuple[Callable[[Trial], None], ...] = (
     _simulates,
     _streams,
     _simulates_many,
+    _equals_its_parts,
     _saves,
     _takes_recordings,
     _refuses_bad_arrays,

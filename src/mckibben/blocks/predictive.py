@@ -422,11 +422,13 @@ class Predictive(Block):
         n, m = len(self.outputs), self.compensator.n_driven
         return self._planned.n_states + self.horizon * m + n + 2
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+    def initial_state(
+        self, first: Array, initial: Initial | None = None, sample_time: float | None = None
+    ) -> Array:
         """Return the initial state: as if its reference had always been applied."""
         if initial is not None and not isinstance(initial, str):
             return explicit_state(self, initial)
-        own = model_state(self._inverse, self._inverse.initial_state(first, initial))
+        own = model_state(self._inverse, self._inverse.initial_state(first, initial, sample_time))
         return np.concatenate([own, np.zeros(self.n_states - own.size)])
 
     @property

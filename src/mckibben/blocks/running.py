@@ -107,7 +107,7 @@ class Stream:
         if status and not all(map(isfinite, last[: self._needed])):
             return self._held(status)
         if not self._started:
-            self.state[:] = self.block.initial_state(self._input, self.initial)
+            self.state[:] = self.block.initial_state(self._input, self.initial, self.sample_time)
             self._clipped = sum(map(self._counted.__getitem__, self._counts))
             self._started = True
         self._run()
@@ -162,7 +162,7 @@ def run_many(
 
     def run(share: Iterable[int]) -> None:
         for index in share:
-            state = blocks[index].initial_state(inputs[0], initial)
+            state = blocks[index].initial_state(inputs[0], initial, sample_time)
             blocks[index].bind(sample_time, state, inputs, outputs[index])()
 
     workers = min(cores(), len(blocks))

@@ -71,8 +71,8 @@ def history(block: Block, recording: Recording) -> Array:
 def state_after(block: Block, before: Array, first: Array, sample_time: float | None) -> Array:
     """Return the state after a history of inputs, (k, n_inputs), before a first input."""
     if not len(before):
-        return block.initial_state(first)
-    state = block.initial_state(before[0], "first_sample")
+        return block.initial_state(first, sample_time=sample_time)
+    state = block.initial_state(before[0], "first_sample", sample_time)
     before = np.ascontiguousarray(before)
     block.bind(sample_time, state, before, np.empty((len(before), len(block.outputs))))()
     return state
@@ -104,7 +104,7 @@ def unstated(block: Block) -> bool:
 
 def _outputs(block: Block, inputs: Array, sample_time: float | None) -> Array:
     """Return the outputs over inputs, (k, n_inputs), of a run from rest; infinite where it clipped."""
-    state = block.initial_state(inputs[0], "first_sample")
+    state = block.initial_state(inputs[0], "first_sample", sample_time)
     outputs = np.empty((len(inputs), len(block.outputs)))
     block.bind(sample_time, state, np.ascontiguousarray(inputs), outputs)()
     if block.n_clipped(state):  # a past that the model itself warns of is none

@@ -227,7 +227,7 @@ class RecurrentFuzzyNetwork(Block):
 
     def state_at(self, first: Array, output: Array) -> Array:
         """Return the equilibrium state at the first inputs if the output is known."""
-        state = self.initial_state(first)
+        state = self.initial_state(first, sample_time=self.sample_time)
         state[: self.output_lags] = output[0]
         return state
 

@@ -251,10 +251,6 @@ class Air(Invertible):
         shares = [-math.expm1(-step / time) if time > 0 else 1.0 for time in times]
         return np.array([self.gain, *self.offsets, *shares, *self.pressures, round(late)])
 
-    def start_numbers(self) -> Array:
-        """Return the coefficients at a sample time compatible with the dead time."""
-        return self.coefficients(self.dead_time or 1.0)
-
     def inverse_state(self, state: Array) -> Array:
         """Return the pressure, and a clip count of 0."""
         return np.array([state[0], 0.0])

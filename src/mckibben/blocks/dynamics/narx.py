@@ -242,7 +242,7 @@ class Narx(Block):
     def state_at(self, first: Array, output: Array) -> Array | None:
         """Return the equilibrium state at a first input if the output is known."""
         centre, half = self.output_scale
-        state = self.initial_state(first, "first_sample")
+        state = self.initial_state(first, "first_sample", self.sample_time)
         state[: self.output_lags] = (float(output[0]) - centre) / half
         return state
 

@@ -173,10 +173,6 @@ class ProcessModel(Block):
         """Return the coefficients of the kernel; raise an error for delays above 254 samples."""
         return _discretised(self, sample_time).copy()
 
-    def start_numbers(self) -> Array:
-        """Return [n, 0, u_0], the coefficients of the start."""
-        return np.array([self.order, 0.0, self.input_offset])
-
     def equations(self) -> tuple[str, ...]:
         """Return the transfer function of this structure."""
         below = r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1"

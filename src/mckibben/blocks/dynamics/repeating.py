@@ -50,7 +50,7 @@ def steady_state(block: Any, recording: Recording) -> Recording:
     step, ratio = needs_sample_time(block.kind, recording.sample_time), BETWEEN * block.substeps
     fine = np.ascontiguousarray(np.roll(band_limited(given[:, 0], ratio), -1)[:, np.newaxis])
     finer: Block = replace(block, substeps=1, hold="first")
-    state, found = block.initial_state(given[0], "virgin"), np.empty_like(fine)
+    state, found = block.initial_state(given[0], "virgin", step), np.empty_like(fine)
     run = finer.bind(step / ratio, state, fine, found)
     state[-1] = given[0, 0]
     before = np.full(len(given), np.inf)

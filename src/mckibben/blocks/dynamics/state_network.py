@@ -210,10 +210,6 @@ class StateNetwork(Block):
         scales = [self.input_offset, self.input_scale, self.output_offset, self.output_scale]
         return np.array([*head, *scales, *self.pack()])
 
-    def start_numbers(self) -> Array:
-        """Return the coefficients at an admissible sample time."""
-        return self.coefficients(1.0 / self.rate)
-
     @classmethod
     def example(cls) -> Self:
         """Return an oscillator with a hardening spring."""

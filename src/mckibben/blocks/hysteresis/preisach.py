@@ -304,9 +304,11 @@ class Preisach(Triangle, Invertible):
         found[1:, :n] = np.cumsum(np.cumsum(cells[:, ::-1], axis=1)[:, ::-1], axis=0)
         return np.tril(found, -1)
 
-    def initial_state(self, first: Array, initial: fields.Initial | None = None) -> Array:
+    def initial_state(
+        self, first: Array, initial: fields.Initial | None = None, sample_time: float | None = None
+    ) -> Array:
         """Return the initial state; raise an error for an invalid depth or direction."""
-        state = super().initial_state(first, initial)
+        state = super().initial_state(first, initial, sample_time)
         depth, direction = state[0], state[1]
         if depth not in range(1, DEPTH + 1) or direction not in (1.0, -1.0):
             raise ModelError(

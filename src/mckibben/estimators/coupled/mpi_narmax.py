@@ -246,7 +246,9 @@ class RecurrentProblem:
     def free_run(self, network: RecurrentFuzzyNetwork, inputs: Array) -> Array:
         """Return the network's free-running output."""
         output = np.empty((len(inputs), 1))
-        network.bind(self.step, network.initial_state(inputs[0]), inputs, output)()
+        network.bind(
+            self.step, network.initial_state(inputs[0], sample_time=self.step), inputs, output
+        )()
         return output[:, 0]
 
     def cost(self, outputs: list[Array]) -> float:

@@ -118,7 +118,7 @@ class ProcessModelEstimator(SeparableEstimator):
         if self.initial == "first_sample" and run.counts[0]:
             ones = np.ones(run.u.size)
             plain = replace(unit, input_offset=0.0)
-            at_zero = plain.initial_state(np.array([0.0])).tolist()
+            at_zero = plain.initial_state(np.array([0.0]), sample_time=run.sample_time).tolist()
             left = 1.0 - plain.simulate(ones, initial=at_zero, sample_time=run.sample_time)
             left /= left[0]
         known = responses - np.outer(left, responses[0])

@@ -266,7 +266,7 @@ def _warn_of_rounding(block: Block, sample_time: float | None) -> None:
 
 def _run(block: Block, inputs: np.ndarray, sample_time: float | None) -> np.ndarray:
     kind = inputs.dtype
-    state = block.initial_state(inputs[0].astype(np.float64)).astype(kind)
+    state = block.initial_state(inputs[0].astype(np.float64), sample_time=sample_time).astype(kind)
     outputs = np.empty((len(inputs), 1), dtype=kind)
     block.kernel.batch(block.coefficients(sample_time).astype(kind), state, inputs, outputs)
     return outputs.astype(np.float64)

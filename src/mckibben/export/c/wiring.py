@@ -85,7 +85,7 @@ class Wiring:
                 )
             state = step.state
             if state is None and not isinstance(part.start, str):
-                state = part.initial_state(np.zeros(len(part.inputs)))
+                state = part.initial_state(np.zeros(len(part.inputs)), sample_time=sample_time)
             self.clip_counts += [self.n_numbers + place for place in part.clip_counts]
             if state is not None:  # what was clipped before is not counted again
                 state = state.copy()

@@ -7,7 +7,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import Placed, balance_in
-from mckibben.blocks.fields import Channel, drives
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.running import run_many
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
@@ -19,9 +19,7 @@ Checked = list[tuple[Channel, Array, tuple[float, float]]]
 
 
 def known_ranges(model: Block) -> dict[str, tuple[float, float]]:
-    """Return the lowest and highest identified value of a model's inputs, by name.
-
-    Of a compensator also of the commands that it gives. Channels without a known range are absent.
+    """Return the lowest and highest identified value of a model's inputs, by name, where known.
 
     Examples
     --------
@@ -29,13 +27,9 @@ def known_ranges(model: Block) -> dict[str, tuple[float, float]]:
     >>> known_ranges(PI.example())
     {'pressure': (0.0, 5.0)}
     """
-    inputs = zip(model.inputs, model.known_inputs, strict=True)
-    commands = [
-        pair for pair in zip(model.outputs, model.known_outputs, strict=True) if drives(pair[0])
-    ]
     return {
         channel.name: (float(low), float(high))
-        for channel, (low, high) in (*commands, *inputs)
+        for channel, (low, high) in zip(model.inputs, model.known_inputs, strict=True)
         if np.isfinite([low, high]).all()
     }
 

@@ -26,7 +26,7 @@ from mckibben.blocks import saving
 from mckibben.blocks.fields import Channel, Initial, drives
 from mckibben.blocks.kernels import Step, in_scratch
 from mckibben.blocks.parameters import Parametrised, gathered
-from mckibben.blocks.ranges import SLOW_STEP, by_name, over_inputs
+from mckibben.blocks.ranges import SLOW_STEP, both_sides, by_name, over_inputs
 from mckibben.blocks.running import Stream, refuse_time, run_many
 from mckibben.blocks.starts import start_state
 from mckibben.errors import DataError, ModelError
@@ -203,10 +203,8 @@ class Block(DrawsItself, Parametrised):
 
         Infinite where none is known. Those of a compensator are outputs of the model that it inverts.
         """
-        forward = self._compensated
-        if forward is not None:
-            outputs, inputs = forward.known_outputs, forward.known_inputs
-            return by_name(self.inputs, [(forward.outputs, outputs), (forward.inputs, inputs)])
+        if self._of_model is not None:
+            return by_name(self.inputs, both_sides(self._of_model))
         parts: tuple[Block, ...] = getattr(self, "parts", ())
         found = by_name(self.inputs, self._known_of_parts())
         driven = found[: self.n_driven]
@@ -218,8 +216,8 @@ class Block(DrawsItself, Parametrised):
         return found
 
     @property
-    def _compensated(self) -> Block | None:
-        """The model whose compensator this is, from motion or force to pressure; None if it is none."""
+    def _of_model(self) -> Block | None:
+        """The model whose channels the block has in other roles; by default the compensated one."""
         compensates = self.inverts and drives(self.outputs[0]) and not drives(self.inputs[0])
         return self.forward_model if compensates else None
 
@@ -229,7 +227,12 @@ class Block(DrawsItself, Parametrised):
 
     @cached_property
     def known_outputs(self) -> Array:
-        """Lowest and highest output over the identified inputs, shape (n_outputs, 2)."""
+        """Lowest and highest output over the identified inputs, shape (n_outputs, 2).
+
+        Those of a compensator are identified inputs of the model that it inverts.
+        """
+        if self._of_model is not None:
+            return by_name(self.outputs, both_sides(self._of_model))
         return over_inputs(self, own_time(self) or SLOW_STEP)
 
     @property

@@ -521,12 +521,8 @@ class Block(DrawsItself, Parametrised):
     @property
     def clip_counts(self) -> tuple[int, ...]:
         """Places in the state that count samples that were clipped, or not solved."""
-        places: list[int] = []
-        first = 0
-        for part in getattr(self, "parts", ()):
-            places += (first + place for place in part.clip_counts)
-            first += part.n_states
-        return tuple(places)
+        shares = self.shares(np.arange(self.n_states, dtype=np.float64))
+        return tuple(int(own[place]) for part, own in shares for place in part.clip_counts)
 
     def n_clipped(self, state: Array) -> int:
         """Return the number of samples that were clipped, or not solved, from the final state."""

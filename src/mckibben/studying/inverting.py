@@ -18,6 +18,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import drives
 from mckibben.blocks.force.feedforward import compensator
+from mckibben.blocks.running import Stream
 from mckibben.comparison.choosing import acceptable, useful
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.splits import Split
@@ -234,13 +235,12 @@ def _check(
         warnings.simplefilter("ignore", ModelWarning)
         wanted = block.simulate(driven)
         asked = wanted.select([channel.name for channel in inverse.inputs])
-        commands = inverse.simulate(asked)
+        commands, kept = inverse.simulate(asked), _first_clipped(inverse, asked)
         again = driven.with_channels(**{name: commands[name] for name in given})
         found = block.simulate(again).matrix(outputs)
     reference = wanted.matrix(outputs)
     step, dead = space.sample_time, block.dead_time + inverse.dead_time
     late = 0 if step is None else round(dead / step)
-    kept = _first_clipped(inverse, asked)
     span = np.maximum(np.ptp(reference, axis=0), np.finfo(float).tiny)
     missed = np.abs(found[late:] - reference[: len(reference) - late]) / span
     return InverseCheck(
@@ -258,20 +258,12 @@ def _check(
 
 def _first_clipped(inverse: Block, asked: Recording) -> int:
     """Return the first sample of a motion at which a compensator clips; all if it never does."""
-    done, rest = 0, len(asked)
-    needed = asked.matrix([channel.name for channel in inverse.inputs])
-
-    def clips(n: int) -> bool:
-        state = inverse.start_on(asked)
-        inverse.bind(asked.sample_time, state, needed[:n], np.empty((n, len(inverse.outputs))))()
-        return inverse.n_clipped(state) > 0
-
-    if not clips(rest):
-        return rest
-    while rest - done > 1:
-        middle = (done + rest) // 2
-        done, rest = (done, middle) if clips(middle) else (middle, rest)
-    return done
+    stream = inverse.stream(asked.sample_time, initial=inverse.start_on(asked).tolist())
+    for place, row in enumerate(asked.matrix([channel.name for channel in inverse.inputs])):
+        stream.step(row)
+        if stream.status & Stream.CLIPPED:
+            return place
+    return len(asked)
 
 
 def _refuse_unrecorded(inverse: Block, split: Split) -> None:

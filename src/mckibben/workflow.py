@@ -340,8 +340,7 @@ def track(
     from mckibben.control import track as close
     from mckibben.control.identified import beyond_known
     from mckibben.control.preview import samples_ahead
-    from mckibben.control.roles import asked, offered
-    from mckibben.control.suiting import flatters_feedback, kind_of
+    from mckibben.control.roles import asked, flatters_feedback, kind_of, offered
     from mckibben.control.twin import COMMAND
     from mckibben.files import write
 

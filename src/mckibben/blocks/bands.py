@@ -200,7 +200,6 @@ class Banded(Composition):
     band: Annotated[InstanceOf[Band], BeforeValidator(nested)]
 
     path_dependent = same_as("forward.path_dependent")
-    sample_time = same_as("forward.sample_time")
     inputs = same_as("forward.inputs")
     scheduling = same_as("forward.scheduling")
     outputs = same_as("band.outputs")

@@ -233,7 +233,7 @@ class Block(DrawsItself, Parametrised):
         """
         if self._of_model is not None:
             return by_name(self.outputs, both_sides(self._of_model))
-        return over_inputs(self, own_time(self) or SLOW_STEP)
+        return over_inputs(self, self.sample_time or SLOW_STEP)
 
     @property
     def n_missable(self) -> int:
@@ -617,14 +617,6 @@ def needs_sample_time(kind: str, sample_time: float | None) -> float:
             remedy="read the recording with a column of times or `rate`, or give `sample_time`",
         )
     return sample_time
-
-
-def own_time(block: Block) -> float | None:
-    """Return the fixed sample time of a block or one of its parts [s]; None if it has none."""
-    if block.sample_time is not None:
-        return block.sample_time
-    steps = (own_time(part) for part in getattr(block, "parts", ()))
-    return next((step for step in steps if step is not None), None)
 
 
 def rate_filter(time_constant: float, step: float) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.blocks.base import Block, own_time
+from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.kernels import in_scratch
 from mckibben.blocks.laws import input_limits, wander
@@ -111,7 +111,7 @@ def c_files(
     """Return the files of `export_c`, text by path in the folder."""
     content = described(block, name=name, sample_time=sample_time, single=single)
     if serving is not None:
-        content |= served(block, content, serving, sample_time or own_time(block))
+        content |= served(block, content, serving, sample_time or block.sample_time)
     content |= vectors(block, content["sample_time"], single=single)
     return {
         **source_files(content),
@@ -280,7 +280,7 @@ def checked_sample_time(block: Block, sample_time: float | None) -> float | None
     ModelError
         If it is missing, not positive, or not the block's own.
     """
-    step = own_time(block) if sample_time is None and block.rate_dependent else sample_time
+    step = block.sample_time if sample_time is None and block.rate_dependent else sample_time
     possible = step is None or 0 < step <= LONGEST_STEP
     require(possible, "sample_time", step, f"a positive time, at most {LONGEST_STEP:g} s")
     if not block.rate_dependent:

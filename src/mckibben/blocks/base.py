@@ -205,11 +205,10 @@ class Block(DrawsItself, Parametrised):
         """
         if self._of_model is not None:
             return by_name(self.inputs, both_sides(self._of_model))
-        parts: tuple[Block, ...] = getattr(self, "parts", ())
         found = by_name(self.inputs, self._known_of_parts())
         driven = found[: self.n_driven]
-        if not parts and self.driven_range is not None:
-            driven[:] = self.driven_range
+        if hasattr(self, "input_range"):
+            driven[:] = self.input_limits
         if not np.isfinite(driven).any():
             with suppress(ModelError):
                 driven[:] = np.transpose(self.inverse().reachable())

@@ -366,13 +366,13 @@ def track(
     copied = ("approach", "settle", "noise", "delay", "slew", "seed")
     arguments: dict[str, Any] = {name: getattr(chosen, name) for name in copied}
     arguments["pressure_loop"] = chosen.pressure_loop and not commanded
+    ahead = preview_time(block) if chosen.preview is None else chosen.preview
     with telling(progress, f"{chosen.controller} on {plant.name}") as tell:
         taught = None
         tuned = cache(
             lambda: tune_pid(plant, sample_time=step, scheduled=held, references=block.inputs)
         )
         if chosen.repetitions:
-            ahead = preview_time(block) if chosen.preview is None else chosen.preview
             numbers = count(chosen.seed)  # noise differs between repetitions
 
             def repeat(corrected: Block) -> Recording:
@@ -389,11 +389,8 @@ def track(
             )
         law = control_law(chosen.controller, taught.best if taught else block, tuned)
         if controller_file is not None:
-            ahead = preview_time(block) if chosen.preview is None else chosen.preview
-            ahead += block.samples_ahead * step
-            if not isinstance(law, Block) or (
-                isinstance(law, FeedforwardFeedback) and ahead > step
-            ):
+            further = ahead + block.samples_ahead * step > step
+            if not isinstance(law, Block) or (isinstance(law, FeedforwardFeedback) and further):
                 raise ModelError(
                     f"{chosen.controller!r} cannot be saved as one block",
                     parameter="controller_out",

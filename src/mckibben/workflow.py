@@ -55,7 +55,7 @@ from mckibben.reading import (
     read_pair,
     read_sides,
 )
-from mckibben.recording import Recording
+from mckibben.recording import Recording, sample_time_of
 from mckibben.studying.results import Exported, Fit, Inverse, Price, Tracking
 from mckibben.system.progress import Tell, telling
 
@@ -359,7 +359,7 @@ def track(
     (run, *_) = read_files(reference, None, reading)
     wanted = asked(plant, run, block)
     BlockController(block).connect(offered(plant, wanted))  # before anything is tuned
-    step = wanted.sample_time or 0.02
+    step = sample_time_of(wanted, "be a reference")
     held = {name: float(wanted[name][0]) for name in plant.inputs if name in wanted}
     # commands are no pressures to be compared with what is measured
     commanded = any(channel.name.startswith(COMMAND) for channel in block.outputs)

@@ -191,12 +191,6 @@ class Block(DrawsItself, Parametrised):
         ends: tuple[float, float] | None = getattr(self, "input_range", None)
         return (-np.inf, np.inf) if ends is None else ends
 
-    @property
-    def driven_range(self) -> tuple[float, float] | None:
-        """Lowest and highest identified driven input; None if it is not known."""
-        parts: tuple[Block, ...] = getattr(self, "parts", ())
-        return parts[0].driven_range if parts else getattr(self, "input_range", None)
-
     @cached_property
     def known_inputs(self) -> Array:
         """Lowest and highest identified value of every input, shape (n_inputs, 2).

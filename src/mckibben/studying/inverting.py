@@ -104,11 +104,6 @@ class Compensation:
     static_error: float
     check: InverseCheck
 
-    @property
-    def given(self) -> str:
-        """Label of the compensator's outputs."""
-        return ", ".join(channel.name for channel in self.inverse.outputs)
-
     def to_dict(self) -> dict[str, Any]:
         """Return whose it is, and its errors."""
         return {

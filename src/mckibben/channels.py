@@ -39,6 +39,9 @@ DESIRED = ("reference_", "command_")
 SCHEDULES = ("pressure_extensor", "force", "torque")
 """Default scheduling channels."""
 
+PULLS = ("force", "torque")
+"""Outputs of muscles that are held."""
+
 LOADS = ("N", "N*m")
 """Units of loads on muscles or a joint, which are not scheduling inputs."""
 
@@ -146,6 +149,8 @@ def channels_of(
     if usual == FORCE:
         sides = sides[0], (FORCE,)
     elif inputs is None and outputs is None and load is None:
+        if pull := _pulls_held(recordings, sides):
+            return Channels(sides[0], pull, sides[1])
         sides = _over_held(recordings, sides)
     given = _named(recordings, inputs, sides[0])
     wanted = _named(recordings, outputs, sides[1])
@@ -275,6 +280,22 @@ def _only_schedules(recordings: Sequence[Recording], name: str) -> bool:
         and not held_at_levels(recordings, PRESSURE)
         and any_moves(recordings, (PRESSURE,))
     )
+
+
+def _pulls_held(recordings: Sequence[Recording], sides: Sides) -> tuple[str, ...]:
+    """Return the force or torque that the inputs drive, where the output is held at levels; or none."""
+    inputs, outputs = sides
+    free = [
+        name
+        for name in PULLS
+        if all(name in one for one in recordings)
+        and any_moves(recordings, (name,))
+        and not held_at_levels(recordings, name)
+    ]
+    there = all(name in one for one in recordings for name in (*inputs, *outputs))
+    held = there and all(held_at_levels(recordings, name) for name in outputs)
+    driven = held and any_moves(recordings, inputs)
+    return tuple(free[:1]) if driven else ()
 
 
 def _over_held(recordings: Sequence[Recording], sides: Sides) -> Sides:

@@ -314,7 +314,7 @@ def leaderboard(board: Leaderboard, keys: Sequence[str] = BOARD) -> list[Item]:
     items.append(Text(notes, "note", listed=True) if notes else None)
     failed = [f"{', '.join(some)}: failed, {reason}" for reason, some in board.failures.items()]
     items.append(Text(failed, "failed", listed=True) if failed else None)
-    if ranked:
+    if any(row is not board.constant for row in ranked):
         caption = "Test errors with 95 % intervals; strokes: on the data fitted; rings: validation."
         plots = [interactive.plots(model_subjects.leaderboard(board))]
         height = 4 + 1.4 * len(board.rows)

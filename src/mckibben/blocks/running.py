@@ -66,10 +66,13 @@ class Stream:
         self._one_given, self._one_gives = self._input.size == 1, self._output.size == 1
         self._bounds: list[tuple[float, float]] = [(a, b) for a, b in input_bounds(block).tolist()]
         self._counts, self._counted = block.clip_counts, _scalars(self.state)
-        self.reset()
+        self._begin()
 
     def reset(self) -> None:
         """Reset to the initial state."""
+        self._begin()
+
+    def _begin(self) -> None:
         self._started, self._clipped = False, 0.0
         self._last = [nan] * self._input.size
         self._kept: float | list[float] = 0.0

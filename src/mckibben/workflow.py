@@ -513,7 +513,7 @@ def _inverse(
             learned, rmse = trained_inverse(block, runs, chosen.seed, tell)
         return Inverse(learned, "learned", rmse=rmse)
     if chosen.predictive:
-        return Inverse(Predictive(block.inverse(), **chosen.of_predictive()), "predictive")
+        return Inverse(Predictive(made(block), **chosen.of_predictive()), "predictive")
     if chosen.wanted == "force":
         if all(channel.name.startswith("force") for channel in block.outputs):
             return Inverse(block, "itself")
@@ -525,7 +525,8 @@ def _inverse(
             return Inverse(block, "itself")
     kind = "adaptive" if chosen.adaptive else "inverse"
     time = 60.0 if chosen.time is None else chosen.time
-    inverse = adaptive(block, time, chosen.noise) if chosen.adaptive else made(block)
+    tested = made(block)
+    inverse = adaptive(block, time, chosen.noise) if chosen.adaptive else tested
     ends = [(float(low), float(high)) for low, high in zip(*block.reachable(), strict=True)]
     known = all(math.isfinite(end) for pair in ends for end in pair)
     names = [channel.name for channel in block.outputs]
@@ -647,7 +648,7 @@ def export(
     if target == "mjcf":
         return _export_mjcf(saved(model), out, chosen)
     block = saved(model, chosen.fields)
-    block = made(block) if chosen.inverse else block
+    block = made(block, chosen.sample_time) if chosen.inverse else block
     name = chosen.name or next(map(name_from, _paths(model)), "model")
     common = {"sample_time": chosen.sample_time, "force": chosen.force}
     tests: list[str | None] = [None, None]

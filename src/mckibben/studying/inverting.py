@@ -158,6 +158,11 @@ def _of_row(
     """Return the compensator of a row; raise a `ModelError` where it has no good one."""
     if not drives(compensator(block).outputs[0]):
         raise ModelError("its inverse gives no input of a muscle", remedy="invert another model")
+    if not np.isfinite(compensator(block).reachable()).all():
+        raise ModelError(
+            "it does not know the inputs that it was identified for, so its commands have no limits",
+            remedy="invert another model",
+        )
     if not useful(row.test_error, plain):
         raise ModelError(
             f"its error on the test, {row.test_error:.3g} {board.unit}, is not clearly below that of a "
@@ -208,15 +213,21 @@ def checked(
     return checks[0]
 
 
-def made(block: Block) -> Block:
+def made(block: Block, sample_time: float | None = None) -> Block:
     """Return the compensator of a model, tested within its identified inputs where it knows them.
+
+    Parameters
+    ----------
+    block : Block
+    sample_time : float, optional
+        At which it is tested [s]; default the model's own, or 20 ms.
 
     Raises
     ------
     ModelError
         As `checked`.
     """
-    space = None if block.inverts else RecordedInputs.known(block)
+    space = None if block.inverts else RecordedInputs.known(block, sample_time)
     return compensator(block) if space is None else checked(block, space).inverse
 
 

@@ -101,11 +101,12 @@ class RecordedInputs:
         )
 
     @classmethod
-    def known(cls, block: Block) -> Self | None:
+    def known(cls, block: Block, sample_time: float | None = None) -> Self | None:
         """Return the inputs that a model was identified for; None if it says none.
 
         They are in any combination, but along the drive of a balance that has one. Inputs whose range
-        is not known are 0. The fastest motion runs through the range in 100 samples of 20 ms.
+        is not known are 0. The fastest motion runs through the range in 100 samples; they are 20 ms
+        apart unless the model has a sample time of its own, or one is given [s].
         """
         ranges = known_ranges(block)
         if not any(channel.name in ranges for channel in block.inputs):
@@ -113,6 +114,7 @@ class RecordedInputs:
         names = tuple(channel.name for channel in block.inputs)
         units = {channel.name: channel.unit for channel in block.inputs}
         ends = np.array([ranges.get(name, (0.0, 0.0)) for name in names]).T
+        step = sample_time or block.sample_time or STEP
         middle, scale = ends.mean(axis=0), np.where(ends[1] > ends[0], ends[1] - ends[0], 1.0)
         directions, extent = np.eye(len(names)), (ends - middle) / scale
         placed = balance_in(block)
@@ -123,7 +125,7 @@ class RecordedInputs:
             reach = EVEN * np.sqrt(((own.T @ ways) ** 2).sum(axis=1))
             directions[:n, :n] = own
             extent[:, :n] = (drive[:, 0] - middle[:n]) / scale[:n] @ own + [-reach, reach]
-        return cls(names, units, middle, scale, directions, extent, ends, SAMPLES, STEP)
+        return cls(names, units, middle, scale, directions, extent, ends, SAMPLES, step)
 
     def motion(self, slowness: float, seed: int) -> Recording:
         """Return a random motion, so many times slower than the fastest recorded."""

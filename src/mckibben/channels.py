@@ -344,6 +344,9 @@ def _called(channels: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
             numbered = [name for name in channels if name in (*plain, *numbered)]
         begun = [name for name in channels if len(word) > 1 and name.startswith(f"{word}_")]
         several = numbered or (placed if len(placed) > 1 and not plain else [])
+        if begun and not (several or plain):  # command_pressure_1, command_pressure_2
+            stem = re.escape(re.sub(r"_\d+$", "", begun[0]))
+            several = [name for name in begun if re.fullmatch(rf"{stem}_\d+", name)]
         if found := several or (plain or begun)[:1]:
             return tuple(found)
     return ()

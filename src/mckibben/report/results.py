@@ -339,7 +339,7 @@ def study(found: Study) -> list[Item]:
     """Return the leaderboard, the three answers, further tiles, and loops."""
     said = [f"{question} {answer}" for question, answer in words.answers(found)]
     said += [f"{one.label}: {one.value}, {one.note}".rstrip(", ") for one in tiles(found)]
-    said += [*words.passed_over(found), *filter(None, [words.not_looped(found)])]
+    said += [*words.compensated(found), *filter(None, [words.not_looped(found)])]
     closed = loops(found.loops) if found.loops else []
     return [*leaderboard(found.leaderboard), Text(said), *closed]
 

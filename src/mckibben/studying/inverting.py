@@ -22,6 +22,7 @@ from mckibben.blocks.running import Stream
 from mckibben.comparison.choosing import acceptable, useful
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.splits import Split
+from mckibben.control.twin import COMMAND
 from mckibben.errors import MckibbenError, ModelError, ModelWarning
 from mckibben.recording import Recording
 from mckibben.studying.recorded_inputs import RecordedInputs
@@ -94,6 +95,9 @@ class Compensation:
         Error of a static map on the same test; see `static_error`.
     check : InverseCheck
         Of the inverse on its own model.
+    commands : tuple of str
+        Recorded commands that are not the model's inputs: what lies between them and these, such as the
+        lag of a regulator, is not in the error.
     """
 
     model: str
@@ -103,6 +107,7 @@ class Compensation:
     following_interval: tuple[float, float] | None
     static_error: float
     check: InverseCheck
+    commands: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Return whose it is, and its errors."""
@@ -113,6 +118,7 @@ class Compensation:
             "following_interval": self.following_interval and list(self.following_interval),
             "static_map_error": self.static_error,
             "inverse_error": self.check.error,
+            "commands": list(self.commands),
         }
 
 
@@ -180,6 +186,9 @@ def _of_row(
         row.rmse_interval,
         plain,
         check,
+        tuple(
+            c for c in split.train[0].channels if c.startswith(COMMAND) and c not in board.inputs
+        ),
     )
 
 

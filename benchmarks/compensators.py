@@ -24,7 +24,7 @@ from tests.plants import PLANTS, Plant
 from mckibben import Recording, study
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.studying.static_map import polynomial
+from mckibben.studying.static_map import static_map
 from mckibben.studying.study import Study
 
 LIKELY = (0.6, 1.6)
@@ -38,11 +38,11 @@ Law = Callable[[Recording], Array]
 def static_law(plant: Plant) -> Law:
     """Return pressures as a polynomial of outputs and loads, least squares on the training runs."""
     names = plant.bench.outputs + plant.bench.loads
-    given = np.concatenate([run.matrix(names) for run in plant.train])
-    wanted = np.concatenate([run.matrix(plant.bench.pressures) for run in plant.train])
-    terms, ends = polynomial(given), (wanted.min(axis=0), wanted.max(axis=0))
-    weights = np.linalg.lstsq(terms(given), wanted, rcond=1e-9)[0]
-    return lambda desired: np.clip(terms(desired.matrix(names)) @ weights, *ends)
+    given = [run.matrix(names) for run in plant.train]
+    wanted = [run.matrix(plant.bench.pressures) for run in plant.train]
+    found, every = static_map(given, wanted), np.concatenate(wanted)
+    ends = every.min(axis=0), every.max(axis=0)
+    return lambda desired: np.clip(found(desired.matrix(names)), *ends)
 
 
 def inverse_law(plant: Plant, inverse: Block) -> Law:

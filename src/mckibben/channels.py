@@ -39,6 +39,9 @@ DESIRED = ("reference_", "command_")
 SCHEDULES = ("pressure_extensor", "force", "torque")
 """Default scheduling channels."""
 
+PULLS = ("force", "torque")
+"""Outputs of muscles that are held."""
+
 LOADS = ("N", "N*m")
 """Units of loads on muscles or a joint, which are not scheduling inputs."""
 
@@ -146,6 +149,8 @@ def channels_of(
     if usual == FORCE:
         sides = sides[0], (FORCE,)
     elif inputs is None and outputs is None and load is None:
+        if pull := _pulls_held(recordings, sides):
+            return Channels(sides[0], pull, sides[1])
         sides = _over_held(recordings, sides)
     given = _named(recordings, inputs, sides[0])
     wanted = _named(recordings, outputs, sides[1])
@@ -277,6 +282,22 @@ def _only_schedules(recordings: Sequence[Recording], name: str) -> bool:
     )
 
 
+def _pulls_held(recordings: Sequence[Recording], sides: Sides) -> tuple[str, ...]:
+    """Return the force or torque that the inputs drive, where the output is held at levels; or none."""
+    inputs, outputs = sides
+    free = [
+        name
+        for name in PULLS
+        if all(name in one for one in recordings)
+        and any_moves(recordings, (name,))
+        and not held_at_levels(recordings, name)
+    ]
+    there = all(name in one for one in recordings for name in (*inputs, *outputs))
+    held = there and all(held_at_levels(recordings, name) for name in outputs)
+    driven = held and any_moves(recordings, inputs)
+    return tuple(free[:1]) if driven else ()
+
+
 def _over_held(recordings: Sequence[Recording], sides: Sides) -> Sides:
     """Return force instead of the output, if that is held in all recordings and the force is not."""
     outputs = sides[1]
@@ -323,6 +344,9 @@ def _called(channels: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
             numbered = [name for name in channels if name in (*plain, *numbered)]
         begun = [name for name in channels if len(word) > 1 and name.startswith(f"{word}_")]
         several = numbered or (placed if len(placed) > 1 and not plain else [])
+        if begun and not (several or plain):  # command_pressure_1, command_pressure_2
+            stem = re.escape(re.sub(r"_\d+$", "", begun[0]))
+            several = [name for name in begun if re.fullmatch(rf"{stem}_\d+", name)]
         if found := several or (plain or begun)[:1]:
             return tuple(found)
     return ()

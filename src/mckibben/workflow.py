@@ -55,7 +55,7 @@ from mckibben.reading import (
     read_pair,
     read_sides,
 )
-from mckibben.recording import Recording
+from mckibben.recording import Recording, sample_time_of
 from mckibben.studying.results import Exported, Fit, Inverse, Price, Tracking
 from mckibben.system.progress import Tell, telling
 
@@ -340,8 +340,7 @@ def track(
     from mckibben.control import track as close
     from mckibben.control.identified import beyond_known
     from mckibben.control.preview import samples_ahead
-    from mckibben.control.roles import asked, offered
-    from mckibben.control.suiting import flatters_feedback, kind_of
+    from mckibben.control.roles import asked, flatters_feedback, kind_of, offered
     from mckibben.control.twin import COMMAND
     from mckibben.files import write
 
@@ -360,20 +359,20 @@ def track(
     (run, *_) = read_files(reference, None, reading)
     wanted = asked(plant, run, block)
     BlockController(block).connect(offered(plant, wanted))  # before anything is tuned
-    step = wanted.sample_time or 0.02
+    step = sample_time_of(wanted, "be a reference")
     held = {name: float(wanted[name][0]) for name in plant.inputs if name in wanted}
     # commands are no pressures to be compared with what is measured
     commanded = any(channel.name.startswith(COMMAND) for channel in block.outputs)
     copied = ("approach", "settle", "noise", "delay", "slew", "seed")
     arguments: dict[str, Any] = {name: getattr(chosen, name) for name in copied}
     arguments["pressure_loop"] = chosen.pressure_loop and not commanded
+    ahead = preview_time(block) if chosen.preview is None else chosen.preview
     with telling(progress, f"{chosen.controller} on {plant.name}") as tell:
         taught = None
         tuned = cache(
             lambda: tune_pid(plant, sample_time=step, scheduled=held, references=block.inputs)
         )
         if chosen.repetitions:
-            ahead = preview_time(block) if chosen.preview is None else chosen.preview
             numbers = count(chosen.seed)  # noise differs between repetitions
 
             def repeat(corrected: Block) -> Recording:
@@ -390,11 +389,8 @@ def track(
             )
         law = control_law(chosen.controller, taught.best if taught else block, tuned)
         if controller_file is not None:
-            ahead = preview_time(block) if chosen.preview is None else chosen.preview
-            ahead += block.samples_ahead * step
-            if not isinstance(law, Block) or (
-                isinstance(law, FeedforwardFeedback) and ahead > step
-            ):
+            further = ahead + block.samples_ahead * step > step
+            if not isinstance(law, Block) or (isinstance(law, FeedforwardFeedback) and further):
                 raise ModelError(
                     f"{chosen.controller!r} cannot be saved as one block",
                     parameter="controller_out",
@@ -517,7 +513,7 @@ def _inverse(
             learned, rmse = trained_inverse(block, runs, chosen.seed, tell)
         return Inverse(learned, "learned", rmse=rmse)
     if chosen.predictive:
-        return Inverse(Predictive(block.inverse(), **chosen.of_predictive()), "predictive")
+        return Inverse(Predictive(made(block), **chosen.of_predictive()), "predictive")
     if chosen.wanted == "force":
         if all(channel.name.startswith("force") for channel in block.outputs):
             return Inverse(block, "itself")
@@ -529,7 +525,8 @@ def _inverse(
             return Inverse(block, "itself")
     kind = "adaptive" if chosen.adaptive else "inverse"
     time = 60.0 if chosen.time is None else chosen.time
-    inverse = adaptive(block, time, chosen.noise) if chosen.adaptive else made(block)
+    tested = made(block)
+    inverse = adaptive(block, time, chosen.noise) if chosen.adaptive else tested
     ends = [(float(low), float(high)) for low, high in zip(*block.reachable(), strict=True)]
     known = all(math.isfinite(end) for pair in ends for end in pair)
     names = [channel.name for channel in block.outputs]
@@ -651,7 +648,7 @@ def export(
     if target == "mjcf":
         return _export_mjcf(saved(model), out, chosen)
     block = saved(model, chosen.fields)
-    block = made(block) if chosen.inverse else block
+    block = made(block, chosen.sample_time) if chosen.inverse else block
     name = chosen.name or next(map(name_from, _paths(model)), "model")
     common = {"sample_time": chosen.sample_time, "force": chosen.force}
     tests: list[str | None] = [None, None]

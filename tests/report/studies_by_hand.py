@@ -157,7 +157,7 @@ def compensated(row: Row, recording: Recording) -> Compensation:
     space = RecordedInputs.of([recording], [channel.name for channel in row.block.inputs])
     check = checked(row.block, space, model=row.model)
     error, ends = row.test_error, row.rmse_interval
-    return Compensation(row.model, check.inverse, "mm", error, ends, 10 * error, check)
+    return Compensation(row.model, check.inverse, "mm", error, ends, 10 * error, check, ())
 
 
 def renamed(block: Block, names: tuple[str, str]) -> Block:

@@ -182,6 +182,7 @@ class Adaptive(Block):
     path_dependent = same_as("fixed.path_dependent")
     outputs = same_as("fixed.outputs")
     reachable = same_as("fixed.reachable")
+    sample_time = same_as("forward.sample_time")
     forward_model = same_as("forward")
 
     def __post_init__(self) -> None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -24,7 +23,6 @@ from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Rows, Vec
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
-from mckibben.blocks.ranges import by_name
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError, require
 from mckibben.numerals import numeral
@@ -200,7 +198,6 @@ class Banded(Composition):
     band: Annotated[InstanceOf[Band], BeforeValidator(nested)]
 
     path_dependent = same_as("forward.path_dependent")
-    sample_time = same_as("forward.sample_time")
     inputs = same_as("forward.inputs")
     scheduling = same_as("forward.scheduling")
     outputs = same_as("band.outputs")
@@ -226,14 +223,10 @@ class Banded(Composition):
     def parts(self) -> tuple[Block, ...]:  # type: ignore[override]
         return (self.forward, self.band)
 
-    @cached_property
-    def known_inputs(self) -> Array:
-        """Those of the model, else those of its calibration."""
-        forward, ends = self.forward, np.transpose(self.band.ends)
-        calibrated = ends[: len(forward.inputs)]
-        return by_name(
-            self.inputs, [(forward.inputs, forward.known_inputs), (forward.inputs, calibrated)]
-        )
+    def _known_of_parts(self) -> list[tuple[tuple[Channel, ...], Array]]:
+        """Return inputs with the ranges of the model, then with those of the calibration."""
+        forward, calibrated = self.forward, np.transpose(self.band.ends)[: len(self.inputs)]
+        return [(forward.inputs, forward.known_inputs), (forward.inputs, calibrated)]
 
     def initial_state(
         self, first: Array, initial: Initial | None = None, sample_time: float | None = None

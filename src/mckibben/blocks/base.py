@@ -26,7 +26,7 @@ from mckibben.blocks import saving
 from mckibben.blocks.fields import Channel, Initial, drives
 from mckibben.blocks.kernels import Step, in_scratch
 from mckibben.blocks.parameters import Parametrised, gathered
-from mckibben.blocks.ranges import SLOW_STEP, by_name, over_inputs
+from mckibben.blocks.ranges import SLOW_STEP, both_sides, by_name, over_inputs
 from mckibben.blocks.running import Stream, refuse_time, run_many
 from mckibben.blocks.starts import start_state
 from mckibben.errors import DataError, ModelError
@@ -191,35 +191,26 @@ class Block(DrawsItself, Parametrised):
         ends: tuple[float, float] | None = getattr(self, "input_range", None)
         return (-np.inf, np.inf) if ends is None else ends
 
-    @property
-    def driven_range(self) -> tuple[float, float] | None:
-        """Lowest and highest identified driven input; None if it is not known."""
-        parts: tuple[Block, ...] = getattr(self, "parts", ())
-        return parts[0].driven_range if parts else getattr(self, "input_range", None)
-
     @cached_property
     def known_inputs(self) -> Array:
         """Lowest and highest identified value of every input, shape (n_inputs, 2).
 
         Infinite where none is known. Those of a compensator are outputs of the model that it inverts.
         """
-        forward = self._compensated
-        if forward is not None:
-            outputs, inputs = forward.known_outputs, forward.known_inputs
-            return by_name(self.inputs, [(forward.outputs, outputs), (forward.inputs, inputs)])
-        parts: tuple[Block, ...] = getattr(self, "parts", ())
+        if self._of_model is not None:
+            return by_name(self.inputs, both_sides(self._of_model))
         found = by_name(self.inputs, self._known_of_parts())
         driven = found[: self.n_driven]
-        if not parts and self.driven_range is not None:
-            driven[:] = self.driven_range
+        if hasattr(self, "input_range"):
+            driven[:] = self.input_limits
         if not np.isfinite(driven).any():
             with suppress(ModelError):
                 driven[:] = np.transpose(self.inverse().reachable())
         return found
 
     @property
-    def _compensated(self) -> Block | None:
-        """The model whose compensator this is, from motion or force to pressure; None if it is none."""
+    def _of_model(self) -> Block | None:
+        """The model whose channels the block has in other roles; by default the compensated one."""
         compensates = self.inverts and drives(self.outputs[0]) and not drives(self.inputs[0])
         return self.forward_model if compensates else None
 
@@ -229,8 +220,13 @@ class Block(DrawsItself, Parametrised):
 
     @cached_property
     def known_outputs(self) -> Array:
-        """Lowest and highest output over the identified inputs, shape (n_outputs, 2)."""
-        return over_inputs(self, own_time(self) or SLOW_STEP)
+        """Lowest and highest output over the identified inputs, shape (n_outputs, 2).
+
+        Those of a compensator are identified inputs of the model that it inverts.
+        """
+        if self._of_model is not None:
+            return by_name(self.outputs, both_sides(self._of_model))
+        return over_inputs(self, self.sample_time or SLOW_STEP)
 
     @property
     def n_missable(self) -> int:
@@ -520,12 +516,8 @@ class Block(DrawsItself, Parametrised):
     @property
     def clip_counts(self) -> tuple[int, ...]:
         """Places in the state that count samples that were clipped, or not solved."""
-        places: list[int] = []
-        first = 0
-        for part in getattr(self, "parts", ()):
-            places += (first + place for place in part.clip_counts)
-            first += part.n_states
-        return tuple(places)
+        shares = self.shares(np.arange(self.n_states, dtype=np.float64))
+        return tuple(int(own[place]) for part, own in shares for place in part.clip_counts)
 
     def n_clipped(self, state: Array) -> int:
         """Return the number of samples that were clipped, or not solved, from the final state."""
@@ -620,14 +612,6 @@ def needs_sample_time(kind: str, sample_time: float | None) -> float:
             remedy="read the recording with a column of times or `rate`, or give `sample_time`",
         )
     return sample_time
-
-
-def own_time(block: Block) -> float | None:
-    """Return the fixed sample time of a block or one of its parts [s]; None if it has none."""
-    if block.sample_time is not None:
-        return block.sample_time
-    steps = (own_time(part) for part in getattr(block, "parts", ()))
-    return next((step for step in steps if step is not None), None)
 
 
 def rate_filter(time_constant: float, step: float) -> tuple[float, float]:

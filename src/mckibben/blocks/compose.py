@@ -198,6 +198,11 @@ class Composition(Block):
     def dead_time(self) -> float:  # type: ignore[override]
         return type(self).together(part.dead_time for part in self.parts)
 
+    @property
+    def sample_time(self) -> float | None:  # type: ignore[override]
+        """The first fixed sample time of a part [s]; None if none has one."""
+        return next((part.sample_time for part in self.parts if part.sample_time), None)
+
     def check_parts(self) -> None:
         """Raise an error for no parts."""
         if not self.parts:

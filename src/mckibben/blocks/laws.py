@@ -164,6 +164,14 @@ def input_limits(block: Block) -> tuple[Array, Array]:
     return narrowed(lowest, highest)
 
 
+def identified_limits(block: Block) -> tuple[Array, Array]:
+    """Return the ends of every input's identified range, without margins, else its test values."""
+    with np.errstate(invalid="ignore"):
+        ends = narrowed(*block.known_inputs.T)
+    lowest, highest = np.where(np.isfinite(ends).all(axis=0), ends, input_limits(block))
+    return lowest, highest
+
+
 def narrowed(lowest: Array, highest: Array) -> tuple[Array, Array]:
     """Return a range without its margins."""
     margin = MARGIN * (highest - lowest)

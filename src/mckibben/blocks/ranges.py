@@ -52,6 +52,11 @@ def by_name(
     return found
 
 
+def both_sides(block: Block) -> list[tuple[tuple[Channel, ...], Array]]:
+    """Return the outputs and the inputs of a block with their identified ranges."""
+    return [(block.outputs, block.known_outputs), (block.inputs, block.known_inputs)]
+
+
 def over_inputs(block: Block, sample_time: float) -> Array:
     """Return the range of outputs over the identified inputs, shape (n_outputs, 2).
 

@@ -137,7 +137,10 @@ def _excursion(block: Block, inputs: Array, outputs: Array, sample_time: float |
     none explains the outputs, it is the end that explains them better.
     """
     first, given = inputs[0], inputs[:, 0]
-    low, high = block.driven_range or (first[0], first[0])
+    driven = block
+    while parts := getattr(driven, "parts", ()):
+        driven = parts[0]
+    low, high = getattr(driven, "input_range", None) or (first[0], first[0])
     low, high = min(low, float(given.min())), max(high, float(given.max()))
     held = np.tile(first, (SETTLING if block.rate_dependent else 0, 1))
 

@@ -37,7 +37,6 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.repetition import Repetition
 from mckibben.control.connecting import find
-from mckibben.control.loop import ends
 from mckibben.errors import DataError, require
 from mckibben.recording import Recording, sample_time_of
 
@@ -187,10 +186,11 @@ def learned(
     desired, measured = (_outputs(compensator, runs, prefix) for prefix in (DESIRED, ""))
     if not np.array_equal(desired, np.broadcast_to(desired[0], desired.shape)):
         raise DataError("repetitions have different references", remedy="repeat one motion")
-    reached = ends(compensator.forward_model, channels, runs[0].rest_length)
     lessons = [
-        _Lesson.of(desired[0, :, k], measured[:, :, k], reached.get(channel.name), settle, repeats)
-        for k, channel in enumerate(channels)
+        _Lesson.of(
+            desired[0, :, k], measured[:, :, k], compensator.known_inputs[k], settle, repeats
+        )
+        for k in range(len(channels))
     ]
     errors = np.array([lesson.errors for lesson in lessons])
     floor = np.maximum(errors[:, :1], np.finfo(float).tiny)
@@ -257,12 +257,15 @@ class _Lesson:
         cls,
         desired: Array,
         measured: Array,
-        reached: tuple[float, float] | None,
+        identified: Array,
         settle: int,
         repeats: bool,
     ) -> _Lesson:
-        """Return it, from the desired output, (n,), and the measured ones, (n_runs, n)."""
-        lowest, highest = (-np.inf, np.inf) if reached is None else reached
+        """Return it, from the desired output, (n,), and the measured ones, (n_runs, n).
+
+        What the compensator is asked for stays between the ends that its model was ``identified`` for.
+        """
+        lowest, highest = identified
         low, high = np.minimum(lowest - desired, 0.0), np.maximum(highest - desired, 0.0)
         delay = _delay(desired, measured[0])
         cutoff, expected = _cutoff(desired, _earlier(desired - measured[0], delay, repeats))

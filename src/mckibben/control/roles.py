@@ -1,13 +1,14 @@
-"""Roles of a plant's channels, by name: driven, followed, or held."""
+"""Kinds of plants, and roles of their channels, by name: driven, followed, or held."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
+from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import COMMANDS, Channel
 from mckibben.control.connecting import Offer, find
@@ -20,6 +21,9 @@ MOVED = ("displacement", "angle")
 
 NOISE = 0.01
 """Share of a rig's range by which a constant input may exceed it, for sensor noise."""
+
+Kind = Literal["rig", "same model", "another model"]
+"""A virtual rig; the model that a compensator inverts; or another model."""
 
 
 class Plant(Protocol):
@@ -48,6 +52,23 @@ class Plant(Protocol):
 
     def changed(self, settings: Mapping[str, Any]) -> Any:
         """Return the same plant with other settings."""
+
+
+def kind_of(plant: Plant, compensator: Block) -> Kind:
+    """Return what kind of plant a compensator is tested on.
+
+    Errors on the same model come from limits, rates and rounding alone, whatever the muscle does.
+    """
+    if not isinstance(plant, Twin):
+        return "rig"
+    model = compensator.forward_model
+    same = model is not None and inside(model).to_dict() == plant.forward.to_dict()
+    return "same model" if same else "another model"
+
+
+def flatters_feedback(plant: Plant, law: str) -> bool:
+    """Return whether feedback performs better on a plant than on a muscle: it responds at once."""
+    return isinstance(plant, Twin) and law != "feedforward" and not plant.forward.rate_dependent
 
 
 def rest_length_of(plant: Plant) -> float | None:

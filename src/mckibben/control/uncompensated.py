@@ -19,7 +19,7 @@ from mckibben.control.controller import Ahead, Controller
 from mckibben.control.loop import Tracked, track
 from mckibben.control.roles import Plant, asked, followed_by, roles
 from mckibben.errors import MckibbenError, ModelError
-from mckibben.recording import Recording
+from mckibben.recording import Recording, sample_time_of
 
 UNCOMPENSATED = "no compensation"
 """Label of that loop in tables and figures."""
@@ -102,7 +102,7 @@ def slow_rise(
     low, high = _limits(plant, driven)
     if only is not None:
         high = np.where([name == only for name in driven], high, low)
-    steps = round(RISE / (reference.sample_time or 1.0))
+    steps = round(RISE / sample_time_of(reference, "be a reference"))
     first = {name: np.full(steps + 2, reference[name][0]) for name in (*followed, *held)}
     shares = np.minimum(np.arange(steps + 2) / steps, 1.0)
     rise = low + shares[:, np.newaxis] * (high - low)

@@ -149,7 +149,7 @@ def _checks(study: Study, view: _View) -> Section | None:
     if isinstance(study.check, Validation):
         for one in study.check.outputs[:MOST_CHECKED]:
             items += results.checked(one)
-    if said := words.passed_over(study):
+    if said := words.compensated(study):
         items.append(Text(said, "note", listed=True))
     if study.inverse is not None:
         drawing = model_subjects.inverse_check(study.inverse.check)

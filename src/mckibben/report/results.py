@@ -314,7 +314,7 @@ def leaderboard(board: Leaderboard, keys: Sequence[str] = BOARD) -> list[Item]:
     items.append(Text(notes, "note", listed=True) if notes else None)
     failed = [f"{', '.join(some)}: failed, {reason}" for reason, some in board.failures.items()]
     items.append(Text(failed, "failed", listed=True) if failed else None)
-    if ranked:
+    if any(row is not board.constant for row in ranked):
         caption = "Test errors with 95 % intervals; strokes: on the data fitted; rings: validation."
         plots = [interactive.plots(model_subjects.leaderboard(board))]
         height = 4 + 1.4 * len(board.rows)
@@ -339,7 +339,7 @@ def study(found: Study) -> list[Item]:
     """Return the leaderboard, the three answers, further tiles, and loops."""
     said = [f"{question} {answer}" for question, answer in words.answers(found)]
     said += [f"{one.label}: {one.value}, {one.note}".rstrip(", ") for one in tiles(found)]
-    said += [*words.passed_over(found), *filter(None, [words.not_looped(found)])]
+    said += [*words.compensated(found), *filter(None, [words.not_looped(found)])]
     closed = loops(found.loops) if found.loops else []
     return [*leaderboard(found.leaderboard), Text(said), *closed]
 

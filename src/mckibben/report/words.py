@@ -556,9 +556,21 @@ def _record_next(study: Study) -> str:
     return f"{gap_run(first, ranges=False)[:-1]}: {gap_name(first)} cannot be identified{more}."
 
 
-def passed_over(study: Study) -> list[str]:
-    """Return which better models have no compensator, and why."""
-    return [f"No compensator of {model}: {why}" for model, why in study.passed_over.items()]
+def compensated(study: Study) -> list[str]:
+    """Return which better models have no compensator and why, and what an error leaves out."""
+    said = [f"No compensator of {model}: {why}" for model, why in study.passed_over.items()]
+    return [*said, *_left_out(study.inverse.commands if study.inverse is not None else ())]
+
+
+def _left_out(commands: Sequence[str]) -> list[str]:
+    """Return what the expected error of following does not include."""
+    if not commands:
+        return []
+    names = ", ".join(commands)
+    return [
+        f"The expected error leaves out what lies between {names} and the measured input, such as the "
+        "lag of a regulator: to include it, choose the command as input."
+    ]
 
 
 def expected(found: Mapping[str, Any]) -> str:
@@ -566,7 +578,8 @@ def expected(found: Mapping[str, Any]) -> str:
     unit, ends = found["unit"], found["following_interval"]
     interval = f" (95 %: {numeral(ends[0], 2)} to {numeral(ends[1], 2)})" if ends else ""
     error, plain = (size(unit, found[key]) for key in ("following_error", "static_map_error"))
-    return f"Expected RMSE of following: {error}{interval}; a static map: {plain}."
+    said = f"Expected RMSE of following: {error}{interval}; a static map: {plain}."
+    return " ".join([said, *_left_out(found["commands"])])
 
 
 def not_looped(study: Study) -> str:

@@ -18,9 +18,11 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import drives
 from mckibben.blocks.force.feedforward import compensator
+from mckibben.blocks.running import Stream
 from mckibben.comparison.choosing import acceptable, useful
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.splits import Split
+from mckibben.control.twin import COMMAND
 from mckibben.errors import MckibbenError, ModelError, ModelWarning
 from mckibben.recording import Recording
 from mckibben.studying.recorded_inputs import RecordedInputs
@@ -93,6 +95,9 @@ class Compensation:
         Error of a static map on the same test; see `static_error`.
     check : InverseCheck
         Of the inverse on its own model.
+    commands : tuple of str
+        Recorded commands that are not the model's inputs: what lies between them and these, such as the
+        lag of a regulator, is not in the error.
     """
 
     model: str
@@ -102,11 +107,7 @@ class Compensation:
     following_interval: tuple[float, float] | None
     static_error: float
     check: InverseCheck
-
-    @property
-    def given(self) -> str:
-        """Label of the compensator's outputs."""
-        return ", ".join(channel.name for channel in self.inverse.outputs)
+    commands: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Return whose it is, and its errors."""
@@ -117,6 +118,7 @@ class Compensation:
             "following_interval": self.following_interval and list(self.following_interval),
             "static_map_error": self.static_error,
             "inverse_error": self.check.error,
+            "commands": list(self.commands),
         }
 
 
@@ -162,6 +164,11 @@ def _of_row(
     """Return the compensator of a row; raise a `ModelError` where it has no good one."""
     if not drives(compensator(block).outputs[0]):
         raise ModelError("its inverse gives no input of a muscle", remedy="invert another model")
+    if not np.isfinite(compensator(block).reachable()).all():
+        raise ModelError(
+            "it does not know the inputs that it was identified for, so its commands have no limits",
+            remedy="invert another model",
+        )
     if not useful(row.test_error, plain):
         raise ModelError(
             f"its error on the test, {row.test_error:.3g} {board.unit}, is not clearly below that of a "
@@ -179,6 +186,9 @@ def _of_row(
         row.rmse_interval,
         plain,
         check,
+        tuple(
+            c for c in split.train[0].channels if c.startswith(COMMAND) and c not in board.inputs
+        ),
     )
 
 
@@ -212,15 +222,21 @@ def checked(
     return checks[0]
 
 
-def made(block: Block) -> Block:
+def made(block: Block, sample_time: float | None = None) -> Block:
     """Return the compensator of a model, tested within its identified inputs where it knows them.
+
+    Parameters
+    ----------
+    block : Block
+    sample_time : float, optional
+        At which it is tested [s]; default the model's own, or 20 ms.
 
     Raises
     ------
     ModelError
         As `checked`.
     """
-    space = None if block.inverts else RecordedInputs.known(block)
+    space = None if block.inverts else RecordedInputs.known(block, sample_time)
     return compensator(block) if space is None else checked(block, space).inverse
 
 
@@ -234,13 +250,12 @@ def _check(
         warnings.simplefilter("ignore", ModelWarning)
         wanted = block.simulate(driven)
         asked = wanted.select([channel.name for channel in inverse.inputs])
-        commands = inverse.simulate(asked)
+        commands, kept = inverse.simulate(asked), _first_clipped(inverse, asked)
         again = driven.with_channels(**{name: commands[name] for name in given})
         found = block.simulate(again).matrix(outputs)
     reference = wanted.matrix(outputs)
     step, dead = space.sample_time, block.dead_time + inverse.dead_time
     late = 0 if step is None else round(dead / step)
-    kept = _first_clipped(inverse, asked)
     span = np.maximum(np.ptp(reference, axis=0), np.finfo(float).tiny)
     missed = np.abs(found[late:] - reference[: len(reference) - late]) / span
     return InverseCheck(
@@ -258,20 +273,12 @@ def _check(
 
 def _first_clipped(inverse: Block, asked: Recording) -> int:
     """Return the first sample of a motion at which a compensator clips; all if it never does."""
-    done, rest = 0, len(asked)
-    needed = asked.matrix([channel.name for channel in inverse.inputs])
-
-    def clips(n: int) -> bool:
-        state = inverse.start_on(asked)
-        inverse.bind(asked.sample_time, state, needed[:n], np.empty((n, len(inverse.outputs))))()
-        return inverse.n_clipped(state) > 0
-
-    if not clips(rest):
-        return rest
-    while rest - done > 1:
-        middle = (done + rest) // 2
-        done, rest = (done, middle) if clips(middle) else (middle, rest)
-    return done
+    stream = inverse.stream(asked.sample_time, initial=inverse.start_on(asked).tolist())
+    for place, row in enumerate(asked.matrix([channel.name for channel in inverse.inputs])):
+        stream.step(row)
+        if stream.status & Stream.CLIPPED:
+            return place
+    return len(asked)
 
 
 def _refuse_unrecorded(inverse: Block, split: Split) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -72,7 +72,8 @@ class RecordedInputs:
     @classmethod
     def of(cls, recordings: Sequence[Recording], names: Sequence[str]) -> Self:
         """Return the inputs of recordings."""
-        tables = [recording.with_derived(names).matrix(names) for recording in recordings]
+        derived = [recording.with_derived(names) for recording in recordings]
+        tables = [recording.matrix(names) for recording in derived]
         every = np.concatenate(tables)
         low, high = every.min(axis=0), every.max(axis=0)
         scale = np.where(high > low, high - low, 1.0)
@@ -86,7 +87,7 @@ class RecordedInputs:
         )
         moving = steps[steps > 0]
         fastest = float(np.quantile(moving, FAST)) if moving.size else 1.0
-        units = {name: recordings[0].with_derived(names).units[name] for name in names}
+        units = {name: derived[0].units[name] for name in names}
         return cls(
             tuple(names),
             units,
@@ -100,40 +101,42 @@ class RecordedInputs:
         )
 
     @classmethod
-    def known(cls, block: Block) -> Self | None:
+    def known(cls, block: Block, sample_time: float | None = None) -> Self | None:
         """Return the inputs that a model was identified for; None if it says none.
 
         They are in any combination, but along the drive of a balance that has one. Inputs whose range
-        is not known are 0. The fastest motion runs through the range in 100 samples of 20 ms.
+        is not known are 0. The fastest motion runs through the range in 100 samples; they are 20 ms
+        apart unless the model has a sample time of its own, or one is given [s].
         """
         ranges = known_ranges(block)
         if not any(channel.name in ranges for channel in block.inputs):
             return None
-        low, high = np.array([ranges.get(channel.name, (0.0, 0.0)) for channel in block.inputs]).T
-        names = [channel.name for channel in block.inputs]
+        names = tuple(channel.name for channel in block.inputs)
         units = {channel.name: channel.unit for channel in block.inputs}
-        rise = np.linspace(low, high, SAMPLES + 1)
-        box = cls.of([Recording(dict(zip(names, rise.T, strict=True)), STEP, units)], names)
-        directions, extent = np.eye(len(names)), (box.ends - box.middle) / box.scale
+        ends = np.array([ranges.get(name, (0.0, 0.0)) for name in names]).T
+        step = sample_time or block.sample_time or STEP
+        middle, scale = ends.mean(axis=0), np.where(ends[1] > ends[0], ends[1] - ends[0], 1.0)
+        directions, extent = np.eye(len(names)), (ends - middle) / scale
         placed = balance_in(block)
         if placed is not None and placed.solved and placed.balance.drive:
             drive, n = np.array(placed.balance.drive), len(placed.balance.given)
-            middle = (drive[:, 0] - box.middle[:n]) / box.scale[:n]
-            ways = drive[:, 1:] / box.scale[:n, np.newaxis]
+            ways = drive[:, 1:] / scale[:n, np.newaxis]
             own = np.linalg.qr(ways, mode="complete").Q
             reach = EVEN * np.sqrt(((own.T @ ways) ** 2).sum(axis=1))
             directions[:n, :n] = own
-            extent[:, :n] = middle @ own + [-reach, reach]
-        return replace(box, directions=directions, extent=extent)
+            extent[:, :n] = (drive[:, 0] - middle[:n]) / scale[:n] @ own + [-reach, reach]
+        return cls(names, units, middle, scale, directions, extent, ends, SAMPLES, step)
 
     def motion(self, slowness: float, seed: int) -> Recording:
         """Return a random motion, so many times slower than the fastest recorded."""
         pace = int(np.clip(self.samples * slowness, *STRIDES))
         low, high = self.extent
-        along = wander(low, high, np.random.default_rng(seed), pace, TURNS)
-        inputs = self.middle + self.scale * (along @ self.directions.T)
-        inputs = np.clip(inputs, *self.ends)
+        inputs = self._inputs(wander(low, high, np.random.default_rng(seed), pace, TURNS))
         return Recording(dict(zip(self.names, inputs.T, strict=True)), self.sample_time, self.units)
+
+    def _inputs(self, along: Array) -> Array:
+        """Return the inputs, within their ends, at values along the directions, both (k, n)."""
+        return np.clip(self.middle + self.scale * (along @ self.directions.T), *self.ends)
 
     def reached(
         self, block: Block, held: Mapping[str, float], seconds: float
@@ -156,16 +159,15 @@ class RecordedInputs:
         share = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(CYCLES * n + 1) / n)
         others = {name: np.full(share.size, value) for name, value in held.items()}
         units = {channel.name: channel.unit for channel in block.inputs}
-        low, high = self.extent
+        names = [channel.name for channel in block.outputs]
         ends = []
-        for place, direction in enumerate(self.directions.T):
-            along = low[place] + share * (high[place] - low[place])
-            inputs = np.clip(self.middle + self.scale * np.outer(along, direction), *self.ends)
-            run = Recording({**dict(zip(self.names, inputs.T, strict=True)), **others}, step, units)
-            given = block.simulate(run).matrix([channel.name for channel in block.outputs])[-n:]
+        for direction, low, high in zip(np.eye(len(self.names)), *self.extent, strict=True):
+            inputs = self._inputs(np.outer(low + share * (high - low), direction))
+            run = Recording(dict(zip(self.names, inputs.T, strict=True)) | others, step, units)
+            given = block.simulate(run).matrix(names)[-n:]
             ends += [given.min(axis=0), given.max(axis=0)]
         found = zip(np.min(ends, axis=0).tolist(), np.max(ends, axis=0).tolist(), strict=True)
-        return dict(zip([channel.name for channel in block.outputs], found, strict=True))
+        return dict(zip(names, found, strict=True))
 
     def outside(self, inputs: Array) -> float:
         """Return the share of some inputs, shape (k, n), that are not as the recorded ones."""

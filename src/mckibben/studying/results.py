@@ -12,8 +12,7 @@ from mckibben.blocks.equations import quantities
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
     from mckibben.control import Before, Learned, Tracked
-    from mckibben.control.roles import Plant
-    from mckibben.control.suiting import Kind
+    from mckibben.control.roles import Kind, Plant
     from mckibben.estimators.core.estimator import Estimator
     from mckibben.recording import Recording
 

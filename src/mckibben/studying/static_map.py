@@ -18,45 +18,82 @@ LARGEST_DEGREE, MOST_TERMS = 5, 60
 RIDGE = 1e-9
 """Of the least squares, relative to the largest diagonal element."""
 
+FEWEST_PARTS = 3
+"""Of the data, each left out in turn to choose the degree: recordings, or pieces of them if fewer."""
+
+Map = Callable[[Array], Array]
+"""From values, (m, n), to others, (m, k)."""
+
 
 def static_error(split: Split, inputs: Sequence[str], outputs: Sequence[str]) -> float:
-    """Return the error on the test of a polynomial of the inputs, mean RMSE over outputs.
-
-    The polynomial is fitted to the training recordings by least squares, and has the largest degree up
-    to 5 with at most 60 terms. Inputs beyond those fitted count as the nearest one.
-    """
+    """Return the error on the test of a static map of the inputs, mean RMSE over outputs."""
     train = [recording.with_derived((*inputs, *outputs)) for recording in split.train]
     test = [recording.with_derived((*inputs, *outputs)) for recording in split.test]
     known = [name for name in inputs if all(name in one for one in (*train, *test))]
     kept = [~recording.bridged for recording in train]
-
-    fitted = _joined(train, kept, known)
-    terms = polynomial(fitted)
-    given = terms(fitted)
-    gram = given.T @ given
-    gram += RIDGE * gram.diagonal().max() * np.eye(len(gram))
-    weights = np.linalg.solve(gram, given.T @ _joined(train, kept, outputs))
-    errors = terms(_joined(test, split.test_rows, known)) @ weights
-    errors -= _joined(test, split.test_rows, outputs)
+    found = static_map(_rows(train, kept, known), _rows(train, kept, outputs))
+    errors = found(np.concatenate(_rows(test, split.test_rows, known)))
+    errors -= np.concatenate(_rows(test, split.test_rows, outputs))
     return float(np.sqrt((errors**2).mean(axis=0)).mean())
 
 
-def polynomial(fitted: Array) -> Callable[[Array], Array]:
-    """Return the function from values, (m, n), to the terms of a polynomial of them, (m, terms).
+def static_map(given: Sequence[Array], wanted: Sequence[Array]) -> Map:
+    """Return a polynomial fitted to recordings by least squares.
+
+    Its degree is that of the smallest error on recordings left out in turn; of one or two recordings,
+    on thirds of each: few lengths or loads determine no high degree.
 
     Parameters
     ----------
-    fitted : array, shape (k, n)
-        Values beyond these count as the nearest one.
+    given, wanted : sequence of array, shapes (m, n) and (m, k)
+        Of every recording. Values beyond these count as the nearest one.
     """
-    low, high = fitted.min(axis=0), fitted.max(axis=0)
-    n = low.size
-    fits = (d for d in range(LARGEST_DEGREE, 1, -1) if comb(n + d, d) <= MOST_TERMS)
-    degree = next(fits, 1)
+    if len(given) < FEWEST_PARTS:
+        given, wanted = (
+            [part for one in tables for part in np.array_split(one, FEWEST_PARTS)]
+            for tables in (given, wanted)
+        )
+    n = given[0].shape[1]
+    every = np.concatenate(given)
+    low, high = every.min(axis=0), every.max(axis=0)
+    possible = [d for d in range(1, LARGEST_DEGREE + 1) if d == 1 or comb(n + d, d) <= MOST_TERMS]
+    chosen, least = _constant(wanted), np.inf
+    for degree in possible:
+        terms = _polynomial(low, high, degree)
+        tables = [terms(part) for part in given]
+        grams = np.array([table.T @ table for table in tables])
+        sides = np.array([table.T @ part for table, part in zip(tables, wanted, strict=True)])
+        missed = 0.0
+        for place, (table, part) in enumerate(zip(tables, wanted, strict=True)):
+            others = np.arange(len(tables)) != place
+            weights = _solved(grams[others].sum(axis=0), sides[others].sum(axis=0))
+            missed += float(((table @ weights - part) ** 2).sum())
+        if missed < least:
+            least = missed
+            chosen = _weighted(terms, _solved(grams.sum(axis=0), sides.sum(axis=0)))
+    return chosen
+
+
+def _solved(gram: Array, sides: Array) -> Array:
+    ridge = RIDGE * gram.diagonal().max() * np.eye(len(gram))
+    return np.asarray(np.linalg.solve(gram + ridge, sides))
+
+
+def _weighted(terms: Map, weights: Array) -> Map:
+    return lambda values: terms(values) @ weights
+
+
+def _constant(wanted: Sequence[Array]) -> Map:
+    mean = np.concatenate(wanted).mean(axis=0)
+    return lambda values: np.tile(mean, (len(values), 1))
+
+
+def _polynomial(low: Array, high: Array, degree: int) -> Map:
+    """Return the function to the terms of a polynomial; values beyond the ends count as these."""
     factors = [
         list(places)
         for order in range(degree + 1)
-        for places in combinations_with_replacement(range(n), order)
+        for places in combinations_with_replacement(range(low.size), order)
     ]
 
     def terms(values: Array) -> Array:
@@ -66,6 +103,6 @@ def polynomial(fitted: Array) -> Callable[[Array], Array]:
     return terms
 
 
-def _joined(runs: Sequence[Recording], rows: Sequence[Mask], names: Sequence[str]) -> Array:
+def _rows(runs: Sequence[Recording], rows: Sequence[Mask], names: Sequence[str]) -> list[Array]:
     pairs = zip(runs, rows, strict=True)
-    return np.concatenate([run.matrix(names)[own] for run, own in pairs])
+    return [run.matrix(names)[own] for run, own in pairs]

@@ -488,11 +488,6 @@ class Balance(Invertible):
         flat = np.hstack([np.reshape(table, (n, -1)) for table in own])
         return np.concatenate([*shared, *(np.concatenate(row) for row in tables), flat.ravel()])
 
-    @property
-    def driven_range(self) -> tuple[float, float] | None:
-        """Lowest and highest identified pressure."""
-        return self.pressure_range
-
     @cached_property
     def known_inputs(self) -> Array:
         """Ranges of coordinates, and of what schedules and loads."""

@@ -40,7 +40,6 @@ from mckibben.blocks.kernels import fill, kernel, step
 from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
-from mckibben.blocks.ranges import by_name
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
@@ -129,6 +128,7 @@ class LoadEstimate(Block):
     start_kernel = load_estimate_start
     parameters = ("forward",)
     typical = (Balance.example(),)
+    _of_model = same_as("forward")
     notation = Notation(
         r"F = C^{+} \left(p A(y) - \text{springs} - \text{elasticity} - \text{friction} - "
         r"\text{relaxation} - \text{damping} - \text{inertia}\right)"
@@ -166,21 +166,6 @@ class LoadEstimate(Block):
     def scheduled(self) -> tuple[Channel, ...]:
         """The scheduling inputs other than loads."""
         return self.forward.scheduled[: len(self.forward.scheduled) - self.forward.n_loads]
-
-    @cached_property
-    def known_inputs(self) -> Array:
-        """Ranges of the balance's."""
-        return by_name(self.inputs, self._known_of_balance())
-
-    @cached_property
-    def known_outputs(self) -> Array:
-        """Ranges of loads."""
-        return by_name(self.outputs, self._known_of_balance())
-
-    def _known_of_balance(self) -> list[tuple[tuple[Channel, ...], Array]]:
-        """Return the balance's channels with their ranges."""
-        balance = self.forward
-        return [(balance.inputs, balance.known_inputs), (balance.outputs, balance.known_outputs)]
 
     @property
     def n_scratch(self) -> int:

@@ -309,7 +309,7 @@ class BalanceEstimator(CoupledEstimator):
 
         given_range = None
         if data.inputs[0].unit in LIMITED:
-            given_range = min(float(data.lowest.min()), 0.0), float(data.highest.max())
+            given_range = float(data.lowest.min()), float(data.highest.max())
             low, high = acting_in_muscles(np.array(given_range)).tolist()
             balance = replace(balance, pressure_range=(low, high))
         if structure.n > structure.m and self.drive == "recorded":

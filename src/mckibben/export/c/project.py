@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.blocks.base import Block, own_time
+from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.kernels import in_scratch
-from mckibben.blocks.laws import input_limits, wander
+from mckibben.blocks.laws import identified_limits, wander
 from mckibben.blocks.ranges import input_bounds
 from mckibben.blocks.saving import to_text
 from mckibben.errors import ModelError, ModelWarning, require
@@ -111,7 +111,7 @@ def c_files(
     """Return the files of `export_c`, text by path in the folder."""
     content = described(block, name=name, sample_time=sample_time, single=single)
     if serving is not None:
-        content |= served(block, content, serving, sample_time or own_time(block))
+        content |= served(block, content, serving, sample_time or block.sample_time)
     content |= vectors(block, content["sample_time"], single=single)
     return {
         **source_files(content),
@@ -137,7 +137,7 @@ def vectors(block: Block, sample_time: float | None, *, single: bool = False) ->
     ModelError
         If the model's outputs are not finite on them.
     """
-    inputs = wander(*input_limits(block), np.random.default_rng(0), PACE, TURNS)
+    inputs = wander(*identified_limits(block), np.random.default_rng(0), PACE, TURNS)
     if single:
         inputs = inputs.astype(np.float32).astype(np.float64)
     with warnings.catch_warnings():
@@ -252,7 +252,7 @@ def _warn_of_rounding(block: Block, sample_time: float | None) -> None:
     """Compare the same kernel in single and double precision."""
     rng = np.random.default_rng(0)
     samples = min(SAMPLES, MOST_PRODUCTS // max(block.n_states, 1))
-    inputs = wander(*input_limits(block), rng, 400, samples // 400).astype(np.float32)
+    inputs = wander(*identified_limits(block), rng, 400, samples // 400).astype(np.float32)
     single, double = (_run(block, inputs.astype(kind), sample_time) for kind in (np.float32, float))
     off = float(np.abs(single - double).max() / max(np.ptp(double), 1e-300))
     if not off <= NOTICED:
@@ -280,7 +280,7 @@ def checked_sample_time(block: Block, sample_time: float | None) -> float | None
     ModelError
         If it is missing, not positive, or not the block's own.
     """
-    step = own_time(block) if sample_time is None and block.rate_dependent else sample_time
+    step = block.sample_time if sample_time is None and block.rate_dependent else sample_time
     possible = step is None or 0 < step <= LONGEST_STEP
     require(possible, "sample_time", step, f"a positive time, at most {LONGEST_STEP:g} s")
     if not block.rate_dependent:

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.blocks.base import Block
-from mckibben.blocks.laws import input_limits
+from mckibben.blocks.laws import identified_limits
 from mckibben.blocks.saving import to_dict, to_text
 from mckibben.errors import DataError, ModelError
 from mckibben.export.c.project import described, source_files
@@ -121,7 +121,7 @@ def fmu_files(
 ) -> dict[str, str]:
     """Return the files of an FMU except its libraries, text by path in the zip."""
     content = described(block, name=name, sample_time=sample_time, single=False)
-    low, high = input_limits(block)
+    low, high = identified_limits(block)
     starts = np.where(np.isfinite(low) & np.isfinite(high), np.clip(0.0, low, high), 0.0)
     channels = (*content["inputs"], *content["outputs"])
     content |= {

@@ -10,12 +10,17 @@ import re
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from mckibben.blocks.base import Block
 from mckibben.blocks.saving import to_text
 from mckibben.errors import ModelError
 from mckibben.export.c.project import described, source_files
 from mckibben.export.folders import write_folder
 from mckibben.export.templating import render
+
+USUAL = (0.0, 6.0)
+"""Lowest and highest pressure [bar] of a compensator that knows none."""
 
 
 def export_ros2(
@@ -78,6 +83,7 @@ def ros2_files(
     n_driven = len(block.inputs) - len(block.scheduling)
     content = described(block, name=name, sample_time=sample_time, single=False)
     references = content["inputs"][:n_driven]
+    low, high = np.where(np.isfinite(block.known_outputs), block.known_outputs, USUAL).T
     handles = [re.sub(r"[^a-z0-9_]+", "_", each["name"].lower()) for each in references]
     content |= {
         "references": references,
@@ -86,6 +92,8 @@ def ros2_files(
             for place, each in enumerate(handles, start=1)
         ],
         "measured": content["inputs"][n_driven:],
+        "lowest": min(float(low.min()), 0.0),
+        "highest": float(high.max()),
         "class_name": "".join(word.capitalize() for word in name.split("_")) + "Controller",
     }
 

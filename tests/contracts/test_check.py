@@ -94,8 +94,10 @@ BROKEN: dict[str, tuple[Any, str, Make]] = {
     "inverts: an inverse deaf to states": (
         Inverse,
         "initial_state",
-        lambda original: lambda self, first, initial=None, step=None: original(
-            self, first, None, step
+        lambda original: (
+            lambda self, first, initial=None, sample_time=None: original(
+                self, first, None, sample_time
+            )
         ),
     ),
     "inverts: nothing to reach": (

@@ -105,7 +105,7 @@ class Layout:
             if left is not None:
                 start, left = left[: block.n_states], left[block.n_states :]
             states.append(block.initial_state(sample, start, sample_time))
-            if not passed_on.isdisjoint(step.given):
+            if left is None and not passed_on.isdisjoint(step.given):
                 outputs = np.empty((1, len(step.given)))
                 block.bind(sample_time, states[-1].copy(), sample[np.newaxis], outputs)()
                 signals[step.given] = outputs[0]

@@ -88,6 +88,30 @@ def test_every_output_has_an_input_of_its_own(inputs: str, outputs: str, own: st
     assert pairs == tuple(zip(own.split(), outputs.split(), strict=True))
 
 
+@pytest.mark.parametrize(
+    ("drive", "held", "pull"),
+    [
+        ("voltage", "length", "force"),
+        ("pressure", "contraction", "force"),
+        ("pressure", "angle", "torque"),
+    ],
+)
+def test_what_is_held_at_levels_schedules_whatever_its_name(
+    drive: str, held: str, pull: str
+) -> None:
+    names = (drive, held, pull)
+    noise = 0.001 * np.sin(40 * T)
+    runs = [
+        run(*names).with_channels(**{held: level + noise}) for level in (10.0, 11.0, 12.0, 13.0)
+    ]
+    assert channels_of(runs) == Channels((drive,), (pull,), (held,))
+
+
+def test_numbered_commands_drive_together() -> None:
+    names = ["command_pressure_1", "command_pressure_2", "angle"]
+    assert recognised([run(*names)], names) == (tuple(names[:2]), ("angle",))
+
+
 def test_a_comparison_of_held_lengths_is_of_force() -> None:
     names = ("pressure", "displacement", "force")
     held = [run(*names, held=("displacement",)) for _ in range(2)]

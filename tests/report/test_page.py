@@ -20,6 +20,7 @@ from mckibben import example
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
+from mckibben.comparison.leaderboard import Row
 from mckibben.diagnosis.description import describe
 from mckibben.numerals import number, percent
 from mckibben.outputs import Results
@@ -199,7 +200,8 @@ def test_pages_of_little_are_whole() -> None:
     assert "inverse" not in Parsed(page(study(inverse=False))).figures
     failed = study(blocks={})
     board = replace(failed.leaderboard, rows=(), pending=("pi", "gpi"))
-    for found in (failed, replace(failed, leaderboard=board)):
+    lost = replace(board, rows=(Row("pi", "it fails"),), pending=("gpi",))
+    for found in (failed, *(replace(failed, leaderboard=one) for one in (board, lost))):
         parsed = Parsed(page(found))
         assert set(parsed.all("id")) >= SECTIONS - {"model", "checks"}
         assert set(parsed.figures) == {"lead", "time"}

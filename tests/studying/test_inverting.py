@@ -16,7 +16,7 @@ from mckibben.comparison.splits import given_split
 from mckibben.signals import triangle
 from mckibben.studying.inverting import checked, made
 from mckibben.studying.recorded_inputs import RecordedInputs
-from mckibben.studying.static_map import static_error
+from mckibben.studying.static_map import static_error, static_map
 from tests.blocks.balances import CROWDED
 
 TIME = np.arange(0, 24, 0.02)
@@ -114,6 +114,30 @@ def test_a_model_is_inverted_along_the_line_on_which_it_was_driven() -> None:
     np.testing.assert_allclose(away @ np.linalg.svd(ways)[0][:, 2], 0.0, atol=1e-12)
     assert (np.ptp(away, axis=0) > np.sqrt(3.0) * np.abs(ways).max(axis=1)).all()
     assert made(model) == model.inverse()
+
+
+def test_few_lengths_determine_no_high_degree() -> None:
+    """Between four lengths, as good as a plane through them, and not a cubic through their noise."""
+    rng = np.random.default_rng(0)
+    pressure = rng.uniform(0, 4, (4, 300))
+    length = np.repeat([[170.0], [180.0], [190.0], [200.0]], 300, axis=1)
+    force = 30 * pressure + 2 * length + 15 * rng.standard_normal((4, 1))
+    given = [np.column_stack(pair) for pair in zip(pressure, length, strict=True)]
+    found = static_map(given, [row[:, np.newaxis] for row in force])
+    between = np.column_stack([np.full(7, 2.0), np.linspace(170.0, 200.0, 7)])
+    assert np.abs(np.diff(found(between)[:, 0], n=3)).max() < 1e-6
+
+
+def test_commands_without_limits_are_no_compensator() -> None:
+    found = study([TRAIN], [TEST], models=["arx"], jobs=1)
+    assert found.inverse is None
+
+
+def test_recorded_commands_that_are_no_input_are_named() -> None:
+    runs = [run.with_channels(command_pressure=run["pressure"]) for run in (TRAIN, TEST)]
+    found = study(runs[:1], runs[1:], models=["gpi"], inputs="pressure", jobs=1).inverse
+    assert found is not None
+    assert found.commands == ("command_pressure",)
 
 
 def test_the_static_map_is_a_polynomial_of_all_inputs() -> None:

@@ -35,6 +35,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import Channel, vector
+from mckibben.blocks.ranges import input_bounds
 from mckibben.blocks.repetition import Repetition
 from mckibben.control.connecting import find
 from mckibben.errors import DataError, require
@@ -186,10 +187,9 @@ def learned(
     desired, measured = (_outputs(compensator, runs, prefix) for prefix in (DESIRED, ""))
     if not np.array_equal(desired, np.broadcast_to(desired[0], desired.shape)):
         raise DataError("repetitions have different references", remedy="repeat one motion")
+    bounds = input_bounds(compensator)
     lessons = [
-        _Lesson.of(
-            desired[0, :, k], measured[:, :, k], compensator.known_inputs[k], settle, repeats
-        )
+        _Lesson.of(desired[0, :, k], measured[:, :, k], bounds[k], settle, repeats)
         for k in range(len(channels))
     ]
     errors = np.array([lesson.errors for lesson in lessons])
@@ -257,15 +257,16 @@ class _Lesson:
         cls,
         desired: Array,
         measured: Array,
-        identified: Array,
+        bounds: Array,
         settle: int,
         repeats: bool,
     ) -> _Lesson:
         """Return it, from the desired output, (n,), and the measured ones, (n_runs, n).
 
-        What the compensator is asked for stays between the ends that its model was ``identified`` for.
+        What the compensator is asked for stays within the ``bounds`` beyond which it takes it for a
+        fault.
         """
-        lowest, highest = identified
+        lowest, highest = bounds
         low, high = np.minimum(lowest - desired, 0.0), np.maximum(highest - desired, 0.0)
         delay = _delay(desired, measured[0])
         cutoff, expected = _cutoff(desired, _earlier(desired - measured[0], delay, repeats))

@@ -19,9 +19,11 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance_law import (
     AT_REST,
+    DYNAMIC,
     FROM_REST,
     HEAD,
     IN_TIME,
+    LEAST_AREA,
     OWN,
     area,
     coordinate_at,
@@ -31,6 +33,7 @@ from mckibben.blocks.coupled.balance_law import (
     n_terms,
     shortening,
     solve_equilibrium,
+    terms_at,
     unbalanced,
     update_state,
 )
@@ -191,6 +194,28 @@ def through_past(c: Array, k: int, slopes: Array, past: Array, moved: Array, to:
 
 
 @inlined
+def through_line(c: Array, k: int, state: Array, terms: Array, moved: Array, to: Array) -> None:
+    """Add derivatives of a line's force by the area that muscle k had: of its coefficients and place.
+
+    ``terms`` are its own, and ``moved`` the derivatives of its last shortening.
+    """
+    own, before = muscle_at(c, k), shortening(c, k, state)
+    first = terms_at(c, k) + DYNAMIC + int(c[7])
+    inside = min(max(before, c[own]), c[own + 1])
+    a, narrowing = area(c, k, inside)
+    if not a > LEAST_AREA * c[first]:
+        return
+    pull = 2.0 * c[terms_at(c, k) + 1] * terms[1] / a
+    if inside == before:
+        mix(to, 1.0, pull * narrowing, moved)
+    column, power = first - coordinate_at(c, 0), 1.0
+    to[column] -= pull * a / c[first]
+    for i in range(int(c[8])):
+        to[column + i] += pull * power
+        power *= inside / c[10]
+
+
+@inlined
 def carry(
     c: Array,
     k: int,
@@ -320,6 +345,8 @@ def move(
         by_shape(c, k, state, way, y, p[k], x, dp[k], values, by_y, own_late, to)
         if way != AT_REST:
             through_past(c, k, by_y, past, moved, by_force)
+        if way == IN_TIME and not held and c[15] > 0.0 and c[terms_at(c, k) + 1] > 0.0:
+            through_line(c, k, state, values, moved, by_force)
         for j in range(m):
             if c[own + j] != 0.0:
                 mix(slopes[j], 1.0, c[own + j], by_force)

@@ -240,10 +240,14 @@ class Recording(DrawsItself):
         return next(iter(self.channels.values())).size
 
     @property
+    def step(self) -> float:
+        """From one value of `time` to the next: the sample time [s], or 1 where samples are numbered."""
+        return 1.0 if self.sample_time is None else self.sample_time
+
+    @property
     def time(self) -> Array:
         """Time of every sample [s], shape (n,); sample numbers if the recording has no time."""
-        step = 1.0 if self.sample_time is None else self.sample_time
-        return self.start_time + step * np.arange(self.n_samples, dtype=np.float64)
+        return self.start_time + self.step * np.arange(self.n_samples, dtype=np.float64)
 
     @property
     def duration(self) -> float | None:
@@ -290,7 +294,7 @@ class Recording(DrawsItself):
     @property
     def bridged(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Which samples were interpolated over a gap in reading, shape (n,)."""
-        time, within = self.time, 1e-6 * (self.sample_time or 1.0)
+        time, within = self.time, 1e-6 * self.step
         found = np.zeros(time.size, dtype=np.bool_)
         for start, stop in self.meta.get("bridged", ()):
             found |= (time >= start - within) & (time <= stop + within)

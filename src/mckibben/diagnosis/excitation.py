@@ -171,7 +171,7 @@ class Excitation:
         times = before + np.clip((levels - reached[before]) / rise, 0.0, 1.0)
         step = float(np.diff(levels)[0])
         moving = max(float(np.quantile(np.diff(times), 0.25)), 0.1)
-        return step / (moving * (recording.sample_time or 1.0))
+        return step / (moving * recording.step)
 
     @cached_property
     def longest_hold(self) -> float:

@@ -268,7 +268,7 @@ def _link(log: Recording, model: Block, compensator: Block | None, inputs: Seque
         clipped = int(np.any(limits, axis=0).sum())
     followed = [name for name in names if REFERENCE + name in log]
     pairs |= {f"measured after modelled {n}": (modelled[n], log[n]) for n in followed}
-    step = log.sample_time or 1.0
+    step = log.step
     return _Link(
         log=log.slice(scored.start, scored.stop),
         modelled=modelled.slice(scored.start, scored.stop),
@@ -326,7 +326,7 @@ def _at_limit(command: Array, references: Sequence[Array]) -> Array:
 
 def _followed(links: Sequence[_Link], channel: Channel) -> Followed:
     logs, name = [link.log for link in links], channel.name
-    step = logs[0].sample_time or 1.0
+    step = logs[0].step
     measured, reference = (
         np.concatenate([log[prefix + name] for log in logs]) for prefix in ("", REFERENCE)
     )

@@ -317,7 +317,7 @@ def _scored(state: State, name: str) -> Recording | None:
     """Return the recording of a run without its approach; None where it is gone."""
     with suppress(MckibbenError):
         one = following.read_run(state.workspace, f"{name}.csv")
-        return one.slice(max(round(-one.start_time / (one.sample_time or 1.0)), 0), len(one))
+        return one.slice(max(round(-one.start_time / one.step), 0), len(one))
     return None
 
 

@@ -346,7 +346,7 @@ def _part(state: State, entry: Entry, recording: Recording) -> None:
         if low is None and high is None:
             remedy = "drag across the plot, or give From and To"
             raise DataError("no part is selected", remedy=remedy)
-        half = 0.5 * (recording.sample_time or 1.0)
+        half = 0.5 * recording.step
         first = 0 if low is None else np.searchsorted(time, low - half)
         last = len(time) if high is None else np.searchsorted(time, high + half)
         return int(first), int(last)

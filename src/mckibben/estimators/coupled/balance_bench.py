@@ -235,10 +235,7 @@ def one_speed(data: TrainingData) -> bool:
     """Return whether all inputs always move at about one speed, so that rate is not identifiable."""
     if any(run.sample_time is None for run in data.runs):
         return True
-    speeds = [
-        (np.abs(np.diff(run.driven, axis=0)) / (run.sample_time or 1.0)).max(axis=1)
-        for run in data.runs
-    ]
+    speeds = [(np.abs(np.diff(run.driven, axis=0)) / data.timed()).max(axis=1) for run in data.runs]
     found = np.concatenate(speeds)
     rests = found <= SLOW * float(np.quantile(found, 0.99))
     if rests.mean() > SLOW:

@@ -179,7 +179,7 @@ class Problem:
         """
         values = structure.expanded(z[: len(structure.terms)])
         driven = self.acting(run, structure, values)
-        c = structure.coefficients(values, run.sample_time or 1.0)
+        c = structure.coefficients(values, run.sample_time)
         for j, load in enumerate(z[self.loads_at(structure, run)].tolist()):
             c[coordinate_at(c, j)] += load
         return follow(

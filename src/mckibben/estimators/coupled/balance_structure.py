@@ -484,7 +484,7 @@ class Structure:
         positions = self.nonlinear_values(values, "places").reshape(self.m, len(table))[j]
         return np.column_stack([positions, np.maximum(table[:, 2:], 0.0)])
 
-    def coefficients(self, values: Array, sample_time: float) -> Array:
+    def coefficients(self, values: Array, sample_time: float | None) -> Array:
         """Return the coefficients of the block, those of inactive terms included."""
         c = self.block(values).coefficients(sample_time)
         linear = c[c.size - self.n_linear :]

@@ -187,7 +187,7 @@ class RecurrentProblem:
             f = hysteresis.simulate(run.driven[:, 0], sample_time=run.sample_time)
             inputs.append(np.ascontiguousarray(np.column_stack([f, run.scheduled])))
         targets = tuple(run.outputs[:, 0] for run in data.runs)
-        step = float(data.runs[0].sample_time or 1.0)
+        step = data.timed()
         return cls(settings, tuple(inputs), targets, step, hysteresis.outputs[0], data)
 
     def regress(self, inputs: Array, past: Array) -> Array:

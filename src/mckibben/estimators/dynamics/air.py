@@ -176,7 +176,7 @@ class AirEstimator(SeparableEstimator):
         if block.ambient is None and self.ambient is None:
             lowest = block.goal(data.input_range[0], -1)
             block = replace(block, ambient=0.0 if lowest >= 0 else None)
-        return error, replace(block, dead_time=delay * (data.sample_time or 1.0))
+        return error, replace(block, dead_time=delay * data.timed())
 
     def _refined(
         self, block: Air, data: TrainingData, tracker: Tracker, limits: Sequence[str]
@@ -213,7 +213,7 @@ class AirEstimator(SeparableEstimator):
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [log filling time, log venting time, hysteresis]."""
-        sample_time = data.sample_time or 1.0
+        sample_time = data.timed()
         shortest = np.log(0.1 * sample_time)
         longest = np.log(max(run.u.size for run in data.runs) * sample_time)
         widest = MOST_HYSTERESIS * float(np.ptp(data.input_range))

@@ -71,7 +71,7 @@ class ProcessModelEstimator(SeparableEstimator):
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [log time constants], and of the share of the damping in its range."""
-        oscillates, step = "U" in self.structure, data.sample_time or 1.0
+        oscillates, step = "U" in self.structure, data.timed()
         lower, upper = (np.full(self.n_times, np.log(k * step)) for k in (1.0, data.slowest))
         return np.append(lower, [0.0] * oscillates), np.append(upper, [1.0] * oscillates)
 
@@ -175,7 +175,7 @@ def damping_range(time: float, data: TrainingData) -> tuple[float, float]:
     Their slower decay, `TrainingData.slowest` at most, takes time / damping, or time (damping +
     sqrt(damping^2 - 1)).
     """
-    slowest = data.slowest * (data.sample_time or 1.0) / time
+    slowest = data.slowest * data.timed() / time
     most = 0.5 * (slowest + 1.0 / slowest)
     return max(LEAST_DAMPING, 1.0 / slowest), min(MOST_DAMPING, most)
 

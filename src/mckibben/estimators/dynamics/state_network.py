@@ -256,7 +256,7 @@ class NetworkRuns:
     ) -> None:
         self.template, self.target, self.tracker = template, data.target, tracker
         self.at_rest = warm is None and template.initial == "first_sample"
-        self.rate = template.rate * (data.sample_time or 1.0)
+        self.rate = template.rate * data.timed()
         self.paths = paths(data, template.substeps, warm, self.at_rest)
 
     def errors(self, theta: Array) -> Array:

@@ -140,14 +140,14 @@ class MultistateEstimator(SeparableEstimator):
         """
         low, high = data.input_range
         lengths = np.log((high - low) * np.array([0.005, 2.0]))
-        times = np.log((data.sample_time or 1.0) * np.array([1e-2, 20.0]))
+        times = np.log(data.timed() * np.array([1e-2, 20.0]))
         pairs = np.tile([lengths, times], (sum(self._n_pairs), 1))
         return pairs[:, 0], pairs[:, 1]
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return initial elements that slip early and late, with short relaxation times."""
         low, high = data.input_range
-        time = np.log(0.1 * (data.sample_time or 1.0))
+        time = np.log(0.1 * data.timed())
         guesses = []
         for first in (0.5, 0.25, 0.1):
             for ratio in (0.7, 0.4, 0.2):
@@ -166,7 +166,7 @@ class MultistateEstimator(SeparableEstimator):
         """
         low, high = data.input_range
         lengths = np.log((high - low) * LENGTHS)
-        times = np.log((data.sample_time or 1.0) * np.array(TIMES))
+        times = np.log(data.timed() * np.array(TIMES))
         choices, first = [], 0
         for n_pairs in self._n_pairs:
             candidates = [

@@ -103,7 +103,7 @@ class CreepPIEstimator(SeparableEstimator):
         n, k = self.n_operators, self.n_creep
         low, high = data.input_range
         least = np.log(max(0.01 * (high - low), 0.1 - low))
-        step = data.sample_time or 1.0
+        step = data.timed()
         longest = max(run.u.size for run in data.runs) * step
         slow = np.log(max(SLOWEST * longest, 30 * step))
         lower = [*[0.0] * n, least, *[np.log(FASTEST * step)] * k, *[0.0] * k]

@@ -159,7 +159,7 @@ def _tracked(common: None, trial: tuple[Block | Controller, Rig, Task, int], _: 
 
 def widths(recording: Recording, moving: str, outputs: Sequence[str]) -> dict[str, float]:
     """Return e_w of the moving output over the last period, and cross-motion of others [%]."""
-    n = round(PERIOD / (recording.sample_time or 1.0))
+    n = round(PERIOD / recording.step)
     u, found = recording[f"reference_{moving}"][-n:], {}
     for name in outputs:  # each turned to begin at its minimum
         x, y = (np.roll(wave, -int(np.argmin(u))) for wave in (u, recording[name][-n:]))

@@ -99,7 +99,7 @@ def quick() -> tuple[Protocol, list[str]]:
 
 def _shortened(run: Run) -> Run:
     stage, inputs = run.labels["stage"], run.inputs
-    n = round(QUICK.get(stage, 1.0) * PERIOD / (inputs.sample_time or 1.0))
+    n = round(QUICK.get(stage, 1.0) * PERIOD / inputs.step)
     part = inputs.slice(0, n) if stage == "joint" else inputs.slice(len(inputs) - n, len(inputs))
     return replace(run, inputs=replace(part, start_time=0.0))
 

@@ -283,8 +283,11 @@ def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
     better = any(other.sound and other.order < row.order for other in table.rows.values())
     if better or not row.sound or row.block is None or row.validation_rmse is None:
         return row
-    held = plan.data.held(found.predictions, row.block)
-    tested = tested_band(row.block, held, found.outputs, plan.data)
+    data, given = plan.data, tuple(channel.name for channel in row.block.outputs)
+    if given != data.channels.outputs:
+        return row
+    held = data.held(found.predictions, row.block)
+    tested = tested_band(row.block, held, found.outputs, data.split, data.held_out)
     if tested is None:
         return row
     banded, band = tested

@@ -30,7 +30,7 @@ from mckibben.statistics import block_length, correlation_length
 from mckibben.system.progress import Tell, one_by_one, telling
 
 if TYPE_CHECKING:
-    from mckibben.comparison.fitting import Data
+    from mckibben.comparison.splits import Split
 
 Unit = Literal["auto", "run", "block"]
 
@@ -378,15 +378,20 @@ class TestedBand:
 
 
 def tested_band(
-    block: Block, held: Sequence[Held], outputs: Sequence[Array], data: Data
+    block: Block,
+    held: Sequence[Held],
+    outputs: Sequence[Array],
+    split: Split,
+    held_out: Sequence[Recording],
 ) -> tuple[Banded, TestedBand] | None:
     """Return a model with its band, and the band's coverage on the test; None without a band.
 
-    ``held`` are of models fitted without a part of the training side, on that part; ``outputs``,
-    shape (n, k) each, free-running on every training recording, then on every test recording.
+    ``held`` are of models fitted without a part of recordings that are ``held_out``, on that part;
+    ``outputs``, shape (n, k) each, free-running on every training recording, then on every test
+    recording.
     """
-    names, split = data.channels.outputs, data.split
-    if not held or tuple(channel.name for channel in block.outputs) != tuple(names):
+    names = [channel.name for channel in block.outputs]
+    if not held:
         return None
     try:
         band = find_band(block, held, "block", AT_SPEED).band
@@ -408,7 +413,7 @@ def tested_band(
     )
     by_run = np.array([inside.mean(axis=0) for inside in covered])
     lowest, highest = float(by_run.min()), float(by_run.max())
-    branches = n_branches([recording.matrix(names) for recording in data.held_out])
+    branches = n_branches([recording.matrix(names) for recording in held_out])
     reasons: dict[Unknown, bool] = {
         "blocks": band.units < FEWEST,
         "branches": branches < FEWEST,

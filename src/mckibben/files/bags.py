@@ -19,11 +19,11 @@ from urllib.parse import quote
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.files.formats import reason
 from mckibben.files.headers import channel_of, is_standard, is_time, parse
 from mckibben.files.notices import listed
 from mckibben.files.table import WIDEST, Column, Table
 from mckibben.system.extras import demand
+from mckibben.system.validation import reason
 
 _UNITS = {
     "sensor_msgs/msg/FluidPressure": {"fluid_pressure": "Pa abs"},

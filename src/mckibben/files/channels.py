@@ -16,8 +16,8 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from mckibben.errors import DataError
-from mckibben.files.formats import reason
 from mckibben.system.ordinary import DESCRIPTION, read_text
+from mckibben.system.validation import reason
 
 NAME = "channels.toml"
 

@@ -9,11 +9,10 @@ from io import BufferedReader
 from pathlib import Path
 from types import ModuleType
 
-from pydantic import ValidationError
-
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files.table import Table, distinct, printable
 from mckibben.system.ordinary import opened
+from mckibben.system.validation import reason
 
 MOST_BYTES = 2**31
 """Largest file that is read by default [bytes]."""
@@ -81,16 +80,6 @@ def bag(folder: Path) -> list[Table]:
     """Return the contents of a ROS 2 bag folder; errors as in `read`."""
     with refusing(folder):
         return [printable(table) for table in import_module("mckibben.files.bags").folder(folder)]
-
-
-def reason(error: Exception) -> str:
-    """Return a library's error in one line."""
-    text = str(error)
-    if isinstance(error, ValidationError):
-        first = error.errors()[0]
-        place, text = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
-        text = f"{place[:100]}: {text}".removeprefix(": ")
-    return " ".join(text.split())[:300] or type(error).__name__
 
 
 @contextmanager

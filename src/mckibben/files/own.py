@@ -11,11 +11,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError, MckibbenError
-from mckibben.files.formats import reason, tables
+from mckibben.files.formats import tables
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
 from mckibben.system import ordinary
 from mckibben.system.atomic import digest, replacing
+from mckibben.system.validation import reason
 
 
 class Stored(BaseModel):

@@ -18,10 +18,11 @@ from mckibben.comparison.splits import FEWEST
 from mckibben.errors import DataError
 from mckibben.files import read
 from mckibben.files.channels import NAME, Folder, describing, description
-from mckibben.files.formats import SOUGHT, reason
+from mckibben.files.formats import SOUGHT
 from mckibben.files.sources import inside, is_bag
 from mckibben.recording import PERIODIC, Recording
 from mckibben.signals import resample
+from mckibben.system.validation import reason
 
 KNOWN = Path(str(resources.files("mckibben.measured"))) / "known"
 """Descriptions of public data sets, by the name of their folder: ``NAME.toml``."""

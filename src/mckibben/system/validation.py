@@ -1,4 +1,4 @@
-"""Validation errors of pydantic as errors of the package."""
+"""Errors of pydantic and of other libraries in the words of the package."""
 
 from __future__ import annotations
 
@@ -22,3 +22,13 @@ def invalid(error: ValidationError, file: str | Path | None, remedy: str) -> Dat
     else:
         problem = f"{path} is {first['input']!r:.60}: {first['msg'][:1].lower()}{first['msg'][1:]}"
     return DataError(problem, file=file, remedy=remedy)
+
+
+def reason(error: Exception) -> str:
+    """Return a library's error in one line."""
+    text = str(error)
+    if isinstance(error, ValidationError):
+        first = error.errors()[0]
+        place, text = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+        text = f"{place[:100]}: {text}".removeprefix(": ")
+    return " ".join(text.split())[:300] or type(error).__name__

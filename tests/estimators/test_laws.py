@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import pickle
 from dataclasses import replace
 from typing import Any
 
@@ -66,6 +67,22 @@ def test_impossible_settings_are_refused(setting: str, value: object) -> None:
         if setting in load("estimators", name)().get_params():
             with pytest.raises(ModelError, match=rf"{setting}.*{value}"):
                 quick(name).set_params(**{setting: value}).fit(example_for(name))
+
+
+# -- what is kept --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["pi", "balance", "arx", "narx", "cpi", "play-ridge"])
+def test_pickled_it_has_its_numbers_and_not_the_recordings(name: str) -> None:
+    estimator = quick(name).fit(example_for(name))
+    found = estimator.diagnostics_
+    content = pickle.dumps(estimator)
+    again = pickle.loads(content)
+    assert again.model_ == estimator.model_
+    np.testing.assert_array_equal(again.diagnostics_.covariance, found.covariance)
+    recorded_bytes = sum(x.nbytes for run in example_for(name) for x in run.channels.values())
+    most = found.covariance.nbytes + 3 * len(pickle.dumps(estimator.model_)) + 2000
+    assert len(content) < min(most, recorded_bytes)
 
 
 # -- data ------------------------------------------------------------------------------------------

@@ -95,6 +95,10 @@ class Diagnostics:
         with one_blas_thread():
             return self.uncertainty()
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: the uncertainty itself, not the recordings that it is found from."""
+        return vars(self) | {"uncertainty": partial(tuple, self._uncertainty)}
+
     @property
     def condition(self) -> float:
         """Condition number of the sensitivity of the output to the free parameters.

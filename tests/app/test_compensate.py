@@ -48,15 +48,15 @@ def test_a_fit_has_the_error_to_expect_of_its_compensator_or_why_there_is_none(
     tmp_path: Path,
 ) -> None:
     workspace = with_example(tmp_path)
-    for model in ("gpi", "arx"):
+    for model in ("gpi", "play-ridge"):
         modelling.fit(workspace, silent, model=model, inputs=["pressure"], outputs=["displacement"])
     rows = {row["model"]: row for row in workspace.results()}
     expected = rows["gpi"]["compensator"]
     assert expected["following_error"] == rows["gpi"]["test"]["rmse"]
     assert expected["following_error"] < 0.5 * expected["static_map_error"]
     assert rows["gpi"]["no_compensator"] == ""
-    assert rows["arx"]["compensator"] is None  # whose commands have no limits
-    assert rows["arx"]["no_compensator"]
+    assert rows["play-ridge"]["compensator"] is None  # it has no inverse
+    assert rows["play-ridge"]["no_compensator"]
 
 
 def test_motions_are_between_their_ends_and_what_is_none_is_refused() -> None:

@@ -13,6 +13,7 @@ from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Affine
 from mckibben.comparison.splits import given_split
+from mckibben.registry import load
 from mckibben.signals import triangle
 from mckibben.studying.inverting import checked, made
 from mckibben.studying.recorded_inputs import RecordedInputs
@@ -128,9 +129,13 @@ def test_few_lengths_determine_no_high_degree() -> None:
     assert np.abs(np.diff(found(between)[:, 0], n=3)).max() < 1e-6
 
 
-def test_commands_without_limits_are_no_compensator() -> None:
-    found = study([TRAIN], [TEST], models=["arx"], jobs=1)
-    assert found.inverse is None
+def test_commands_end_at_the_recorded_inputs_also_of_linear_models() -> None:
+    estimator = load("estimators", "arx")().fit([TRAIN])
+    stream = made(estimator.model_).stream(0.02)
+    commands = np.array([stream.step(y)[0] for y in (10.0, 25.0, 5.0, 25.0)])
+    ends = TRAIN["pressure"].min(), TRAIN["pressure"].max()
+    assert stream.status == stream.CLIPPED
+    assert ends == (pytest.approx(commands.min()), pytest.approx(commands.max()))
 
 
 def test_recorded_commands_that_are_no_input_are_named() -> None:

@@ -18,7 +18,7 @@ from mckibben.blocks import saving
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Composition
 from mckibben.blocks.fields import Initial
-from mckibben.blocks.inverse import Invertible
+from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.errors import ContractError, DataError, ModelError, ModelWarning
 from mckibben.recording import Recording, standard_unit
 from mckibben.registry import load, names
@@ -380,7 +380,8 @@ def _tracks(trial: Trial, inverse: Block, references: Array) -> None:
     half = n // 2
     forward_state = _state_after(trial.block, given[:half], trial.sample_time)
     starts = [_state_after(inverse, wanted[:half], trial.sample_time)]
-    starts += [forward_state] if hasattr(trial.block, "input_range") else []
+    limited = isinstance(inverse, Inverse) and hasattr(trial.block, "input_range")
+    starts += [forward_state] if limited else []
     for start in starts:
         resumed = trial.run(wanted[half:], start, inverse)
         outputs = trial.run(np.column_stack([resumed, scheduling[half:]]), forward_state)

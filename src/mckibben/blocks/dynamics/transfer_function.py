@@ -74,6 +74,8 @@ class TransferFunction(Block):
         c_1, c_2, ... and d_1, d_2, ... of the noise model C / D, its leading ones left out.
     noise_deviation : float or None
         Standard deviation of the white noise that drives it; None where it is not known.
+    input_range : (float, float), optional
+        Lowest and highest input that it was identified for; a compensator of it stays within.
     """
 
     kind = "transfer-function"
@@ -113,6 +115,7 @@ class TransferFunction(Block):
     noise_numerator: fields.Coefficients = ()
     noise_denominator: fields.Coefficients = ()
     noise_deviation: fields.NotNegative | None = None
+    input_range: fields.InputRange | None = None
 
     @property
     def n_states(self) -> int:

@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Start
-from mckibben.blocks.compose import Parallel
+from mckibben.blocks.compose import Parallel, Series
 from mckibben.blocks.coupled.load_estimate import ForceCompensator
 from mckibben.blocks.fields import STRICT, Initial
 from mckibben.blocks.force.laws import ForceLaw, PolynomialForce
@@ -27,6 +27,7 @@ from mckibben.blocks.force.multistate_friction import (
     multistate_friction_step,
 )
 from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.memoryless import Polynomial
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
@@ -171,9 +172,20 @@ class ForceFeedforward(Block):
 def compensator(model: Block) -> Block:
     """Return the compensator of a model: of a force, from that and the length, or the inverse.
 
+    Commands of an inverse without limits of its own end where the model was identified.
+
     Raises
     ------
     ModelError
         If there is none.
     """
-    return ForceFeedforward.of(model) or ForceCompensator.of(model) or model.inverse()
+    return ForceFeedforward.of(model) or ForceCompensator.of(model) or _limited(model)
+
+
+def _limited(model: Block) -> Block:
+    inverse, known = model.inverse(), model.known_inputs[: model.n_driven]
+    if len(known) > 1 or np.isfinite(inverse.reachable()).all() or not np.isfinite(known).all():
+        return inverse
+    (channel,), (ends,) = inverse.outputs, known
+    identity = Polynomial((0.0, 1.0), input_range=tuple(ends), input=channel, output=channel)
+    return Series((inverse, identity.inverse()))

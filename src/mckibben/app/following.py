@@ -178,7 +178,7 @@ def reach(
     def make() -> dict[str, tuple[float, float]]:
         block, runs = workspace.model(name), list(workspace.used().values())
         driven = [channel.name for channel in made(workspace, name, "inverse", {}).outputs]
-        others = {c.name: held.get(c.name, 0.0) for c in block.inputs if c.name not in driven}
+        others = {c.name: held[c.name] for c in block.inputs if c.name not in driven}
         found: dict[str, tuple[float, float]] = {}
         with suppress(MckibbenError):
             recorded_inputs = RecordedInputs.of(runs, driven)
@@ -199,7 +199,7 @@ def reach(
 def wish(workspace: Workspace, name: str) -> Json:
     """Return a motion of the first channel that a model is asked for, from rest, within reach.
 
-    It is made smaller until the inverse clips nothing of it.
+    It is made smaller, down to a fifth of the reach, until the inverse clips nothing of it.
     """
     step, cycle = pace(workspace, name)
     channels, held = asked_for(workspace, name)

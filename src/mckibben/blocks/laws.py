@@ -37,11 +37,11 @@ def check_block(block: Block, *, sample_time: float = 0.01, seed: int = 0) -> No
     """Test a block against all laws of blocks.
 
     Sizes agree with what is declared; simulating is repeatable and leaves its arguments alone; a
-    stream, `Block.simulate_many` and a saved copy agree with `Block.simulate` to the last bit, and so do
-    the parts of a composition, run one after another; a
-    recording gives what an array gives; bad input is refused by name; a rate-independent block sees
-    neither the sample time nor the pace of its input; and the inverse, where there is one, is exact
-    through minor loops, from a carried-over state, and again after references it could not reach.
+    stream, `Block.simulate_many`, a saved copy and the parts of a composition, run one after another,
+    agree with `Block.simulate` to the last bit; a recording gives what an array gives; bad input is
+    refused by name; a rate-independent block sees neither the sample time nor the pace of its input; and
+    the inverse, where there is one, is exact through minor loops, from a carried-over state, and again
+    after references it could not reach.
 
     Parameters
     ----------

@@ -15,6 +15,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.free_run import run_free
 from mckibben.channels import Channels, any_moves, channels_of
 from mckibben.control.identified import known_ranges
+from mckibben.control.loop import ends
 from mckibben.diagnosis.coupling import coupling
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.base import driving
@@ -215,7 +216,8 @@ def _block_loop(
     """Draw the loop of a block for a decreasing triangle of one input, others at mid-range."""
     names = [channel.name for channel in block.inputs]
     driven, given = input or names[0], output or block.outputs[0].name
-    ranges = known_ranges(block) | _always_in_reach(block)
+    compensated = block.forward_model if block.inverts else None
+    ranges = known_ranges(block) | ends(compensated, block.inputs[: block.n_driven], None)
     if driven not in ranges and high is None:
         raise ModelError(
             f"the range of {driven} that the model was identified on is not known",
@@ -223,20 +225,11 @@ def _block_loop(
         )
     low, top = ranges.get(driven, (0.0, 0.0))
     middle = {name: float(np.mean(ranges.get(name, (0.0, 0.0)))) for name in names}
-    ends = low, top if high is None else high
+    turns = low, top if high is None else high
     step = block.sample_time or SAMPLE_TIME
     units = {channel.name: channel.unit for channel in block.inputs}
-    run = block.simulate(_triangle(block.title, driven, ends, middle, step, units))
+    run = block.simulate(_triangle(block.title, driven, turns, middle, step, units))
     return subjects.loop([run], driven, given)
-
-
-def _always_in_reach(block: Block) -> dict[str, tuple[float, float]]:
-    """Return what a compensator may be asked for whatever happened before, by channel."""
-    forward = block.forward_model if block.inverts else None
-    if forward is None:
-        return {}
-    ends = zip(forward.outputs, *forward.reachable(), strict=True)
-    return {c.name: (low, high) for c, low, high in ends if np.isfinite([low, high]).all()}
 
 
 def _against(kind: str) -> Callable[..., Drawing]:

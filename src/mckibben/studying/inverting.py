@@ -162,9 +162,10 @@ def _of_row(
     row: Row, block: Block, board: Leaderboard, split: Split, plain: float, seed: int
 ) -> Compensation:
     """Return the compensator of a row; raise a `ModelError` where it has no good one."""
-    if not drives(compensator(block).outputs[0]):
+    inverse = compensator(block)
+    if not drives(inverse.outputs[0]):
         raise ModelError("its inverse gives no input of a muscle", remedy="invert another model")
-    if not np.isfinite(compensator(block).reachable()).all():
+    if not np.isfinite(inverse.reachable()).all():
         raise ModelError(
             "it does not know the inputs that it was identified for, so its commands have no limits",
             remedy="invert another model",
@@ -273,6 +274,8 @@ def _check(
 
 def _first_clipped(inverse: Block, asked: Recording) -> int:
     """Return the first sample of a motion at which a compensator clips; all if it never does."""
+    if not inverse.n_clipped(inverse.final_state(asked)):
+        return len(asked)
     stream = inverse.stream(asked.sample_time, initial=inverse.start_on(asked).tolist())
     for place, row in enumerate(asked.matrix([channel.name for channel in inverse.inputs])):
         stream.step(row)

@@ -233,8 +233,7 @@ class PredictionErrorEstimator(Estimator):
         deviation = evaluate(theta, orders, runs, start)[2]
         noise = (vector(p.c), vector(p.poles[0] if orders.a else p.d), deviation)
         constant = p.constant / (1.0 + float(p.poles.sum())) if orders.a else p.constant
-        found, driven = [], data.stacked("driven")
-        ends = list(zip(driven.min(axis=0).tolist(), driven.max(axis=0).tolist(), strict=True))
+        found, ends = [], list(zip(data.lowest.tolist(), data.highest.tolist(), strict=True))
         for place, (channel, b) in enumerate(zip(data.inputs, p.b, strict=True)):
             poles = p.poles[min(place, len(p.poles) - 1)]
             numerator = np.zeros(1 + max(orders.input_lags))

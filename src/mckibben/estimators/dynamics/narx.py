@@ -427,12 +427,9 @@ def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stre
         if horizon is None:
             first = run.driven[0]
             state = model.state_at(first, run.y[:1]) if run.counts[0] else None
-            add(
-                slice(None),
-                model.initial_state(first, sample_time=model.sample_time)
-                if state is None
-                else state,
-            )
+            if state is None:
+                state = model.initial_state(first, sample_time=model.sample_time)
+            add(slice(None), state)
             continue
         x, y = scaled(run.u, model.input_scale), scaled(run.y, model.output_scale)
         played = operators(model, x)

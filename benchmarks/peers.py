@@ -30,9 +30,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from mckibben.blocks.free_run import run_free
 
 from mckibben import compare
-from mckibben.blocks.free_run import run_free
 from mckibben.channels import Channels
 from mckibben.errors import MckibbenError
 from mckibben.measured.scoring import START, Part, entries, parts_of

@@ -26,12 +26,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
+from mckibben.blocks.free_run import run_free
 from tests.plants import DEVELOP, PLANTS, SEALED, Plant, motions
 
 from mckibben import Recording, registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.free_run import run_free
 from mckibben.channels import Channels
 from mckibben.comparison.fitting import Candidate
 from mckibben.comparison.planning import objections

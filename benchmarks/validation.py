@@ -23,8 +23,8 @@ from tests.plants import motions
 from mckibben import Recording
 from mckibben.arrays import Array
 from mckibben.blocks.hysteresis.pi import PI
+from mckibben.blocks.runs import FreeRun, run_of
 from mckibben.diagnosis.check import check_runs
-from mckibben.diagnosis.free_runs import Run
 from mckibben.system.threads import one_blas_thread
 
 STEP = 0.02
@@ -70,10 +70,10 @@ def reader(*inputs: str) -> Any:
     return SimpleNamespace(kind="truth", inputs=channels, outputs=[output], scheduling=())
 
 
-def run(pressure: Array, measured: Array, modelled: Array, **loads: Array) -> Run:
+def run(pressure: Array, measured: Array, modelled: Array, **loads: Array) -> FreeRun:
     channels = {"pressure": pressure, "displacement": measured, **loads}
-    columns = np.column_stack([pressure, measured, modelled])
-    return Run(Recording(channels, STEP), columns[:, :1], columns[:, 1:2], columns[:, 2:])
+    recorded = run_of(Recording(channels, STEP), ["pressure"], ["displacement"])
+    return FreeRun.of(recorded, modelled[:, np.newaxis])
 
 
 def right(seeds: int) -> None:

@@ -13,8 +13,7 @@ from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.dynamics.narx import NarxPolynomial
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.blocks.free_run import run_free
-from mckibben.blocks.starts import history, start_state
+from mckibben.blocks.starts import history, run_on
 from mckibben.recording import PERIODIC
 
 T = np.linspace(0, 1, 800)
@@ -35,9 +34,9 @@ def recorded(block: Block, u: np.ndarray) -> Recording:
 @pytest.mark.parametrize("block", [*MEMORY, *LINEAR], ids=lambda block: block.kind)
 def test_a_run_from_rest_begins_at_rest(block: Block) -> None:
     recording = recorded(block, U)
-    assert len(history(block, recording)) == 0
+    assert len(history(block, run_on(block, recording))) == 0
     np.testing.assert_array_equal(
-        start_state(block, recording), block.initial_state(U[:1], sample_time=0.01)
+        block.start_on(recording), block.initial_state(U[:1], sample_time=0.01)
     )
     np.testing.assert_array_equal(
         block.simulate(recording)["displacement"], recording["displacement"]
@@ -68,7 +67,7 @@ def test_a_model_of_past_outputs_has_had_the_first_one() -> None:
     block = NarxPolynomial.example()
     recording = recorded(block, U).with_channels(displacement=np.full(U.size, 3.0))
     centre, half = block.output_scale
-    state = start_state(block, recording)
+    state = block.start_on(recording)
     np.testing.assert_allclose(state[: block.output_lags], (3.0 - centre) / half)
 
 
@@ -78,8 +77,8 @@ def test_only_the_first_measured_output_is_looked_at() -> None:
     spoilt = recording["displacement"].copy()
     spoilt[1:] = 99.0
     np.testing.assert_array_equal(
-        run_free(block, recording.with_channels(displacement=spoilt), "displacement"),
-        run_free(block, recording, "displacement"),
+        block.simulate(recording.with_channels(displacement=spoilt))["displacement"],
+        block.simulate(recording)["displacement"],
     )
 
 
@@ -108,7 +107,7 @@ def test_of_a_period_that_is_repeated_no_start_counts() -> None:
     block = RateDependentPI.example()
     wave = 2.5 + 2.0 * np.sin(2 * np.pi * np.arange(200) / 200)
     recording = recorded(block, np.tile(wave, 3)).slice(200, 400)
-    found = run_free(block, recording.with_meta(**{PERIODIC: True}), "displacement")
+    found = block.simulate(recording.with_meta(**{PERIODIC: True}))["displacement"]
     expected = block.simulate(np.tile(wave, 2), sample_time=0.01)[200:]
     np.testing.assert_array_equal(found, expected)
     assert not np.array_equal(found, block.simulate(wave, sample_time=0.01))

@@ -16,7 +16,7 @@ from mckibben.comparison.doubts import Span, doubts_of
 from mckibben.comparison.leaderboard import Row
 from mckibben.comparison.parts import N_PARTS, parts_of, spans_of
 from mckibben.estimators.core.estimator import Estimator
-from mckibben.estimators.core.leaving_out import MOST_FREE, held_out
+from mckibben.estimators.core.leaving_out import MOST_FREE
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.metrics import Scores
 from mckibben.registry import load
@@ -74,7 +74,7 @@ def test_bridged_samples_and_short_recordings_are_left_alone() -> None:
 
 def without(estimator: Estimator, part: Any) -> Array:
     """Return the outputs of a fit, from rest, to all but a part."""
-    model = estimator.find(estimator.data([RUN], [~part[0]]), Tracker())[0]
+    model = estimator.find(estimator.data([RUN], [~part[0]]), Tracker())
     return model.simulate(RUN, initial="first_sample")["displacement"]
 
 
@@ -92,7 +92,7 @@ def test_of_a_linear_readout_it_is_that_of_a_fit_to_the_rest() -> None:
 def test_the_error_on_a_part_is_about_that_of_a_fit_to_the_rest(name: str) -> None:
     parts = parts_of([RUN], CHANNELS)
     estimator = load("estimators", name)().fit(RUN)
-    (table,) = held_out(estimator, [RUN], parts) or []
+    (table,) = estimator.held_out([RUN], parts) or []
     errors = []
     for part in parts[2:5]:
         rows, y = part[0], RUN["displacement"]
@@ -109,7 +109,7 @@ def test_the_part_itself_has_no_say() -> None:
     y = RUN["displacement"] + np.where(part[0], 3.0, 0.0)
     spoilt = RUN.with_channels(displacement=y)
     estimator = load("estimators", "mpi")().fit(spoilt)
-    (table,) = held_out(estimator, [spoilt], [part]) or []
+    (table,) = estimator.held_out([spoilt], [part]) or []
     error = (table[:, 0] - RUN["displacement"])[part[0]]
     fitted = (estimator.model_.simulate(spoilt)["displacement"] - RUN["displacement"])[part[0]]
     assert np.sqrt(np.mean(error**2)) < 0.5 * np.sqrt(np.mean(fitted**2))

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, DataError, ModelError, Recording, compare, registry
-from mckibben.blocks.free_run import run_free
 from mckibben.channels import Channels
 from mckibben.comparison.choosing import USEFUL, order, recommended
 from mckibben.comparison.leaderboard import Leaderboard
@@ -53,7 +52,7 @@ def test_errors_are_those_of_free_runs_within_their_intervals(
         assert row.block is not None
         assert row.test is not None
         assert row.rmse_interval is not None
-        error = run_free(row.block, test_set, "displacement") - test_set["displacement"]
+        error = row.block.simulate(test_set)["displacement"] - test_set["displacement"]
         assert row.test.rmse == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-9)
         assert row.rmse_interval[0] <= row.test.rmse <= row.rmse_interval[1]
 

@@ -14,7 +14,7 @@ from sklearn.exceptions import NotFittedError
 
 from mckibben import DataError, ModelError, Recording, registry
 from mckibben import load as load_model
-from mckibben.estimators.core.free_runs import FreeRuns
+from mckibben.blocks.free_runs import FreeRuns
 from tests.estimators.examples import CASES, KINDS, quick, recorded
 from tests.estimators.examples import few_steps as few_steps  # a fixture
 
@@ -140,7 +140,7 @@ def test_what_is_fixed_is_no_parameter_and_all_else_follows_the_data(name: str, 
         names = {fits[0].model_.parameter_names[k] for k in free[still[free]]}
         assert names <= STILL.get(name, set())
     if not still[fixed].all():
-        whole = FreeRuns(fits[0].model_, runs[:1], [np.ones(len(runs[0]), dtype=bool)])
+        whole = FreeRuns.of(fits[0].model_, runs[:1])
         slopes = whole.slopes(range(first.size))
         free = np.delete(slopes, fixed, axis=1)
         left = slopes - free @ np.linalg.lstsq(free, slopes, rcond=1e-9)[0]

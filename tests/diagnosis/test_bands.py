@@ -11,12 +11,12 @@ from scipy.stats import binom
 
 from mckibben import GPI, Banded, DataError, ModelError, PerChannel, Recording, calibrate, compare
 from mckibben.blocks.fields import Channel
+from mckibben.blocks.runs import FreeRun, run_of
 from mckibben.blocks.saving import from_dict
 from mckibben.diagnosis.bands import (
     FEWEST,
     LEVEL,
     SHARES,
-    Held,
     TestedBand,
     calibration,
     find_band,
@@ -68,15 +68,18 @@ def test_no_more_runs_than_chance_are_missed_where_a_run_is_off_as_a_whole() -> 
     rng = np.random.default_rng(5)
     u = random_wave(STEP * np.arange(40), 0.3, 5.0, seed=0)
     modelled = MODEL.simulate(u)[:, None]
-    counts = np.ones(40, dtype=bool)
     missed, trials, per = 0, 40, 5
     for _ in range(trials):
         offs = rng.standard_t(3, 39 + per)
-        held = [Held(u[:, None], modelled, modelled + off, counts, None) for off in offs]
+        held = []
+        for off in offs:
+            pressed = Recording({"pressure": u, "displacement": modelled[:, 0] + off})
+            run = run_of(pressed, ["pressure"], ["displacement"])
+            held.append(FreeRun.of(run, modelled))
         band = find_band(MODEL, held[:39], "run").band
         for one in held[39:]:
             ends = band.simulate(one.modelled)
-            missed += not (ends[0, 1] <= one.measured[0, 0] <= ends[0, 2])
+            missed += not (ends[0, 1] <= one.y[0] <= ends[0, 2])
     assert missed <= binom.ppf(0.999, trials * per, 0.1)
     assert missed > 0
 

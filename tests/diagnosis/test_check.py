@@ -11,9 +11,9 @@ from scipy.signal import lfilter
 
 from mckibben import PI, DataError, Recording
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
+from mckibben.blocks.runs import FreeRun, run_of
 from mckibben.comparison.choosing import USEFUL
 from mckibben.diagnosis.check import check, check_runs
-from mckibben.diagnosis.free_runs import Run
 from mckibben.signals import staircase
 from tests.diagnosis.runs import LINE, STEP, TRUE, Array, cycles, noise, recording, run
 
@@ -122,7 +122,8 @@ def test_of_no_use_is_what_a_comparison_does_not_recommend(share: float) -> None
     y = run(TRUE, 1500)["displacement"]
     u, mean = cycles(1500), 1.0
     modelled = y - share * (y - mean)
-    taken = Run(recording(u, y), u[:, np.newaxis], y[:, np.newaxis], modelled[:, np.newaxis])
+    measured = run_of(recording(u, y), ["pressure"], ["displacement"])
+    taken = FreeRun.of(measured, modelled[:, np.newaxis])
     (one,) = check_runs(TRUE, [taken], means=np.array([mean])).outputs
     assert one.rmse == pytest.approx(share * one.mean_error)
     assert one.useless == (share > USEFUL)

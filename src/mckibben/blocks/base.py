@@ -28,7 +28,7 @@ from mckibben.blocks.kernels import Step, in_scratch
 from mckibben.blocks.parameters import Parametrised, gathered
 from mckibben.blocks.ranges import SLOW_STEP, both_sides, by_name, over_inputs
 from mckibben.blocks.running import Stream, refuse_time, run_many
-from mckibben.blocks.starts import start_state
+from mckibben.blocks.starts import run_on, start_state
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 from mckibben.system.compiling import bound
@@ -288,7 +288,7 @@ class Block(DrawsItself, Parametrised):
 
     def start_on(self, recording: Recording) -> Array:
         """Return the state before the first sample of a recording; see `mckibben.blocks.starts`."""
-        return start_state(self, recording)
+        return start_state(self, run_on(self, recording))
 
     # -- its kernel --------------------------------------------------------------------------
 

@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Mask
 from mckibben.blocks.fields import drives
+from mckibben.blocks.runs import Run, run_of
+from mckibben.recording import Recording
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
-    from mckibben.recording import Recording
 
 SETTLING = 256
 """Most samples at the first input before a recording, in which rates decay in a rate-dependent block."""
@@ -32,69 +33,72 @@ EXPLAINED = 1e-9
 """Error of the first output, relative to its size, that is rounding: a run from rest explains it."""
 
 
-def start_state(block: Block, recording: Recording) -> Array:
-    """Return the state before the first sample of a recording, shape (n_states,)."""
-    known = known_state(block, recording)
-    if known is not None:
-        return known
-    first = recording.matrix(channel.name for channel in block.inputs)[0]
-    return state_after(block, history(block, recording), first, recording.sample_time)
+def run_on(block: Block, recording: Recording, rows: Mask | None = None, index: int = 0) -> Run:
+    """Return a recording as a run of a block, without outputs if the recording lacks one of them.
+
+    ``rows`` are the samples that count, shape (n,); those bridged in reading never do.
+    """
+    inputs, outputs = ([c.name for c in some] for some in (block.inputs, block.outputs))
+    whole = recording.with_derived([*inputs, *outputs])
+    measured = all(whole.units.get(channel.name) == channel.unit for channel in block.outputs)
+    return run_of(
+        whole,
+        inputs[: block.n_driven],
+        outputs if measured else (),
+        inputs[block.n_driven :],
+        ~whole.bridged if rows is None else rows & ~whole.bridged,
+        index=index,
+    )
 
 
-def known_state(block: Block, recording: Recording) -> Array | None:
-    """Return the state of a block of past outputs, shape (n_states,), which the first one gives."""
-    outputs = first_outputs(block, recording)
-    if outputs is None:
-        return None
-    first = recording.matrix(channel.name for channel in block.inputs)[0]
-    return block.state_at(first, outputs)
+def start_state(block: Block, run: Run) -> Array:
+    """Return the state before the first sample of a run, shape (n_states,)."""
+    return state_after(block, history(block, run), run)
 
 
-def history(block: Block, recording: Recording) -> Array:
+def history(block: Block, run: Run) -> Array:
     """Return the inputs before the first sample that explain the first output, shape (k, n_inputs).
 
     Empty (k = 0) where the block begins at rest at the first input, or as it states.
     """
-    inputs = recording.matrix(channel.name for channel in block.inputs)
-    outputs, first = first_outputs(block, recording), inputs[0]
+    outputs, first, step = first_outputs(block, run), run.first, run.sample_time
     if outputs is None or block.n_driven != 1 or block.state_at(first, outputs) is not None:
-        return np.empty((0, inputs.shape[1]))
-    step = recording.sample_time
+        return np.empty((0, first.size))
     missed = outputs - _outputs(block, first[np.newaxis], step)[-1]
     if np.abs(missed).max() <= EXPLAINED * np.abs(outputs).max():
-        return np.empty((0, inputs.shape[1]))
+        return np.empty((0, first.size))
     if block.is_linear:
         return _rest_elsewhere(block, first, missed, step)
-    return _excursion(block, inputs, outputs, step)
+    return _excursion(block, run.inputs, outputs, step)
 
 
-def state_after(block: Block, before: Array, first: Array, sample_time: float | None) -> Array:
-    """Return the state after a history of inputs, (k, n_inputs), before a first input."""
+def state_after(block: Block, before: Array, run: Run) -> Array:
+    """Return the state after a history of inputs, (k, n_inputs), before the first sample of a run.
+
+    That of a block of past outputs is given by the first outputs instead.
+    """
+    outputs, first, step = first_outputs(block, run), run.first, run.sample_time
+    known = None if outputs is None else block.state_at(first, outputs)
+    if known is not None:
+        return known
     if not len(before):
-        return block.initial_state(first, sample_time=sample_time)
-    state = block.initial_state(before[0], "first_sample", sample_time)
+        return block.initial_state(first, sample_time=step)
+    state = block.initial_state(before[0], "first_sample", step)
     before = np.ascontiguousarray(before)
-    block.bind(sample_time, state, before, np.empty((len(before), len(block.outputs))))()
+    block.bind(step, state, before, np.empty((len(before), len(block.outputs))))()
     return state
 
 
-def first_outputs(block: Block, recording: Recording) -> Array | None:
-    """Return the first measured value of every output of a block; None where they have no say.
+def first_outputs(block: Block, run: Run) -> Array | None:
+    """Return the first outputs, from which a block begins, shape (m,); None where they have no say.
 
-    That is where one is missing, interpolated or also an input, where the block has no state or states
-    its start, and where it is a compensator, whose outputs are commands.
+    That is where they are not known, or also an input, where the block has no state or states its
+    start, and where it is a compensator, whose outputs are commands.
     """
-    recording = recording.with_derived(channel.name for channel in block.outputs)
     commands = drives(block.outputs[0]) and not drives(block.inputs[0])
     given = {channel.name for channel in block.inputs}
-    if commands or block.n_states == 0 or not unstated(block) or recording.bridged[0]:
-        return None
-    if any(
-        channel.name in given or recording.units.get(channel.name) != channel.unit
-        for channel in block.outputs
-    ):
-        return None
-    return np.array([recording[channel.name][0] for channel in block.outputs])
+    again = any(channel.name in given for channel in block.outputs)
+    return None if commands or again or not block.n_states or not unstated(block) else run.start
 
 
 def unstated(block: Block) -> bool:

@@ -13,17 +13,15 @@ import numpy as np
 from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.free_run import run_free
+from mckibben.blocks.runs import FreeRun, run_of
 from mckibben.channels import Channels
 from mckibben.comparison.choosing import CONSTANT, skill_of
 from mckibben.comparison.leaderboard import Row, Validated
 from mckibben.comparison.parts import Part
 from mckibben.comparison.splits import Split
-from mckibben.diagnosis.bands import Held
 from mckibben.diagnosis.branch_gaps import Memory, memory_test
 from mckibben.errors import MckibbenError, unforeseen
 from mckibben.estimators.core.estimator import Estimator
-from mckibben.estimators.core.leaving_out import held_out
 from mckibben.metrics import Scores, mean_scores, score
 from mckibben.recording import Recording
 from mckibben.system import workers
@@ -88,19 +86,13 @@ class Data:
             for part in self.parts
         ]
 
-    def held(self, predictions: Sequence[Array], block: Block) -> list[Held]:
-        """Return the held-out predictions of every recording of the parts, and its measured outputs."""
-        inputs = [channel.name for channel in block.inputs]
+    def held(self, predictions: Sequence[Array], block: Block) -> list[FreeRun]:
+        """Return the held-out predictions of every recording of the parts, as runs."""
+        inputs, outputs = [channel.name for channel in block.inputs], self.channels.outputs
         each = zip(self.held_out, predictions, zip(*self.parts, strict=True), strict=True)
         return [
-            Held(
-                run.matrix(inputs),
-                found,
-                run.matrix(self.channels.outputs),
-                np.any(rows, axis=0),
-                run.sample_time,
-            )
-            for run, found, rows in each
+            FreeRun.of(run_of(one, inputs, outputs, counts=np.any(rows, axis=0)), found)
+            for one, found, rows in each
         ]
 
 
@@ -227,10 +219,10 @@ def _held_out(
     """Return the outputs over the recordings of the parts, each part by the model without it."""
     block, train, names = estimator.fitted, data.split.train, data.channels.outputs
     if data.checks:
-        return tuple(run_free(block, recording, names) for recording in data.checks), "given"
+        return tuple(block.simulate(one).matrix(names) for one in data.checks), "given"
     if not data.parts:
         return tuple(outputs[: len(train)]), "fit"
-    found = held_out(estimator, train, data.parts)
+    found = estimator.held_out(train, data.parts)
     if found is None:
         return tuple(outputs[: len(train)]), "fit"
     given = [channel.name for channel in block.outputs]
@@ -239,7 +231,7 @@ def _held_out(
 
 def outputs_of(block: Block, data: Data) -> tuple[Array, ...]:
     """Return a model's free-running outputs on every training recording, then every test recording."""
-    return tuple(run_free(block, one, data.channels.outputs) for one in data.recordings)
+    return tuple(block.simulate(one).matrix(data.channels.outputs) for one in data.recordings)
 
 
 def _step_cost(block: Block, recording: Recording) -> float:

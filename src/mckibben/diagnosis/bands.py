@@ -9,7 +9,7 @@ unit's samples on average (Lee, Barber and Willett, Distribution-free inference 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
@@ -19,8 +19,9 @@ from mckibben.arrays import Array
 from mckibben.blocks.bands import Band, Banded, inside
 from mckibben.blocks.base import Block, check_units
 from mckibben.blocks.fields import rows, vector
-from mckibben.blocks.free_run import refuse_runaway, run_free
+from mckibben.blocks.free_runs import free_run
 from mckibben.blocks.inverse import commands
+from mckibben.blocks.runs import FreeRun
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
 from mckibben.recording import Recording, listed
@@ -67,37 +68,6 @@ like branches differ.
 
 SHARES = 0.8, 0.97
 """Least and greatest share of the samples of a test recording in a band of 0.9 that is known."""
-
-
-@dataclass(frozen=True)
-class Held:
-    """A run to which the model was not fitted.
-
-    Parameters
-    ----------
-    inputs : array, shape (n, inputs)
-    modelled, measured : array, shape (n, outputs)
-        Outputs; the model runs free.
-    counts, sample_time : array of bool, shape (n,), float or None
-        Samples that are scored; [s].
-    """
-
-    inputs: Array
-    modelled: Array
-    measured: Array
-    counts: NDArray[np.bool_]
-    sample_time: float | None
-
-    @property
-    def errors(self) -> Array:
-        """Errors of the scored samples, shape (scored, outputs)."""
-        return np.asarray((self.measured - self.modelled)[self.counts])
-
-    @property
-    def speeds(self) -> Array:
-        """Speeds of the modelled outputs there [unit/s, or per sample], shape (scored, outputs)."""
-        moved = np.abs(np.diff(self.modelled, axis=0, prepend=self.modelled[:1]))
-        return np.asarray(moved[self.counts] / (self.sample_time or 1.0))
 
 
 @dataclass(frozen=True)
@@ -216,22 +186,18 @@ def calibration(
         check_units(recording, model.outputs)
     inputs, outputs = ([c.name for c in channels] for channels in (model.inputs, model.outputs))
     check_shared({"fit": fitted, "calibrate": recordings}, inputs, outputs)
-    held = [held_of(model, one) for one in one_by_one(recordings, tell)]
+    runs = [free_run(model, one) for one in one_by_one(recordings, tell)]
+    # the first sample, a start, is not scored
+    held = [replace(run, counts=np.arange(len(run)) > 0) for run in runs]
     found = find_band(model, held, exchangeable)
     return Banded(model, found.band), found
 
 
-def held_of(model: Block, recording: Recording) -> Held:
-    """Return a model's free run on a recording; the first sample, its start, is not scored."""
-    outputs = [channel.name for channel in model.outputs]
-    modelled, measured = run_free(model, recording, outputs), recording.matrix(outputs)
-    refuse_runaway(model, recording, modelled, measured)
-    given = recording.matrix(channel.name for channel in model.inputs)
-    return Held(given, modelled, measured, np.arange(len(recording)) > 0, recording.sample_time)
-
-
 def find_band(
-    model: Block, runs: Sequence[Held], unit: Unit = "auto", widenings: Sequence[float] = WIDENINGS
+    model: Block,
+    runs: Sequence[FreeRun],
+    unit: Unit = "auto",
+    widenings: Sequence[float] = WIDENINGS,
 ) -> Calibration:
     """Return the band of a model from its errors on held-out runs; needs two units."""
     runs = [run for run in runs if run.counts.any()]
@@ -379,7 +345,7 @@ class TestedBand:
 
 def tested_band(
     block: Block,
-    held: Sequence[Held],
+    held: Sequence[FreeRun],
     outputs: Sequence[Array],
     split: Split,
     held_out: Sequence[Recording],

@@ -17,7 +17,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.diagnosis.free_runs import Run
+from mckibben.blocks.runs import FreeRun
 from mckibben.signals.holds import holds
 from mckibben.signals.reversals import reversals
 from mckibben.statistics import correlation_length, hats
@@ -102,7 +102,7 @@ class _Group:
 
 
 def causes(
-    block: Block, runs: Sequence[Run], output: int, residuals: Sequence[Array], every: int
+    block: Block, runs: Sequence[FreeRun], output: int, residuals: Sequence[Array], every: int
 ) -> tuple[tuple[Cause, ...], tuple[Cause, ...]]:
     """Return the significant causes of a residual, largest first, and every cause by itself.
 
@@ -210,11 +210,11 @@ def averaged(samples: Array, every: int) -> Array:
 
 
 def _groups(
-    block: Block, runs: Sequence[Run], output: int, every: int
+    block: Block, runs: Sequence[FreeRun], output: int, every: int
 ) -> tuple[list[_Group], list[Array]]:
     """Return the groups of regressors, and their columns (blocks, k) of every run; the first is 1."""
-    room = max(sum(len(run.inputs) // every for run in runs) // PER_COLUMN, 1)
-    tables = [np.ones((len(run.inputs) // every, 1)) for run in runs]
+    room = max(sum(len(run) // every for run in runs) // PER_COLUMN, 1)
+    tables = [np.ones((len(run) // every, 1)) for run in runs]
     groups = [_Group("offset", "", (0,))]
     modelled = _scaled([run.modelled[:, output] for run in runs])
     for kind, channel, delay, columns in _regressors(block, runs, output, modelled):
@@ -230,7 +230,7 @@ def _groups(
 
 
 def _regressors(
-    block: Block, runs: Sequence[Run], output: int, modelled: Sequence[Array]
+    block: Block, runs: Sequence[FreeRun], output: int, modelled: Sequence[Array]
 ) -> Iterator[tuple[str, str, int, list[Array]]]:
     """Yield kind, channel, delay and columns of causes; short recordings have room for the first."""
     delay = _best_delay(runs, output)
@@ -252,16 +252,16 @@ def _regressors(
     yield "output", "", 0, _hats(modelled, KNOTS)
 
 
-def block_length(block: Block, runs: Sequence[Run]) -> int:
+def block_length(block: Block, runs: Sequence[FreeRun]) -> int:
     """Return the number of samples per block: short compared with a branch, with a limited total."""
-    sizes = [len(run.inputs) for run in runs]
+    sizes = [len(run) for run in runs]
     branches = _branch_lengths(block, runs)
     usual = int(np.median(branches)) // PER_BRANCH if branches else 1
     most = max(int(np.median(sizes)) // (2 * PER_COLUMN), 1)
     return min(max(1, min(usual, sum(sizes) // FEWEST), -(-sum(sizes) // MOST)), most)
 
 
-def _branch_lengths(block: Block, runs: Sequence[Run]) -> list[int]:
+def _branch_lengths(block: Block, runs: Sequence[FreeRun]) -> list[int]:
     """Return the samples between turning points of driven inputs."""
     driven = [x for name in _driven(block) for x in _samples(runs, name) if np.ptp(x) > 0]
     return [int(length) for x in driven for length in np.diff(reversals(x))]
@@ -271,20 +271,20 @@ def _driven(block: Block) -> list[str]:
     return [c.name for c in block.inputs if c.name not in block.scheduling]
 
 
-def _moving(block: Block, runs: Sequence[Run]) -> list[str]:
+def _moving(block: Block, runs: Sequence[FreeRun]) -> list[str]:
     """Return the inputs, and recorded causes that the model does not use, that vary."""
     inputs, outputs = ([c.name for c in channels] for channels in (block.inputs, block.outputs))
     others = [
         name
-        for name in runs[0].recording.channels
+        for name in runs[0].source.channels
         if name.split("_")[0] in CAUSES and name not in (*inputs, *outputs)
     ]
-    recorded = [n for n in (*inputs, *others) if all(n in run.recording for run in runs)]
+    recorded = [n for n in (*inputs, *others) if all(n in run.source for run in runs)]
     return [name for name in recorded if np.ptp(np.concatenate(_samples(runs, name))) > 0]
 
 
-def _samples(runs: Sequence[Run], name: str) -> list[Array]:
-    return [run.recording[name] for run in runs]
+def _samples(runs: Sequence[FreeRun], name: str) -> list[Array]:
+    return [run.source[name] for run in runs]
 
 
 def _scaled(parts: Sequence[Array]) -> list[Array]:
@@ -312,15 +312,15 @@ def _lagging(modelled: Array, delay: int) -> Array:
     return np.column_stack([slope, modelled[places] - modelled])
 
 
-def _best_delay(runs: Sequence[Run], output: int) -> int:
+def _best_delay(runs: Sequence[FreeRun], output: int) -> int:
     """Return the best shift of the modelled output in samples."""
-    most = min(MOST_DELAY, min(len(run.inputs) for run in runs) // LONGER)
+    most = min(MOST_DELAY, min(len(run) for run in runs) // LONGER)
 
     def left(delay: int) -> float:
         total = 0.0
         for run in runs:
-            n = len(run.inputs)  # the same samples at every delay
-            y = run.measured[most : n - most, output]
+            n = len(run)  # the same samples at every delay
+            y = run.outputs[most : n - most, output]
             total += float(np.sum((y - run.modelled[most - delay : n - most - delay, output]) ** 2))
         return total
 
@@ -342,10 +342,10 @@ def _speeds(modelled: Array) -> Array:
     return np.column_stack([np.abs(rate), root, rate * modelled])
 
 
-def _longest_hold(block: Block, runs: Sequence[Run], names: Sequence[str]) -> int:
+def _longest_hold(block: Block, runs: Sequence[FreeRun], names: Sequence[str]) -> int:
     """Return the samples of the longest hold of all inputs and loads; 0 if holds are rare."""
     shortest = max(int(np.median(_branch_lengths(block, runs))) // 2, 10)
-    tables = [run.recording.matrix(names) for run in runs]
+    tables = [run.source.matrix(names) for run in runs]
     spans = np.ptp(np.concatenate(tables), axis=0).tolist()
     found = [hold.stop - hold.start for table in tables for hold in holds(table, spans, shortest)]
     return max(found, default=0) if sum(found) >= HELD * sum(map(len, tables)) else 0

@@ -11,10 +11,11 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
+from mckibben.blocks.runs import FreeRun
 from mckibben.comparison.choosing import useful
 from mckibben.diagnosis.causes import Cause, averaged, block_length, causes
 from mckibben.diagnosis.description import ModelDescription
-from mckibben.diagnosis.free_runs import Run, runs_of
+from mckibben.diagnosis.free_runs import runs_of
 from mckibben.recording import Recording, listed
 from mckibben.statistics import NORMAL_95, correlation_length
 from mckibben.system.progress import Tell, one_by_one, telling
@@ -171,7 +172,7 @@ class Validation(DrawsItself):
     outputs : tuple of OutputCheck
     untested : tuple of str
         Names of recordings too short to be tested.
-    runs : tuple of Run
+    runs : tuple of FreeRun
         The recordings, and what the model makes of them; not in ``to_dict``.
     description : ModelDescription or None
         Of the model, where it was asked for.
@@ -183,7 +184,7 @@ class Validation(DrawsItself):
     recordings: tuple[str, ...]
     outputs: tuple[OutputCheck, ...] = field(repr=False)
     untested: tuple[str, ...] = ()
-    runs: tuple[Run, ...] = field(default=(), repr=False)
+    runs: tuple[FreeRun, ...] = field(default=(), repr=False)
     description: ModelDescription | None = field(default=None, repr=False)
 
     @property
@@ -243,7 +244,7 @@ def check(
 
 
 def check_runs(
-    model: Block, runs: Sequence[Run], tell: Tell | None = None, means: Array | None = None
+    model: Block, runs: Sequence[FreeRun], tell: Tell | None = None, means: Array | None = None
 ) -> Validation:
     """Check a model by its free runs on recordings; see `check`.
 
@@ -253,25 +254,30 @@ def check_runs(
         Of the training outputs, which the model has to beat; default those of the recordings.
     """
     every = block_length(model, runs)
-    tested = [run for run in runs if len(run.inputs) // every >= FEWEST_BLOCKS] or list(runs)
+    tested = [run for run in runs if len(run) // every >= FEWEST_BLOCKS] or list(runs)
     if means is None:
-        means = np.concatenate([run.measured for run in runs]).mean(axis=0)
+        means = np.concatenate([run.outputs for run in runs]).mean(axis=0)
     with one_blas_thread():
         outputs = tuple(
             _output(model, runs, tested, every, place, float(means[place]))
             for place in one_by_one(range(len(model.outputs)), tell)
         )
-    names = tuple(run.recording.name for run in runs)
-    untested = tuple(run.recording.name for run in runs if run not in tested)
+    names = tuple(run.name for run in runs)
+    untested = tuple(run.name for run in runs if run not in tested)
     return Validation(model.kind, names, outputs, untested, tuple(runs))
 
 
 def _output(
-    model: Block, runs: Sequence[Run], tested: Sequence[Run], every: int, place: int, mean: float
+    model: Block,
+    runs: Sequence[FreeRun],
+    tested: Sequence[FreeRun],
+    every: int,
+    place: int,
+    mean: float,
 ) -> OutputCheck:
     channel = model.outputs[place]
     residuals = [run.residual[:, place] for run in runs]
-    measured = [run.measured[:, place] for run in runs]
+    measured = [run.outputs[:, place] for run in runs]
     span, rmse = float(np.ptp(np.concatenate(measured))), _rms(residuals)
     exact = rmse <= max(ROUNDING * span, STEP * _resolution(measured))
     if exact:
@@ -281,7 +287,7 @@ def _output(
     missing, suspects = causes(model, tested, place, left, every)
     found = dict.fromkeys((one.kind, one.channel) for one in suspects)
     patterns = [
-        _pattern(against, name, runs[0].recording.units[name], left, tested, every)
+        _pattern(against, name, runs[0].source.units[name], left, tested, every)
         for kind, against in (("curve", "input"), ("hysteresis", "branch"), ("load", "load"))
         for each, name in found
         if each == kind
@@ -292,7 +298,7 @@ def _output(
     return OutputCheck(
         output=channel.name,
         unit=channel.unit,
-        sample_time=runs[0].recording.sample_time,
+        sample_time=runs[0].sample_time,
         span=span,
         rmse=rmse,
         mean_error=_rms([y - mean for y in measured]),
@@ -305,9 +311,9 @@ def _output(
 
 
 def _pattern(
-    against: str, name: str, unit: str, left: list[Array], runs: Sequence[Run], every: int
+    against: str, name: str, unit: str, left: list[Array], runs: Sequence[FreeRun], every: int
 ) -> Pattern:
-    values = [averaged(run.recording[name], every) for run in runs]
+    values = [averaged(run.source[name], every) for run in runs]
     branches = [np.gradient(x) for x in values] if against == "branch" else None
     return Pattern(against, name, unit, bins(left, values, every, branches))
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.equations import Quantity, quantities, written
+from mckibben.blocks.free_runs import FreeRuns
 from mckibben.blocks.inverse import commands
 from mckibben.blocks.notation import Written
 from mckibben.errors import DataError, ModelWarning
-from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.core.uncertainty import (
     autoregressions,
     covariance_of,
@@ -124,19 +124,16 @@ def describe(
 
 def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, float]:
     """Return the covariance of a model's parameters, and independent samples; NaN if unknown."""
-    names = [channel.name for channel in (*block.inputs, *block.outputs)]
-    outputs = [channel.name for channel in block.outputs]
     share = min(1.0, MOST_OPERATIONS / max(_operations(block, recordings), 1.0))
-    every = [recording.with_derived(names) for recording in recordings]
-    kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in every]
+    kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
     share = sum(map(len, kept)) / sum(map(len, recordings))
     if _means_nothing(block):
         return unknown(block), np.nan
-    runs = FreeRuns(block, kept, [~recording.bridged for recording in kept])
+    runs = FreeRuns.of(block, kept)
     if not np.isfinite(runs.residual).all():
         return unknown(block), np.nan
-    pairs = zip(kept, runs.modelled, runs.rows, strict=True)
-    left = [np.where(own[:, None], r.matrix(outputs) - found, np.nan) for r, found, own in pairs]
+    pairs = zip(runs.runs, runs.modelled, strict=True)
+    left = [np.where(r.counts[:, None], r.outputs - found, np.nan) for r, found in pairs]
     n = sum(int(own.sum()) for own in runs.rows)
     n_effective = min(m.effective_sample_size(n) for m in autoregressions(left)) / share
     return share * covariance_of(runs, np.flatnonzero(fixed(block)).tolist())[1], n_effective

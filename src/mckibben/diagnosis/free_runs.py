@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from mckibben.arrays import Array
 from mckibben.blocks.base import Block, check_units
-from mckibben.blocks.free_run import refuse_runaway, run_free
+from mckibben.blocks.free_runs import free_run
+from mckibben.blocks.runs import FreeRun
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.signals.shared_rows import check_shared
@@ -22,32 +20,7 @@ SAME_TIME = 1e-3
 """Relative difference up to which sample times are equal."""
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """One recording, and the model's free run.
-
-    Parameters
-    ----------
-    recording : Recording
-        Measured.
-    inputs : array, shape (n, k)
-        What the model is given.
-    measured, modelled : array, shape (n, m)
-        Outputs; the model runs free.
-    """
-
-    recording: Recording
-    inputs: Array
-    measured: Array
-    modelled: Array
-
-    @property
-    def residual(self) -> Array:
-        """Measured minus modelled output, shape (n, m)."""
-        return self.measured - self.modelled
-
-
-def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
+def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[FreeRun, ...]:
     """Return a model's free runs over recordings.
 
     Raises
@@ -62,15 +35,7 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
     inputs = [channel.name for channel in block.inputs]
     outputs = [channel.name for channel in block.outputs]
     check_shared({"check": recordings}, inputs, outputs)
-    found = []
-    for recording in recordings:
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore", RuntimeWarning)
-            modelled = run_free(block, recording, outputs)
-        measured = recording.matrix(outputs)
-        refuse_runaway(block, recording, modelled, measured)
-        found.append(Run(recording, recording.matrix(inputs), measured, modelled))
-    return tuple(found)
+    return tuple(free_run(block, recording) for recording in recordings)
 
 
 def check_usable(block: Block, recordings: Sequence[Recording]) -> None:

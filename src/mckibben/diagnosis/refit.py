@@ -13,13 +13,11 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.free_run import run_free
 from mckibben.blocks.inverse import Inverse
 from mckibben.channels import Channels
 from mckibben.comparison.parts import parts_of
 from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.estimators.catalogue import declared
-from mckibben.estimators.core.leaving_out import held_out
 from mckibben.recording import Recording
 from mckibben.statistics import BlockBootstrap, correlation_length, interval
 
@@ -89,7 +87,7 @@ def refitted(
             settings["n_operators"] = len(thresholds) - (thresholds[0] == 0)
 
     def missed(block: Block, log: Recording) -> Array:
-        return np.asarray(run_free(block, log, outputs) - log.matrix(outputs))
+        return np.asarray(block.simulate(log).matrix(outputs) - log.matrix(outputs))
 
     parts = parts_of(whole, Channels(tuple(driving), tuple(outputs), tuple(old.scheduling) or None))
     if not parts:
@@ -100,7 +98,7 @@ def refitted(
             warnings.simplefilter("ignore", ModelWarning)
             before = [missed(old, log) for log in whole]
             refit = estimator(**settings).fit([*whole, *older_runs])
-            found = held_out(refit, [*whole, *older_runs], [(*part, *kept) for part in parts])
+            found = refit.held_out([*whole, *older_runs], [(*part, *kept) for part in parts])
     except MckibbenError as error:
         return f"No model could be fitted to the log: {error}"
     if found is None:

@@ -12,8 +12,8 @@ from mckibben.report.shown import Shown
 from mckibben.system.atomic import to_json
 
 if TYPE_CHECKING:
+    from mckibben.blocks.runs import FreeRun
     from mckibben.diagnosis.check import OutputCheck, Validation
-    from mckibben.diagnosis.free_runs import Run
     from mckibben.outputs import Results
 
 MOST_RECORDINGS = 4
@@ -29,7 +29,7 @@ def check_json(found: Validation, model_file: str) -> dict[str, Any]:
         "verdict": words.check_verdict(found),
         "sentences": [said for one in found.outputs for said in words.check_notes(one)],
         "model_file": model_file,
-        "notes_of_reading": notes_by_file([run.recording for run in found.runs]),
+        "notes_of_reading": notes_by_file([run.source for run in found.runs]),
     }
 
 
@@ -41,9 +41,9 @@ def write_check(folder: Results, found: Validation, model_file: str) -> None:
 
 def check_page(found: Validation, model_file: str) -> str:
     """Return a check as HTML; ``model_file`` is the path of the model."""
-    longest = sorted(found.runs, key=lambda run: -len(run.inputs))[:MOST_RECORDINGS]
+    longest = sorted(found.runs, key=lambda run: -len(run))[:MOST_RECORDINGS]
     runs = [run for run in found.runs if run in longest]
-    names = [run.recording.name for run in runs]
+    names = [run.name for run in runs]
     sections = [
         Section(f"output-{k}", f"Residual of {one.output}", _output(one, k, runs), names)
         for k, one in enumerate(found.outputs)
@@ -70,13 +70,13 @@ def check_page(found: Validation, model_file: str) -> str:
     ).html()
 
 
-def _output(one: OutputCheck, place: int, runs: list[Run]) -> list[Item]:
+def _output(one: OutputCheck, place: int, runs: list[FreeRun]) -> list[Item]:
     """Return the sections of an output: finding, residuals, and all tests."""
     items = results.checked(one)
     if place >= MOST_OUTPUTS:
         return items
     about = [
-        Shown(run.recording, one.patterns[0].channel, one.output, {"model": modelled}, "test")
+        Shown(run.source, one.patterns[0].channel, one.output, {"model": modelled}, "test")
         for run in runs
         for modelled in [run.modelled[:, place]]
     ]

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from mckibben.blocks.base import Block
-from mckibben.blocks.free_run import run_free
 from mckibben.channels import Channels, any_moves, channels_of
 from mckibben.control.identified import known_ranges
 from mckibben.control.loop import ends
@@ -253,7 +252,7 @@ def _against(kind: str) -> Callable[..., Drawing]:
                 one,
                 input or coupled.pairs([one])[0][0],
                 wanted,
-                {name: run_free(block, one, wanted) for name, block in blocks.items()},
+                {name: block.simulate(one)[wanted] for name, block in blocks.items()},
                 "",
             )
             for one in several[:N_COLOURS]

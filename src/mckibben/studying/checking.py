@@ -8,9 +8,11 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.runs import FreeRun
+from mckibben.blocks.starts import run_on
 from mckibben.comparison.splits import Split
 from mckibben.diagnosis.check import Validation, check_runs
-from mckibben.diagnosis.free_runs import Run, check_usable
+from mckibben.diagnosis.free_runs import check_usable
 from mckibben.errors import DataError
 
 
@@ -35,12 +37,10 @@ def check_on_test(
         if not scored.size:
             continue
         start, stop = int(scored[0]), int(scored[-1]) + 1
-        kept = recording.slice(start, stop)
-        inputs = kept.matrix(channel.name for channel in model.inputs)
-        measured = kept.matrix(given)
-        runs.append(Run(kept, inputs, measured, found[start:stop, places]))
+        run = run_on(model, recording.slice(start, stop))
+        runs.append(FreeRun.of(run, found[start:stop, places]))
     try:
-        check_usable(model, [run.recording for run in runs])
+        check_usable(model, [run.source for run in runs])
         return check_runs(model, runs, means=trained.mean(axis=0))
     except DataError as error:
         return str(error)

@@ -16,13 +16,12 @@ from mckibben.app.pages import choosing, parts
 from mckibben.app.state import State, view
 from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
-from mckibben.arrays import Array
-from mckibben.blocks.free_run import run_free
 from mckibben.channels import Channels
 from mckibben.diagnosis.coupling import coupling
 from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.estimators.catalogue import full_name
 from mckibben.numerals import number, typeset, typeset_within
+from mckibben.recording import Recording
 from mckibben.report import interactive, results, subjects
 from mckibben.report.builder import Figure, Table
 from mckibben.report.columns import Column, columns_of
@@ -295,9 +294,8 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
     driving = [each for each in sides.inputs if each in inputs] or inputs[:1]
     pair = coupling([run], driving, [wanted]).pairs([run])[0]
 
-    def show(modelled: Array) -> None:
-        place = outputs.index(wanted)
-        y = modelled.reshape(len(run), -1)[:, place]
+    def show(modelled: Recording) -> None:
+        y = modelled[wanted]
         drawn = subjects.against(FIGURES[tab], run, pair, {name: y}, tested)
         plots = interactive.plots(drawn)
         rows, unit = slice(tested or 0, None), run.units[wanted]
@@ -309,7 +307,7 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
                 mark(widgets.plot_of(plot, height=HEIGHT), f"closer-{tab}")
         ui.label(typeset_within(" ".join(text))).classes("muted")
 
-    free = partial(run_free, block, run, outputs)
+    free = partial(block.simulate, run)
     later(("free", *key, run.name), free, show, height=HEIGHT)
 
 

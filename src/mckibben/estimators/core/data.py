@@ -7,14 +7,16 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.arrays import Array, true_runs
+from mckibben.arrays import Array, Mask
+from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
+from mckibben.blocks.running import run_many
+from mckibben.blocks.runs import Run as Run
+from mckibben.blocks.runs import run_of
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
 
-Mask = NDArray[np.bool_]
 Made = TypeVar("Made")
 
 MOVES_AT_ALL = 0.02
@@ -27,86 +29,6 @@ and the time constant are not determined separately.
 
 FEWEST_SAMPLES = 10
 """Smallest number of samples for identification."""
-
-
-def stretches(mask: Mask) -> list[tuple[int, int]]:
-    """Return start and stop of segments of true values."""
-    return [(start, stop) for start, stop in true_runs(mask).tolist()]
-
-
-@dataclass(frozen=True)
-class Run:
-    """One recording: inputs (n, k), outputs (n, m), scheduling inputs (n, s), and scored samples."""
-
-    name: str
-    driven: Array
-    outputs: Array
-    scheduled: Array
-    counts: Mask
-    sample_time: float | None
-    place: int = 0
-    """Index among all runs."""
-
-    recording: int = 0
-    """Index of its recording."""
-
-    unmeasured: tuple[str, ...] = ()
-    """Scheduling channels that the recording lacks; their mean over the other recordings is used.
-    """
-
-    @property
-    def u(self) -> Array:
-        """The first input, shape (n,)."""
-        return self.driven[:, 0]
-
-    @property
-    def y(self) -> Array:
-        """The first output, shape (n,)."""
-        return self.outputs[:, 0]
-
-    def thinned(self, every: int) -> Run:
-        """Return every n-th sample."""
-        step = None if self.sample_time is None else every * self.sample_time
-        return replace(self._at(slice(None, None, every)), sample_time=step)
-
-    def cut(self, start: int, stop: int | None = None) -> Run:
-        """Return a segment of the run."""
-        return self._at(slice(start, stop))
-
-    def stretches(self, shortest: int) -> list[Run]:
-        """Return the segments of scored samples longer than a minimum, each as a run."""
-        return [
-            self.cut(start, stop)
-            for start, stop in stretches(self.counts)
-            if stop - start > shortest
-        ]
-
-    def condensed(self) -> Run:
-        """Return the run reduced to scored samples and turning points of the input.
-
-        Play operators do not depend on the path between turning points. Turns within
-        the noise go too, so this is for searching, not for the final word.
-        """
-        from mckibben.signals import reversals
-
-        kept = self.counts.copy()
-        kept[reversals(self.u)] = True
-        return self._at(kept)
-
-    def _at(self, kept: slice | Mask) -> Run:
-        """Return the remaining samples."""
-        return replace(
-            self,
-            driven=self.driven[kept],
-            outputs=self.outputs[kept],
-            scheduled=self.scheduled[kept],
-            counts=self.counts[kept],
-        )
-
-    @property
-    def inputs(self) -> Array:
-        """Inputs of a block, shape (n, k + s): driven and scheduling."""
-        return np.ascontiguousarray(np.hstack([self.driven, self.scheduled]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,15 +187,13 @@ class TrainingData:
         """Return a field of all runs, concatenated."""
         return np.concatenate([getattr(run, what) for run in self.runs])
 
-    def between(self, start: float, stop: float) -> TrainingData:
-        """Return the same runs, scored only between two shares of their time."""
-
-        def part(run: Run) -> Run:
-            shares = np.arange(run.counts.size)
-            inside = (shares >= round(start * shares.size)) & (shares < round(stop * shares.size))
-            return replace(run, counts=run.counts & inside)
-
-        return self._changed(part)
+    def simulated(self, blocks: Sequence[Block]) -> Array:
+        """Return outputs of blocks, from rest, at the scored samples, shape (blocks, as `target`)."""
+        outputs = []
+        for run in self.runs:
+            many = run_many(blocks, run.inputs, sample_time=run.sample_time)
+            outputs.append(many[:, run.counts].reshape(len(many), -1))
+        return np.concatenate(outputs, axis=1)
 
     def thinned(self, most: int) -> TrainingData:
         """Return the same runs with fewer scored samples, evenly spread; inputs are unchanged."""
@@ -337,9 +257,7 @@ def training_data(
             remedy="choose two channels with `input` and `output`",
         )
     masks = [np.ones(len(r), dtype=bool) for r in every] if rows is None else list(rows)
-    if len(masks) != len(every) or any(
-        np.shape(mask) != (len(r),) for mask, r in zip(masks, every, strict=False)
-    ):
+    if [np.shape(mask) for mask in masks] != [(len(r),) for r in every]:
         raise DataError(
             "rows do not match the recordings", remedy="give one mask a recording, one value a row"
         )
@@ -347,16 +265,8 @@ def training_data(
     for recording in every:
         _check(recording, first, (*driven, *given, *scheduling), one_rate)
     runs = tuple(
-        Run(
-            r.name,
-            r.matrix(driven),
-            r.matrix(given),
-            r.matrix(scheduling) if scheduling else np.empty((len(r), 0)),
-            np.asarray(mask, dtype=bool),
-            r.sample_time,
-            recording=place,
-        )
-        for place, (r, mask) in enumerate(zip(every, masks, strict=True))
+        run_of(r, driven, given, scheduling, np.asarray(mask, dtype=bool), index=index)
+        for index, (r, mask) in enumerate(zip(every, masks, strict=True))
     )
 
     def channels(names: Sequence[str]) -> tuple[Channel, ...]:

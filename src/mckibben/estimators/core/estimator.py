@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -19,10 +19,9 @@ from numpy.typing import ArrayLike
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
-from mckibben.blocks.free_run import run_free
+from mckibben.blocks.free_runs import FreeRuns, as_it_is
 from mckibben.errors import DataError, MckibbenError, ModelError, ModelWarning
 from mckibben.estimators.core.data import TrainingData, training_data
-from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.core.leaving_out import stepped
 from mckibben.estimators.core.settings import check_settings
 from mckibben.estimators.core.uncertainty import covariance_of, unknown, vanishing
@@ -341,8 +340,8 @@ class Estimator(ABC):
         )
 
     @abstractmethod
-    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the identified block, and the data with the channels that it uses."""
+    def find(self, data: TrainingData, tracker: Tracker) -> Block:
+        """Return the identified block."""
 
     def fit(
         self,
@@ -410,7 +409,7 @@ class Estimator(ABC):
 
     def _fit(
         self,
-        recordings: Recording | Sequence[Recording],
+        recordings: Sequence[Recording],
         rows: Sequence[Mask] | None,
         progress: Progress | None,
     ) -> Self:
@@ -418,25 +417,31 @@ class Estimator(ABC):
         self.check_settings()
         tracker = Tracker(progress=progress)
         data = self.data(recordings, rows)
-        self.model_ = self.find(data, tracker)[0]
-        runs = self.free_runs(self.model_, listed(recordings), rows)
+        self.model_ = self.find(data, tracker)
+        runs = self.free_runs(self.model_, recordings, rows)
         elsewhere = not self.begins_measured and any(map(len, runs.pasts))
         if elsewhere and runs.apart(runs.from_rest) > MATTERS * runs.rmse:
-            runs = self._after_pasts(runs, tracker)
+            runs = self._after_pasts(runs, recordings, rows, tracker)
         self.diagnostics_ = self._diagnose(runs, data, tracker, started)
         refuse_useless(self.diagnostics_, data)
         if progress is not None:
             progress(1.0, self.diagnostics_.rmse)
         return self
 
-    def _after_pasts(self, runs: FreeRuns, tracker: Tracker) -> FreeRuns:
+    def _after_pasts(
+        self,
+        runs: FreeRuns,
+        recordings: Sequence[Recording],
+        rows: Sequence[Mask] | None,
+        tracker: Tracker,
+    ) -> FreeRuns:
         """Fit again to recordings that begin after the pasts which the fit from rest shows."""
         for _ in range(MOST_PASTS):
             before = dict(vars(self))
             found = runs
             with suppress(MckibbenError):  # the fit from rest remains
-                self.model_ = self.find(self.data(*runs.preceded()), tracker)[0]
-                found = self.free_runs(self.model_, runs.recordings, runs.rows)
+                self.model_ = self.find(self.data(*preceded(recordings, runs)), tracker)
+                found = self.free_runs(self.model_, recordings, rows)
             if not found.rmse < runs.rmse:
                 vars(self).clear()
                 vars(self).update(before)
@@ -483,7 +488,7 @@ class Estimator(ABC):
             return self.predict(listed(recordings))[0]
         block = self.fitted
         given = [channel.name for channel in block.outputs]
-        found = [run_free(block, recording, given) for recording in listed(recordings)]
+        found = [block.simulate(recording).matrix(given) for recording in listed(recordings)]
         return [outputs[:, 0] for outputs in found] if len(given) == 1 else found
 
     def score(self, recordings: Recording | Sequence[Recording], y: None = None) -> float:
@@ -553,12 +558,8 @@ class Estimator(ABC):
         recordings: Sequence[Recording],
         rows: Sequence[Mask] | None = None,
     ) -> FreeRuns:
-        """Return the free runs of a block over recordings; samples bridged in reading never count."""
-        names = [channel.name for channel in (*block.inputs, *block.outputs)]
-        every = [one.with_derived(names) for one in listed(recordings)]
-        measured = [~one.bridged for one in every]
-        counted = measured if rows is None else list(map(np.logical_and, rows, measured))
-        return FreeRuns(block, every, counted)
+        """Return the free runs of a block over recordings."""
+        return FreeRuns.of(block, recordings, rows)
 
     @property
     def penalty(self) -> float:
@@ -568,22 +569,44 @@ class Estimator(ABC):
     def left_out(self, runs: FreeRuns, parts: Sequence[Mask]) -> list[list[Array]] | None:
         """Return the outputs of the model as it would be without each part of its data.
 
-        By a step from the fit (`mckibben.estimators.core.leaving_out`), or in closed form.
+        By a step from the fit, or in closed form; see `mckibben.estimators.core.leaving_out.stepped`.
+        """
+        block = runs.block
+        fixed = {*self.diagnostics_.at_bounds, *self.fixed(block)}
+        free = [place for place in range(block.n_parameters) if place not in fixed]
+        return stepped(runs, free, self.penalty, parts)
+
+    def held_out(
+        self, recordings: Sequence[Recording], parts: Sequence[Sequence[Mask]]
+    ) -> list[Array] | None:
+        """Return the outputs over recordings that were fitted, each part by the model without it.
 
         Parameters
         ----------
-        runs : FreeRuns
-            Of its model on the data that it was fitted to.
-        parts : sequence of array of bool, shape (N,)
-            Which outputs that count are left out.
+        recordings : sequence of Recording
+            Those that the estimator was fitted to.
+        parts : sequence of sequence of array of bool, shape (n,)
+            For every part, its samples of every recording.
 
         Returns
         -------
-        list of list of array, shape (n, m), or None
-            For every part, the outputs over every recording; None of a model with more parameters than a
-            step is computed for.
+        list of array, shape (n, m), or None
+            None of a model with more parameters than a step is computed for.
         """
-        return stepped(self, runs, parts)
+        # as the model is delivered, without loads of the recordings' own
+        runs = replace(self.free_runs(self.fitted, recordings), changed=as_it_is)
+        counted = [
+            np.concatenate([rows[own] for rows, own in zip(part, runs.rows, strict=True)])
+            for part in parts
+        ]
+        without = self.left_out(runs, [rows.repeat(len(runs.names)) for rows in counted])
+        if without is None:
+            return None
+        found = [table.copy() for table in runs.modelled]
+        for part, tables in zip(parts, without, strict=True):
+            for outputs, table, rows in zip(found, tables, part, strict=True):
+                outputs[rows] = table[rows]
+        return found
 
     def uncertainty(self, runs: FreeRuns, at_bounds: Sequence[int]) -> tuple[float, Array]:
         """Return the condition of the free parameters, and the covariance of all; see `Diagnostics`."""
@@ -627,6 +650,21 @@ def refuse_useless(found: Diagnostics, data: TrainingData) -> None:
             f"the model found explains no more than the mean: RMSE on its data {'; '.join(figures)}",
             remedy="change its settings, or fit another model: `compare()` ranks those that apply",
         )
+
+
+def preceded(recordings: Sequence[Recording], runs: FreeRuns) -> tuple[list[Recording], list[Mask]]:
+    """Return recordings with the pasts of their runs before them, and the samples that count."""
+    names, found, counted = [channel.name for channel in runs.block.inputs], [], []
+    for recording, past, rows in zip(recordings, runs.pasts, runs.rows, strict=True):
+        columns = dict(zip(names, past.T, strict=True))
+        channels = {
+            name: np.concatenate([columns.get(name, np.full(len(past), samples[0])), samples])
+            for name, samples in recording.with_derived(names).channels.items()
+        }
+        begun = recording.start_time - len(past) * recording.step
+        found.append(replace(recording, channels=channels, start_time=begun))
+        counted.append(np.concatenate([np.zeros(len(past), dtype=bool), rows]))
+    return found, counted
 
 
 def resting(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:

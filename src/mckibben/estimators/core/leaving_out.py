@@ -18,21 +18,16 @@ cross-validatory method for dependent data", Biometrika, 1994.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
+from mckibben.blocks.free_runs import FreeRuns, relative_sizes
 from mckibben.errors import MckibbenError
-from mckibben.estimators.core.free_runs import FreeRuns, as_it_is, relative_sizes
 from mckibben.estimators.core.uncertainty import LARGEST
-from mckibben.recording import Recording
-
-if TYPE_CHECKING:
-    from mckibben.estimators.core.estimator import Estimator
 
 DAMPINGS = np.geomspace(1e-2, 1e3, 6)
 """Dampings tried in turn, relative to each parameter's own effect on all data: what a part alone
@@ -60,81 +55,55 @@ class Slopes:
         Indices in ``block.pack()``.
     units : array, shape (k,)
         Change of every parameter in the unit of its column.
-    penalty : float
-        Of the fit, relative to each parameter's own effect.
     """
 
     values: Array
     kept: NDArray[np.intp]
     places: NDArray[np.intp]
     units: Array
-    penalty: float
 
 
-def slopes_of(estimator: Estimator, runs: FreeRuns) -> Slopes | None:
-    """Return the slopes of a fitted model's free run; None where more than `MOST_FREE` are free."""
-    block, m = runs.block, len(runs.names)
-    parameters = block.pack()
-    fixed = {*estimator.diagnostics_.at_bounds, *estimator.fixed(block)}
-    places = np.array([k for k in range(parameters.size) if k not in fixed], dtype=np.intp)
+def slopes_of(runs: FreeRuns, free: Sequence[int]) -> Slopes:
+    """Return the slopes of a free run by the free parameters that have an effect on it."""
+    m = len(runs.names)
     n_samples = runs.residual.size // m
     samples = np.linspace(0, n_samples - 1, min(n_samples, max(MOST_ROWS // m, 1)))
     kept = (m * samples.round().astype(np.intp)[:, np.newaxis] + np.arange(m)).ravel()
-    if len(places) > MOST_FREE:
-        return None
     with np.errstate(over="ignore", invalid="ignore"):
-        values = runs.slopes(places.tolist(), kept)
+        values = runs.slopes(free, kept)
         largest = np.abs(values).max(axis=0, initial=0.0)
         known = np.isfinite(largest) & (largest < LARGEST) & (largest > 0)
-    values, places = values[:, known], places[known]
+    values, places = values[:, known], np.array(free, dtype=np.intp)[known]
     effects = np.sqrt((values**2).sum(axis=0))
-    units = relative_sizes(parameters)[places] / effects
-    return Slopes(values / effects, kept, places, units, estimator.penalty)
-
-
-def held_out(
-    estimator: Estimator, recordings: Sequence[Recording], parts: Sequence[Sequence[Mask]]
-) -> list[Array] | None:
-    """Return outputs over recordings that were fitted, each part by the model as it would be without it.
-
-    Parameters
-    ----------
-    estimator : Estimator
-        Fitted to the recordings.
-    parts : sequence of sequence of array of bool, shape (n,)
-        For every part, its samples of every recording.
-
-    Returns
-    -------
-    list of array, shape (n, m), or None
-        None of a model with more parameters than a step is computed for.
-    """
-    # as the model is delivered, without loads of the recordings' own
-    runs = replace(estimator.free_runs(estimator.fitted, recordings), changed=as_it_is)
-    counted = [
-        np.concatenate([rows[own] for rows, own in zip(part, runs.rows, strict=True)])
-        for part in parts
-    ]
-    without = estimator.left_out(runs, [rows.repeat(len(runs.names)) for rows in counted])
-    if without is None:
-        return None
-    found = [table.copy() for table in runs.modelled]
-    for part, tables in zip(parts, without, strict=True):
-        for outputs, table, rows in zip(found, tables, part, strict=True):
-            outputs[rows] = table[rows]
-    return found
+    return Slopes(
+        values / effects, kept, places, relative_sizes(runs.block.pack())[places] / effects
+    )
 
 
 def stepped(
-    estimator: Estimator, runs: FreeRuns, parts: Sequence[Mask]
+    runs: FreeRuns, free: Sequence[int], penalty: float, parts: Sequence[Mask]
 ) -> list[list[Array]] | None:
-    """Return the outputs of the model as it would be without each part; None of one that is too large.
+    """Return the outputs of a fitted model as it would be without each part of its data.
 
-    See `Estimator.left_out`.
+    Parameters
+    ----------
+    runs : FreeRuns
+        Of the model on the data that it was fitted to.
+    free : sequence of int
+        Indices in ``block.pack()`` of what was fitted.
+    penalty : float
+        Ridge of the fit, relative to each parameter's own effect.
+    parts : sequence of array of bool, shape (N,)
+        Which outputs that count are left out.
+
+    Returns
+    -------
+    list of list of array, shape (n, m), or None
+        For every part, the outputs over every run; None where more than `MOST_FREE` are free.
     """
-    slopes = slopes_of(estimator, runs)
-    if slopes is None:
+    if len(free) > MOST_FREE:
         return None
+    slopes = slopes_of(runs, free)
     residual = runs.residual[slopes.kept]
     gram, slope = slopes.values.T @ slopes.values, slopes.values.T @ residual
     target = runs.scored(runs.modelled) + runs.residual
@@ -146,7 +115,7 @@ def stepped(
         thinned = residual.size / max(target.size, 1)
         best, before = runs.modelled, _cost(target - runs.scored(runs.modelled), ~part, thinned)
         for damping in DAMPINGS:
-            eased = rest + (damping + slopes.penalty) * np.eye(len(rest))
+            eased = rest + (damping + penalty) * np.eye(len(rest))
             step = np.linalg.lstsq(eased, -uphill, rcond=1e-14)[0]
             tables = _moved(runs, slopes, step)
             if tables is None:

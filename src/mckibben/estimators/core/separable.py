@@ -135,13 +135,13 @@ class SeparableEstimator(Estimator):
         """Return alternatives for groups of nonlinear parameters; by default none."""
         return []
 
-    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def find(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the block for increasing data; mirrored for decreasing data."""
         if not (self.rises and data.falls):
-            return self.identify(data, tracker), data
+            return self.identify(data, tracker)
         rising = self.identify(data.negated(), tracker)
         channel = self.channels(data)["output"]
-        return Series((rising, Negative(channel, channel))), data
+        return Series((rising, Negative(channel, channel)))
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the identified block.

@@ -16,11 +16,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, true_runs
 from mckibben.blocks.base import Block
-from mckibben.blocks.running import run_many
-from mckibben.estimators.core.data import TrainingData, stretches
-from mckibben.estimators.core.free_runs import FreeRuns, relative_sizes
+from mckibben.blocks.free_runs import FreeRuns, relative_sizes
 from mckibben.statistics import Autoregression, autoregression
 
 LARGEST = 1e150
@@ -33,15 +31,6 @@ parameter's direction that must be determined.
 
 NOTHING = 1e-9
 """Relative size below which a parameter counts as 0."""
-
-
-def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
-    """Return outputs of blocks, from rest, at the scored samples, as `TrainingData.target`."""
-    outputs = []
-    for run in data.runs:
-        many = run_many(blocks, run.inputs, sample_time=run.sample_time)
-        outputs.append(many[:, run.counts].reshape(len(many), -1))
-    return np.concatenate(outputs, axis=1)
 
 
 def unknown(block: Block) -> Array:
@@ -138,7 +127,7 @@ def sandwich(
 
 def _pieces(series: Array) -> list[Array]:
     """Return the segments of a series without NaN."""
-    return [series[start:stop] for start, stop in stretches(np.isfinite(series))]
+    return [series[start:stop] for start, stop in true_runs(np.isfinite(series))]
 
 
 def vanishing(parameters: Array) -> Array:

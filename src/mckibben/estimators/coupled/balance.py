@@ -23,11 +23,11 @@ from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance, balance_in
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import rows, vector
+from mckibben.blocks.free_runs import FreeRuns
 from mckibben.channels import schedules
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Grid
-from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.coupled.balance_bench import (
     bench_of,
     check_numbers,
@@ -242,7 +242,7 @@ class BalanceEstimator(CoupledEstimator):
         scheduling = schedules(every) if self.scheduling is None else self.scheduling
         filled, lacking = with_loads(every, scheduling)
         data = super().data(filled, rows)
-        runs = [replace(run, unmeasured=lacking[run.recording]) for run in data.runs]
+        runs = [replace(run, unmeasured=lacking[run.index]) for run in data.runs]
         return replace(data, runs=tuple(runs))
 
     @property
@@ -250,14 +250,14 @@ class BalanceEstimator(CoupledEstimator):
         """The stroke of the data sheet, if there is one."""
         return None if self.prior is None else (as_prior(self.prior).sheet.stroke,)
 
-    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the identified block, and the data without uninformative runs."""
+    def find(self, data: TrainingData, tracker: Tracker) -> Block:
+        """Return the block identified from all informative runs."""
         data, names = without_held(data)
         tracker.notes += [
             f"in {name} nothing moves and no force was measured: it is left out: record the force"
             for name in names
         ]
-        return super().find(data, tracker)
+        return self.identify(data, tracker)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for coordinates, after the air and dead zone."""
@@ -295,11 +295,11 @@ class BalanceEstimator(CoupledEstimator):
         structure = search.structure
         values = structure.expanded(z[: len(structure.terms)])
         balance = in_newtons(structure.block(values, final=True))
-        self.loads_ = np.zeros((1 + max(run.recording for run in data.runs), structure.m))
+        self.loads_ = np.zeros((1 + max(run.index for run in data.runs), structure.m))
         for run in data.runs:
             place = search.problem.loads_at(structure, run)
             if place.stop > place.start:
-                self.loads_[run.recording] = z[place] * balance.areas[0][0]
+                self.loads_[run.index] = z[place] * balance.areas[0][0]
         static = [b for b in front(structure, values, data.inputs[0]) if not b.rate_dependent]
 
         def acting_in_muscles(given: Array) -> Array:
@@ -506,11 +506,10 @@ class BalanceEstimator(CoupledEstimator):
         rows: Sequence[Mask] | None = None,
     ) -> FreeRuns:
         """Return the free runs of a block, each under its own load where one was found."""
-        every = listed(recordings)
-        scheduling = schedules(every) if self.scheduling is None else self.scheduling
+        scheduling = schedules(recordings) if self.scheduling is None else self.scheduling
         if self.unknown_load is not False:
-            every = with_loads(every, scheduling)[0]
-        runs = super().free_runs(block, every, rows)
+            recordings = with_loads(recordings, scheduling)[0]
+        runs = super().free_runs(block, recordings, rows)
         return replace(runs, changed=partial(_loaded, self.loads_)) if self.loads_.any() else runs
 
 

@@ -246,8 +246,8 @@ def one_speed(data: TrainingData) -> bool:
 
 def without_load(data: TrainingData, *, every: bool) -> tuple[int, ...]:
     """Return the recordings without a load that others have; or all but the first with it."""
-    lacking = {run.recording for run in data.runs if run.unmeasured}
-    found = sorted({run.recording for run in data.runs})
+    lacking = {run.index for run in data.runs if run.unmeasured}
+    found = sorted({run.index for run in data.runs})
     reference = next((one for one in found if one not in lacking), None)
     return tuple(one for one in found if one in lacking or (every and one != reference))
 

@@ -95,7 +95,7 @@ class BalanceForceEstimator(SearchEstimator):
     def fixed(self, block: Block) -> tuple[int, ...]:
         return fixed_in(block)
 
-    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def find(self, data: TrainingData, tracker: Tracker) -> Block:
         place, (pressure,) = data.inputs[0], data.scheduled
         balance = BalanceEstimator(
             of_force=True,
@@ -128,9 +128,9 @@ class BalanceForceEstimator(SearchEstimator):
             scheduled=data.outputs,
             spans=balance.spans,
         ).stretches(FEWEST_SAMPLES - 1)  # a force that does not count is not to be given as a load
-        force = load_of(balance.find(muscle, tracker)[0])
+        force = load_of(balance.find(muscle, tracker))
         if rest is None:
-            return force, data
+            return force
         shortening = Affine(-1.0, rest, place, displacement)
         before = PerChannel((shortening, Affine(1.0, 0.0, pressure, pressure)))
-        return Series((before, *(force.parts if isinstance(force, Series) else (force,)))), data
+        return Series((before, *(force.parts if isinstance(force, Series) else (force,))))

@@ -151,9 +151,9 @@ class Problem:
     def loads_at(self, structure: Structure, run: Run) -> slice:
         """Return the indices of a recording's own load, after the terms."""
         first, unmeasured = len(structure.terms), structure.bench.unmeasured
-        if run.recording not in unmeasured:
+        if run.index not in unmeasured:
             return slice(first, first)
-        first += unmeasured.index(run.recording) * structure.m
+        first += unmeasured.index(run.index) * structure.m
         return slice(first, first + structure.m)
 
     def size(self, structure: Structure) -> int:

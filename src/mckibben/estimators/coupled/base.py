@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -10,12 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mckibben.arrays import Array, Mask
-from mckibben.blocks.base import Block
 from mckibben.channels import loads_among, numbered, one, schedules
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData, training_data
 from mckibben.estimators.core.estimator import Estimator, resting
-from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed
 
 MOVES = 0.1
@@ -190,15 +187,6 @@ class CoupledEstimator(Estimator):
     def spans(self) -> tuple[float, ...] | None:
         """Ranges of the outputs, if known in advance."""
         return None
-
-    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the identified block, and the data without unused channels."""
-        block = self.identify(data, tracker)
-        return block, of_channels(data, block.scheduling)
-
-    @abstractmethod
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        """Return the identified block."""
 
 
 def of_channels(data: TrainingData, names: Sequence[str]) -> TrainingData:

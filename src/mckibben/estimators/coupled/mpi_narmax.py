@@ -102,7 +102,7 @@ class MPINarmaxEstimator(CoupledEstimator):
         first, sets = hysteresis.n_parameters, 3 * network.n_regressors * network.n_sets
         return (*places, *range(first, first + sets))
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
+    def find(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the series of hysteresis and network."""
         if len(data.inputs) != 1 or not data.scheduled:
             raise DataError(

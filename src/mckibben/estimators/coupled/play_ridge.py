@@ -24,8 +24,8 @@ from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
 from mckibben.blocks.fields import Channel, rows, vector
+from mckibben.blocks.free_runs import FreeRuns
 from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
@@ -84,7 +84,7 @@ class PlayRidgeEstimator(CoupledEstimator):
     crossed: bool = True
     ridge: Annotated[float, Gt(0)] | None = None
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
+    def find(self, data: TrainingData, tracker: Tracker) -> Block:
         lags = self.lags if data.sample_time is not None else (0.0,)
         spans = np.ptp(np.concatenate([run.inputs for run in data.runs]), axis=0)
         width = readout_width(
@@ -115,13 +115,12 @@ class PlayRidgeEstimator(CoupledEstimator):
         """Return the outputs of the readout without each part, in closed form."""
         block, m = runs.block, len(runs.names)
         assert isinstance(block, CoupledMemory)
-        names, width, tables = [c.name for c in block.inputs], len(block.readout[0]), []
-        for recording, past in zip(runs.recordings, runs.pasts, strict=True):
-            inputs = np.vstack([past, recording.matrix(names)])
-            tables.append(features(block, inputs, recording.sample_time)[len(past) :])
-        pairs = zip(tables, runs.recordings, strict=True)
-        whole = [np.hstack([table, recording.matrix(runs.names)]) for table, recording in pairs]
-        rows = np.concatenate([one[kept] for one, kept in zip(whole, runs.rows, strict=True)])
+        width, tables, scored = len(block.readout[0]), [], []
+        for run, past in zip(runs.runs, runs.pasts, strict=True):
+            inputs = np.vstack([past, run.inputs])
+            tables.append(features(block, inputs, run.sample_time)[len(past) :])
+            scored.append(np.hstack([tables[-1], run.outputs])[run.counts])
+        rows = np.concatenate(scored)
         total, found = rows.T @ rows, []
         for part in parts:
             out = rows[part[::m]]

@@ -145,7 +145,7 @@ class SDCHMEstimator(CoupledEstimator):
                 first += muscle.n_parameters
         return tuple(places)
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
+    def find(self, data: TrainingData, tracker: Tracker) -> Block:
         tracker.reached(0.0)
         front: tuple[Block, ...] = ()
         runs, driven = list(data.runs), data.inputs
@@ -258,7 +258,7 @@ class SDCHMEstimator(CoupledEstimator):
             ) from None
         estimator.check_settings()
         # from rest, as the whole model of several muscles begins
-        block: Block = estimator.find(estimator.data(recording, [run.counts]), Tracker())[0]
+        block: Block = estimator.find(estimator.data(recording, [run.counts]), Tracker())
         return block
 
 

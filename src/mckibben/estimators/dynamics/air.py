@@ -17,7 +17,6 @@ from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Start
 from mckibben.estimators.core.separable import SEARCH_SAMPLES, SeparableEstimator
-from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.optimisers.multi_start import multi_start
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
@@ -199,7 +198,7 @@ class AirEstimator(SeparableEstimator):
             return replace(block.unpack([*point[:3], *np.exp(point[3:5])]), **changed)
 
         def residuals(point: Array) -> Array:
-            return simulate_all([block_at(point)], data)[0] - data.target
+            return data.simulated([block_at(point)])[0] - data.target
 
         part = tracker.part(0.9, 1.0)
         best = multi_start(residuals, [start], lower, upper, part, n_refined=1, max_evaluations=40)

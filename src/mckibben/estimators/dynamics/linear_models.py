@@ -171,7 +171,7 @@ class PredictionErrorEstimator(Estimator):
         whole = replace(self, input=(*driving, *moving), output=tuple(given))
         return super(PredictionErrorEstimator, whole).data(recordings, rows)
 
-    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def find(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the identified block: for several channels, the sum over inputs, per output."""
         parts: list[Block] = []
         share = 1.0 / len(data.outputs)
@@ -180,7 +180,7 @@ class PredictionErrorEstimator(Estimator):
             own = tracker.part(place * share, (place + 1) * share)
             parts += self._of_output(replace(data, runs=runs, outputs=(output,)), own)
             tracker.update_from(own)
-        return (parts[0] if self.single else Parallel(tuple(parts))), data
+        return parts[0] if self.single else Parallel(tuple(parts))
 
     def _of_output(self, data: TrainingData, tracker: Tracker) -> tuple[TransferFunction, ...]:
         """Return the transfer functions from every input to the output."""

@@ -33,11 +33,11 @@ from mckibben.blocks.dynamics.narx import (
     products,
 )
 from mckibben.blocks.fields import vector
+from mckibben.blocks.free_runs import relative_sizes
 from mckibben.blocks.kernels import kernel
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, SearchEstimator
-from mckibben.estimators.core.free_runs import relative_sizes
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -134,8 +134,8 @@ class NarxEstimator(SearchEstimator):
     n_units: Annotated[int, Interval(ge=1, le=100)] = 5
     n_starts: Annotated[int, Interval(ge=1, le=100)] = 3
 
-    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the best bounded model, and the data."""
+    def find(self, data: TrainingData, tracker: Tracker) -> Block:
+        """Return the best bounded model."""
         data.timed(instead=", or use gpi")
         found = self._polynomials if self.mapping == "polynomial" else self._networks
         error = cache(partial(free_run_rmse, data=data))
@@ -170,7 +170,7 @@ class NarxEstimator(SearchEstimator):
             )
         chosen = min(tried, key=error)
         tracker.best_cost = error(chosen)
-        return chosen, data
+        return chosen
 
     def _fields(self, data: TrainingData) -> dict[str, Any]:
         """Return the common fields of all candidate models; the scales map the data to -1 to 1."""

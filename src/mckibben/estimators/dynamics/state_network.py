@@ -71,7 +71,7 @@ def linear_oscillator(data: TrainingData, channels: dict[str, Any]) -> ProcessMo
     estimator = ProcessModelEstimator(
         structure="P2U", input=channels["input"].name, output=channels["output"].name, n_refined=1
     )
-    model, _ = estimator.find(data, Tracker())
+    model = estimator.find(data, Tracker())
     assert isinstance(model, ProcessModel)
     if not model.gain > 0:
         raise DataError(
@@ -183,7 +183,7 @@ class StateNetworkEstimator(SearchEstimator):
     made_for: ClassVar[tuple[str, str] | None] = ("force", "displacement")
     effort: ClassVar[float] = 100.0
 
-    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def find(self, data: TrainingData, tracker: Tracker) -> Block:
         step = data.timed()
         linear = linear_oscillator(data, self.channels(data))
         self._warm = settling_samples(linear, data)
@@ -208,7 +208,7 @@ class StateNetworkEstimator(SearchEstimator):
                 remedy="choose another seed, or record at a higher rate",
             )
         assert tracker.best is not None
-        return template.unpack(tracker.best), data
+        return template.unpack(tracker.best)
 
     def start(self, linear: ProcessModel, data: TrainingData, substeps: int) -> StateNetwork:
         """Return the initial network of the descent."""

@@ -22,7 +22,6 @@ from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators, SearchEstimator
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.signals.reversals import reversals
 
@@ -182,8 +181,8 @@ class ActivationPressureEstimator(SearchEstimator):
         absent = np.flatnonzero(block.pack() == 0).tolist()
         return tuple(sorted({*absent, block.n_parameters - 1}))
 
-    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the model, set to the first moving run's frequency, and the data."""
+    def find(self, data: TrainingData, tracker: Tracker) -> Block:
+        """Return the model, set to the first moving run's frequency."""
         step, smoothed, given = data.timed(), self.rate_time_constant, self.frequency
         at = frequencies(data.runs) if given is None else np.full(len(data.runs), given)
         moving = at >= STATIC_SHARE * at.max()
@@ -202,7 +201,7 @@ class ActivationPressureEstimator(SearchEstimator):
         )
         at = at[moving]
         phi, gamma = self._rates(model, loops.thinned(20_000), at, tracker)
-        return replace(model, phi=vector(phi), gamma=gamma, frequency=float(at[0])), data
+        return replace(model, phi=vector(phi), gamma=gamma, frequency=float(at[0]))
 
     def _rates(
         self, model: ActivationPressure, data: TrainingData, at: Array, tracker: Tracker
@@ -212,7 +211,7 @@ class ActivationPressureEstimator(SearchEstimator):
         gamma phi is fixed up to a factor, which is chosen such that gamma is 1 at the mean
         frequency.
         """
-        whole, static = simulate_all([model, replace(model, gamma=(0.0, 0.0))], data)
+        whole, static = data.simulated([model, replace(model, gamma=(0.0, 0.0))])
         rate, rest, middle = whole - static, data.target - static, float(at.mean())
         rises = (at - middle) / max(middle, 1e-9)
         rise = np.repeat(rises, [int(run.counts.sum()) for run in data.runs])

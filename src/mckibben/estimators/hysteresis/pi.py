@@ -18,7 +18,6 @@ from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, Operators
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.optimisers.tracker import Tracker
 
 
@@ -124,7 +123,7 @@ class PIEstimator(SeparableEstimator):
             slopes = np.maximum(isotonic_regression(slopes, weights=lengths).x, 0.0)
         weights = np.diff(slopes, prepend=0.0)
         model = self.build(np.empty(0), weights, 0.0, data)
-        outputs = simulate_all([model], data)[0]
+        outputs = data.simulated([model])[0]
         return self.build(np.empty(0), weights, float(np.mean(data.target - outputs)), data)
 
 

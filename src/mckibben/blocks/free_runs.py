@@ -1,0 +1,201 @@
+"""Free runs of a block over recordings, and of the same block with other parameters."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mckibben.arrays import Array, Mask
+from mckibben.blocks.base import Block, check_units
+from mckibben.blocks.running import run_many
+from mckibben.blocks.runs import FreeRun, Run
+from mckibben.blocks.starts import history, run_on, state_after
+from mckibben.errors import ModelError
+from mckibben.recording import Recording
+
+DIFFERENCE = 1e-6
+"""Step of finite differences, relative to the size of a parameter."""
+
+AT_ONCE = 2_000_000
+"""Numbers of outputs of several blocks that are held in memory at once."""
+
+AWAY = 1e3
+"""Error, in ranges of the measured output, above which a model has diverged."""
+
+Changed = Callable[[Block, int], Block]
+"""Returns a block as it runs over a recording, by the recording's index."""
+
+
+def as_it_is(block: Block, index: int) -> Block:
+    """Return the block itself, for every recording."""
+    del index
+    return block
+
+
+def relative_sizes(parameters: Array) -> Array:
+    """Return the scales of parameters, with a lower bound."""
+    return np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))
+
+
+def free_run(block: Block, recording: Recording) -> FreeRun:
+    """Return a block's free run over a recording with its outputs.
+
+    It begins by the rule of `mckibben.blocks.starts`. After that nothing measured but the inputs is
+    used.
+
+    Raises
+    ------
+    DataError
+        Where the recording lacks a channel.
+    ModelError
+        If the outputs are not finite, or diverge from the measured ones.
+    """
+    (run,) = FreeRuns.of(block, [recording]).runs
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore", RuntimeWarning)
+        modelled = block.simulate(recording).matrix(channel.name for channel in block.outputs)
+    span = np.ptp(run.outputs, axis=0)
+    if not (np.abs(modelled - run.outputs) <= AWAY * span).all():
+        far, wide = float(np.abs(modelled).max()), float(span.max())
+        raise ModelError(
+            f"the output of {block.kind!r} runs away on {recording.name}: to {far:.4g}, "
+            f"where what is measured spans {wide:.4g}",
+            remedy="see whether units are those that it was identified in; if so, this "
+            "model does not suit these data: identify it again",
+        )
+    return FreeRun.of(run, modelled)
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRuns:
+    """Runs of a block over recordings, at the samples that count.
+
+    Blocks with other parameters begin after the same past as the block itself, so that outputs differ by
+    the parameters alone.
+
+    Parameters
+    ----------
+    block : Block
+    runs : sequence of Run
+        Of the block's channels; a run without a start begins at rest.
+    changed : callable, optional
+        What runs over a recording instead of a block: the block under a load of the recording's own.
+    """
+
+    block: Block
+    runs: Sequence[Run]
+    changed: Changed = as_it_is
+
+    @classmethod
+    def of(
+        cls, block: Block, recordings: Sequence[Recording], rows: Sequence[Mask] | None = None
+    ) -> FreeRuns:
+        """Return the runs over recordings with all channels of the block.
+
+        ``rows`` are the samples of each that count, shape (n,); those bridged in reading never do.
+        """
+        masks = [None] * len(recordings) if rows is None else rows
+        pairs = enumerate(zip(recordings, masks, strict=True))
+        runs = [run_on(block, recording, mask, index) for index, (recording, mask) in pairs]
+        for run in runs:
+            check_units(run.source, block.outputs)
+        return cls(block, runs)
+
+    @cached_property
+    def pasts(self) -> list[Array]:
+        """Inputs before the first sample of every run, shape (k, inputs) each."""
+        return [history(self.changed(self.block, run.index), run) for run in self.runs]
+
+    @cached_property
+    def from_rest(self) -> FreeRuns:
+        """The same runs, begun at rest at their first inputs."""
+        return replace(self, runs=[replace(run, start=None) for run in self.runs])
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the outputs."""
+        return [channel.name for channel in self.block.outputs]
+
+    @property
+    def rows(self) -> list[Mask]:
+        """Samples of every run that count."""
+        return [run.counts for run in self.runs]
+
+    @cached_property
+    def modelled(self) -> list[Array]:
+        """Outputs of the block over every run, shape (n, m) each."""
+        return [table[0] for table in self.simulated([self.block])]
+
+    @cached_property
+    def residual(self) -> Array:
+        """Measured less modelled outputs that count, sample by sample, shape (N,)."""
+        return self.scored([run.outputs for run in self.runs]) - self.scored(self.modelled)
+
+    @property
+    def errors(self) -> tuple[float, ...]:
+        """Root mean square error of every output; infinite of a model that overflows."""
+        by_output = self.residual.reshape(-1, len(self.names)).T
+        if not np.isfinite(by_output).all():
+            return (np.inf,) * len(by_output)
+        return tuple(float(np.sqrt(np.mean(errors**2))) for errors in by_output)
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square of the residual."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(np.sqrt(np.mean(self.residual**2)))
+
+    def apart(self, other: FreeRuns) -> float:
+        """Return the root mean square by which outputs differ from those of other runs."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            differences = self.scored(self.modelled) - self.scored(other.modelled)
+            return float(np.sqrt(np.mean(differences**2)))
+
+    def scored(self, outputs: Sequence[Array]) -> Array:
+        """Return the outputs of all runs, (n, m) each, at the samples that count, (N,)."""
+        pairs = zip(outputs, self.runs, strict=True)
+        return np.concatenate([table[run.counts].ravel() for table, run in pairs])
+
+    def simulated(self, blocks: Sequence[Block]) -> list[Array]:
+        """Return the outputs of blocks over every run, shape (blocks, n, m) each."""
+        found = []
+        for run, past in zip(self.runs, self.pasts, strict=True):
+            own = [self.changed(block, run.index) for block in blocks]
+            if run.source.periodic:
+                found.append(
+                    np.array([block.simulate(run.source).matrix(self.names) for block in own])
+                )
+                continue
+            states = [state_after(block, past, run) for block in own]
+            found.append(run_many(own, run.inputs, sample_time=run.sample_time, states=states))
+        return found
+
+    def outputs(self, blocks: Sequence[Block]) -> Array:
+        """Return the outputs of blocks at the samples that count, shape (blocks, N)."""
+        tables = self.simulated(blocks)
+        return np.array([self.scored([table[k] for table in tables]) for k in range(len(blocks))])
+
+    def slopes(self, places: Sequence[int], kept: Array | slice = slice(None)) -> Array:
+        """Return derivatives of the outputs by parameters in units of their sizes, shape (n, k).
+
+        By finite differences, at the outputs ``kept`` of the N that count.
+        """
+        parameters = self.block.pack()
+        sizes = relative_sizes(parameters)
+        base = self.scored(self.modelled)[kept]
+        found = np.empty((base.size, len(places)))
+        many = max(1, AT_ONCE // max(sum(map(len, self.runs)) * len(self.names), 1))
+        for first in range(0, len(places), many):
+            some = places[first : first + many]
+            blocks = []
+            for place in some:
+                moved = parameters.copy()
+                moved[place] += DIFFERENCE * sizes[place]
+                blocks.append(self.block.unpack(moved))
+            moved_by = self.outputs(blocks)[:, kept] - base
+            found[:, first : first + len(some)] = moved_by.T / DIFFERENCE
+        return found

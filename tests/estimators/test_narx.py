@@ -13,8 +13,8 @@ from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.diagnosis.branch_gaps import hold_test
 from mckibben.estimators.core.data import training_data
 from mckibben.estimators.dynamics.narx import (
-    FreeRuns,
     NarxEstimator,
+    StretchErrors,
     feed_back,
     select,
     stretches,
@@ -63,7 +63,7 @@ def test_slopes_of_free_runs_are_those_of_finite_differences(
     polynomial = kind == "narx-polynomial"
     block = load("blocks", kind if polynomial else "narx-network").example()
     model = replace(block, **scales, **(terms if polynomial else network))
-    runs = FreeRuns(model, stretches(model, data, horizon), Tracker())
+    runs = StretchErrors(model, stretches(model, data, horizon), Tracker())
     parameters, step = model.pack(), 1e-6
     differences = [
         (runs.errors(parameters + move) - runs.errors(parameters - move)) / (2 * step)

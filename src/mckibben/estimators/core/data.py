@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,7 +16,7 @@ from mckibben.blocks.running import run_many
 from mckibben.blocks.runs import Run as Run
 from mckibben.blocks.runs import run_of
 from mckibben.errors import DataError
-from mckibben.recording import Recording, listed
+from mckibben.recording import Recording, listed, sample_time_of
 
 Made = TypeVar("Made")
 
@@ -43,17 +44,10 @@ class TrainingData:
     outputs: tuple[Channel, ...]
     scheduled: tuple[Channel, ...] = ()
     spans: tuple[float, ...] | None = None
-    _memo: dict[Hashable, Array] = field(default_factory=dict, init=False, repr=False)
     _latest: dict[Hashable, tuple[Array, Any]] = field(default_factory=dict, init=False, repr=False)
 
-    def once(self, key: Hashable, compute: Callable[[], Array]) -> Array:
-        """Return the result of ``compute``, cached by key."""
-        if key not in self._memo:
-            self._memo[key] = compute()
-        return self._memo[key]
-
     def latest(self, key: Hashable, theta: Array, compute: Callable[[], Made]) -> Made:
-        """Return the result of ``compute``, cached for the last ``theta``.
+        """Return the result of ``compute``, cached by key for the last ``theta``.
 
         For what all runs share at a point of a search.
         """
@@ -63,39 +57,20 @@ class TrainingData:
         found: Made = known[1]
         return found
 
-    @property
-    def input(self) -> str:
-        """Name of the first input."""
-        return self.inputs[0].name
-
-    @property
-    def input_unit(self) -> str:
-        """Its unit."""
-        return self.inputs[0].unit
-
-    @property
-    def output(self) -> str:
-        """Name of the first output."""
-        return self.outputs[0].name
-
-    @property
+    @cached_property
     def lowest(self) -> Array:
         """Lowest value of every input over all runs."""
-        return self.once(
-            "lowest", lambda: np.min([run.driven.min(axis=0) for run in self.runs], axis=0)
-        )
+        return np.asarray(np.min([run.driven.min(axis=0) for run in self.runs], axis=0))
 
-    @property
+    @cached_property
     def highest(self) -> Array:
         """Highest value of every input over all runs."""
-        return self.once(
-            "highest", lambda: np.max([run.driven.max(axis=0) for run in self.runs], axis=0)
-        )
+        return np.asarray(np.max([run.driven.max(axis=0) for run in self.runs], axis=0))
 
-    @property
+    @cached_property
     def travel(self) -> Array:
         """Range of every output over all runs."""
-        found = self.once("travel", lambda: np.ptp(self.stacked("outputs"), axis=0))
+        found = np.ptp(self.stacked("outputs"), axis=0)
         if self.spans is None:
             return found
         spans = np.array(self.spans)
@@ -112,12 +87,10 @@ class TrainingData:
         y = self.target
         return float(y.min()), float(y.max())
 
-    @property
+    @cached_property
     def target(self) -> Array:
         """Scored outputs of all runs, sample by sample, shape (samples that count × m,)."""
-        return self.once(
-            "target", lambda: np.concatenate([run.outputs[run.counts].ravel() for run in self.runs])
-        )
+        return np.concatenate([run.outputs[run.counts].ravel() for run in self.runs])
 
     @property
     def spread(self) -> Array:
@@ -138,27 +111,9 @@ class TrainingData:
         """Sample time of all runs, or None if one has none."""
         return self.runs[0].sample_time
 
-    def timed(self, why: str = "this model depends on rate", instead: str = "") -> float:
-        """Return the sample time of all runs.
-
-        Parameters
-        ----------
-        why : str
-            What needs it.
-        instead : str
-            What could be done without.
-
-        Raises
-        ------
-        DataError
-            Where the recordings have no time.
-        """
-        if self.sample_time is None:
-            raise DataError(
-                f"the recordings have no time, and {why}",
-                remedy="read them with a time column or `rate`" + instead,
-            )
-        return self.sample_time
+    def timed(self) -> float:
+        """Return the sample time of all runs; raise a `DataError` where the recordings have no time."""
+        return sample_time_of(self.runs[0].source, "be fitted by a model that depends on rate")
 
     @property
     def falls(self) -> bool:

@@ -6,15 +6,15 @@ import time
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, get_type_hints
 
 import numpy as np
 from annotated_types import Interval
 from numpy.typing import ArrayLike
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
@@ -23,7 +23,6 @@ from mckibben.blocks.free_runs import FreeRuns, as_it_is
 from mckibben.errors import DataError, MckibbenError, ModelError, ModelWarning
 from mckibben.estimators.core.data import TrainingData, training_data
 from mckibben.estimators.core.leaving_out import stepped
-from mckibben.estimators.core.settings import check_settings
 from mckibben.estimators.core.uncertainty import covariance_of, unknown, vanishing
 from mckibben.estimators.optimisers.tracker import Progress, Tracker
 from mckibben.recording import REST_LENGTH, Recording, conversion, is_frame, listed
@@ -50,6 +49,8 @@ Start = Literal["first_sample", "virgin"]
 """State before the first sample of every recording: what its first output determines, and at rest at
 the first input for the rest (see `mckibben.blocks.starts`); or as if nothing had ever happened.
 """
+
+STRICT_SETTINGS = ConfigDict(strict=True, allow_inf_nan=False)
 
 MOST_PASTS, MATTERS = 3, 0.1
 """Maximum number of fits after pasts that the last fit shows; and the effect of these on outputs, or the
@@ -380,15 +381,12 @@ class Estimator(ABC):
         ModelError
             On settings out of range, or if the model found is no better than the mean of the output.
         """
-        before = dict(vars(self))
-        runs = listed(recordings) if y is None else [self._recording(recordings, y, sample_time)]
-        try:
-            with one_blas_thread(), telling(progress, "fitting") as tell:
-                return self._fit(runs, rows, tell)
-        except BaseException:  # a fit that fails or is interrupted leaves no traces
-            vars(self).clear()
-            vars(self).update(before)
-            raise
+        every = listed(recordings) if y is None else [self._recording(recordings, y, sample_time)]
+        fitted = copy(self)  # a fit that fails or is interrupted leaves no traces
+        with one_blas_thread(), telling(progress, "fitting") as tell:
+            fitted._fit(every, rows, tell)
+        vars(self).update(vars(fitted))
+        return self
 
     def _recording(self, u: Any, y: Any, sample_time: float | None) -> Recording:
         """Return arrays as a recording with this estimator's channels; ``y`` may be None."""
@@ -412,11 +410,13 @@ class Estimator(ABC):
         recordings: Sequence[Recording],
         rows: Sequence[Mask] | None,
         progress: Progress | None,
-    ) -> Self:
+    ) -> None:
         started = time.perf_counter()
         self.check_settings()
         tracker = Tracker(progress=progress)
         data = self.data(recordings, rows)
+        if self.needs_time:
+            data.timed()
         self.model_ = self.find(data, tracker)
         runs = self.free_runs(self.model_, recordings, rows)
         elsewhere = not self.begins_measured and any(map(len, runs.pasts))
@@ -426,7 +426,6 @@ class Estimator(ABC):
         refuse_useless(self.diagnostics_, data)
         if progress is not None:
             progress(1.0, self.diagnostics_.rmse)
-        return self
 
     def _after_pasts(
         self,
@@ -437,17 +436,17 @@ class Estimator(ABC):
     ) -> FreeRuns:
         """Fit again to recordings that begin after the pasts which the fit from rest shows."""
         for _ in range(MOST_PASTS):
-            before = dict(vars(self))
-            found = runs
-            with suppress(MckibbenError):  # the fit from rest remains
-                self.model_ = self.find(self.data(*preceded(recordings, runs)), tracker)
-                found = self.free_runs(self.model_, recordings, rows)
-            if not found.rmse < runs.rmse:
-                vars(self).clear()
-                vars(self).update(before)
+            again = copy(self)
+            try:
+                again.model_ = again.find(again.data(*preceded(recordings, runs)), tracker)
+                found = again.free_runs(again.model_, recordings, rows)
+            except MckibbenError:  # the fit from rest remains
                 break
-            helped, runs = found.rmse < (1.0 - MATTERS) * runs.rmse, found
-            if not helped:
+            before, after = runs.rmse, found.rmse
+            if after < before:
+                vars(self).update(vars(again))
+                runs = found
+            if not after < (1.0 - MATTERS) * before:
                 break
         return runs
 
@@ -459,7 +458,19 @@ class Estimator(ABC):
         ModelError
             Naming the setting, what it is, and what it may be.
         """
-        check_settings(self)
+        hints = get_type_hints(type(self), include_extras=True)
+        for setting in fields(self):
+            given = getattr(self, setting.name)
+            value = given.tolist() if isinstance(given, np.generic | np.ndarray) else given
+            try:
+                TypeAdapter(hints[setting.name], config=STRICT_SETTINGS).validate_python(value)
+            except ValidationError as error:
+                wanted = error.errors()[0]["msg"]
+                raise ModelError(
+                    f"it is {value!r}: {wanted[0].lower()}{wanted[1:]}",
+                    parameter=setting.name,
+                    remedy="give another, or leave it out",
+                ) from None
 
     def predict(
         self,

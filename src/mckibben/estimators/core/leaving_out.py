@@ -18,13 +18,10 @@ cross-validatory method for dependent data", Biometrika, 1994.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
-from mckibben.blocks.base import Block
 from mckibben.blocks.free_runs import FreeRuns, relative_sizes
 from mckibben.errors import MckibbenError
 from mckibben.estimators.core.uncertainty import LARGEST
@@ -39,45 +36,6 @@ MOST_FREE = 150
 
 MOST_ROWS = 20_000
 """Number of outputs, evenly spread, on which slopes are computed."""
-
-
-@dataclass(frozen=True, eq=False)
-class Slopes:
-    """Derivatives of the free run by what is free, each over its own effect.
-
-    Parameters
-    ----------
-    values : array, shape (n, k)
-        At the outputs ``kept``.
-    kept : array of int, shape (n,)
-        Indices among the outputs that count.
-    places : array of int, shape (k,)
-        Indices in ``block.pack()``.
-    units : array, shape (k,)
-        Change of every parameter in the unit of its column.
-    """
-
-    values: Array
-    kept: NDArray[np.intp]
-    places: NDArray[np.intp]
-    units: Array
-
-
-def slopes_of(runs: FreeRuns, free: Sequence[int]) -> Slopes:
-    """Return the slopes of a free run by the free parameters that have an effect on it."""
-    m = len(runs.names)
-    n_samples = runs.residual.size // m
-    samples = np.linspace(0, n_samples - 1, min(n_samples, max(MOST_ROWS // m, 1)))
-    kept = (m * samples.round().astype(np.intp)[:, np.newaxis] + np.arange(m)).ravel()
-    with np.errstate(over="ignore", invalid="ignore"):
-        values = runs.slopes(free, kept)
-        largest = np.abs(values).max(axis=0, initial=0.0)
-        known = np.isfinite(largest) & (largest < LARGEST) & (largest > 0)
-    values, places = values[:, known], np.array(free, dtype=np.intp)[known]
-    effects = np.sqrt((values**2).sum(axis=0))
-    return Slopes(
-        values / effects, kept, places, relative_sizes(runs.block.pack())[places] / effects
-    )
 
 
 def stepped(
@@ -103,45 +61,48 @@ def stepped(
     """
     if len(free) > MOST_FREE:
         return None
-    slopes = slopes_of(runs, free)
-    residual = runs.residual[slopes.kept]
-    gram, slope = slopes.values.T @ slopes.values, slopes.values.T @ residual
-    target = runs.scored(runs.modelled) + runs.residual
+    parameters, m = runs.block.pack(), len(runs.names)
+    n_samples = runs.residual.size // m
+    samples = np.linspace(0, n_samples - 1, min(n_samples, max(MOST_ROWS // m, 1)))
+    kept = (m * samples.round().astype(np.intp)[:, np.newaxis] + np.arange(m)).ravel()
+    with np.errstate(over="ignore", invalid="ignore"):
+        slopes = runs.slopes(free, kept)
+        largest = np.abs(slopes).max(axis=0, initial=0.0)
+        known = np.isfinite(largest) & (largest < LARGEST) & (largest > 0)
+    slopes, places = slopes[:, known], np.array(free, dtype=np.intp)[known]
+    effects = np.sqrt((slopes**2).sum(axis=0))
+    slopes, units = slopes / effects, relative_sizes(parameters)[places] / effects
+    residual, target = runs.residual[kept], runs.scored(runs.modelled) + runs.residual
+    gram, slope = slopes.T @ slopes, slopes.T @ residual
+    thinned = residual.size / max(target.size, 1)
+
+    def moved(step: Array) -> list[Array] | None:
+        """Return the outputs of the model moved by a step; None where it has none."""
+        there = parameters.copy()
+        there[places] += step * units
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                tables = [table[0] for table in runs.simulated([runs.block.unpack(there)])]
+        except MckibbenError:
+            return None
+        return tables if all(np.isfinite(table).all() for table in tables) else None
+
+    def cost(tables: Sequence[Array], part: Mask) -> float:
+        """Return half the squared error without a part, in the scale of thinned outputs."""
+        error = (target - runs.scored(tables))[~part]
+        return 0.5 * thinned * float(error @ error)
+
     found = []
     for part in parts:
-        out = slopes.values[part[slopes.kept]]
-        rest = gram - out.T @ out
-        uphill = out.T @ residual[part[slopes.kept]]
-        thinned = residual.size / max(target.size, 1)
-        best, before = runs.modelled, _cost(target - runs.scored(runs.modelled), ~part, thinned)
+        out = slopes[part[kept]]
+        rest, uphill = gram - out.T @ out, out.T @ residual[part[kept]]
+        best, before = runs.modelled, cost(runs.modelled, part)
         for damping in DAMPINGS:
             eased = rest + (damping + penalty) * np.eye(len(rest))
             step = np.linalg.lstsq(eased, -uphill, rcond=1e-14)[0]
-            tables = _moved(runs, slopes, step)
-            if tables is None:
-                continue
-            cost = _cost(target - runs.scored(tables), ~part, thinned) + float(slope @ step)
-            if cost < before:
+            tables = moved(step)
+            if tables is not None and cost(tables, part) + float(slope @ step) < before:
                 best = tables
                 break
         found.append(best)
     return found
-
-
-def _moved(runs: FreeRuns, slopes: Slopes, step: Array) -> list[Array] | None:
-    """Return the outputs of the model moved by a step; None where it has none."""
-    parameters = runs.block.pack()
-    parameters[slopes.places] += step * slopes.units
-    try:
-        with np.errstate(over="ignore", invalid="ignore"):
-            other: Block = runs.block.unpack(parameters)
-            tables = [table[0] for table in runs.simulated([other])]
-    except MckibbenError:
-        return None
-    return tables if all(np.isfinite(table).all() for table in tables) else None
-
-
-def _cost(error: Array, rows: Mask, thinned: float) -> float:
-    """Return half the squared error at some outputs, in the scale of thinned ones."""
-    kept = error[rows]
-    return 0.5 * thinned * float(kept @ kept)

@@ -113,8 +113,8 @@ class Problem:
         return self.of_force or not self._moves(run)
 
     def _moves(self, run: Run) -> bool:
-        still = self.data.once(("held", run.place), lambda: np.array(held(self.data, run)))
-        return not still.item()
+        still = self.data.latest(("held", run.place), np.empty(0), lambda: held(self.data, run))
+        return not still
 
     def counting(self, run: Run) -> Mask:
         """Return which of the compared samples are scored."""

@@ -136,7 +136,7 @@ class MPINarmaxEstimator(CoupledEstimator):
             settings["rate_time_constant"] = 5.0 * (data.runs[0].sample_time or 0.0)
         estimator = registry.load("estimators", self.memory)(**settings)
         counted = [run.counts for run in data.runs]
-        block: Block = estimator.find(estimator.data(recordings, counted), Tracker())[0]
+        block: Block = estimator.find(estimator.data(recordings, counted), Tracker())
         return block
 
 

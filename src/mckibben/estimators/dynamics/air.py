@@ -152,7 +152,7 @@ class AirEstimator(SeparableEstimator):
         if not correlations[best] > 0:
             raise DataError(
                 "the pressure does not rise with the command",
-                channel=data.input,
+                channel=data.inputs[0].name,
                 remedy="choose the command with `input`, and the pressure it makes with `output`",
             )
         return best

@@ -24,7 +24,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from annotated_types import Interval
 
-from mckibben.arrays import Array, Mask
+from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.narx import (
     Narx,
@@ -35,6 +35,7 @@ from mckibben.blocks.dynamics.narx import (
 from mckibben.blocks.fields import vector
 from mckibben.blocks.free_runs import relative_sizes
 from mckibben.blocks.kernels import kernel
+from mckibben.blocks.starts import start_state
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, SearchEstimator
@@ -136,7 +137,6 @@ class NarxEstimator(SearchEstimator):
 
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the best bounded model."""
-        data.timed(instead=", or use gpi")
         found = self._polynomials if self.mapping == "polynomial" else self._networks
         error = cache(partial(free_run_rmse, data=data))
         paths: list[list[Narx]] = []
@@ -243,12 +243,12 @@ class NarxEstimator(SearchEstimator):
         """
         pieces, start = stretches(model, data, horizon), model.pack()
         # the samples before a stretch may be measured nowhere, or seldom
-        if sum(int(piece.counts.sum()) for piece in pieces) < start.size:
+        if sum(int(piece.run.counts.sum()) for piece in pieces) < start.size:
             return []
-        runs = FreeRuns(model, pieces, tracker)
+        found = StretchErrors(model, pieces, tracker)
         path = trust_region(
-            runs.errors,
-            runs.slopes,
+            found.errors,
+            found.slopes,
             start,
             scale=relative_sizes(start),
             least_gain=LEAST_GAIN,
@@ -394,52 +394,33 @@ class HiddenLayers:
         return np.vstack([columns, DAMPING * np.eye(columns.shape[1])])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stretch:
-    """A segment of a run: initial state, and its inputs, outputs, mask and regressors.
+    """A segment of a run, the state before it, and the regressors that depend on inputs alone."""
 
-    ``regressors`` are those that depend on inputs alone.
-    """
-
+    run: Run
     state: Array
-    inputs: Array
-    outputs: Array
-    counts: Mask
     regressors: Array
 
 
 def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stretch]:
     """Return segments of so many samples, each started from measured outputs; or whole runs.
 
-    Of short ones no more than `HORIZON_SAMPLES` take, spread evenly. A whole run whose first sample does
-    not count starts at rest, since its output may not be looked at.
+    Of short ones no more than `HORIZON_SAMPLES` take, spread evenly.
     """
+    if horizon is None:
+        return [Stretch(run, start_state(model, run), driven(model, run)) for run in data.runs]
     found: list[Stretch] = []
     n, m = model.output_lags, model.past_inputs
-
-    def add(samples: slice, state: Array) -> None:
-        inputs = np.ascontiguousarray(run.driven[samples])
-        parts = (run.y[samples], run.counts[samples], regressors[samples])
-        found.append(Stretch(state, inputs, *parts))
-
     for run in data.runs:
         regressors = driven(model, run)
-        if horizon is None:
-            first = run.driven[0]
-            state = model.state_at(first, run.y[:1]) if run.counts[0] else None
-            if state is None:
-                state = model.initial_state(first, sample_time=model.sample_time)
-            add(slice(None), state)
-            continue
         x, y = scaled(run.u, model.input_scale), scaled(run.y, model.output_scale)
         played = operators(model, x)
-        for start in range(max(n, m, 1), run.u.size, horizon):
-            before = start - 1 - np.arange(max(n, m))
+        for start in range(max(n, m, 1), len(run), horizon):
+            before, stop = start - 1 - np.arange(max(n, m)), start + horizon
             if run.counts[before[:n]].all():
                 state = np.concatenate([y[before[:n]], x[before[:m]], played[start - 1]])
-                add(slice(start, start + horizon), state)
-    if horizon is None:
-        return found
+                found.append(Stretch(run.cut(start, stop), state, regressors[start:stop]))
     few = min(len(found), -(-HORIZON_SAMPLES // horizon))
     return [found[k] for k in np.linspace(0, len(found) - 1, few).round().astype(int)]
 
@@ -459,16 +440,16 @@ def feed_back(slopes: Array, by_past: Array) -> None:
                     slopes[t, j] += share * slopes[t - 1 - k, j]
 
 
-class FreeRuns:
-    """Free runs over segments of data, for models of one structure."""
+class StretchErrors:
+    """Errors over segments of data, running free in each, for models of one structure."""
 
     def __init__(self, model: Narx, stretches: Sequence[Stretch], tracker: Tracker) -> None:
         self.model, self.stretches, self.tracker = model, stretches, tracker
-        self.counts = np.concatenate([each.counts for each in stretches])
-        self.target = np.concatenate([each.outputs for each in stretches])[self.counts]
+        self.counts = np.concatenate([each.run.counts for each in stretches])
+        self.target = np.concatenate([each.run.y for each in stretches])[self.counts]
         self._driven = np.concatenate([each.regressors for each in stretches])
         # outputs of all stretches, each behind the measured ones before it, the oldest first
-        lags, lengths = model.output_lags, [each.counts.size for each in stretches]
+        lags, lengths = model.output_lags, [len(each.run) for each in stretches]
         numbers = np.repeat(np.arange(len(lengths)), lengths)
         self._own = np.arange(numbers.size) + lags * (1 + numbers)
         self._past = self._own[:, np.newaxis] - 1 - np.arange(lags)
@@ -483,8 +464,10 @@ class FreeRuns:
         outputs = np.empty((self.counts.size, 1))
         stop = 0
         for each in self.stretches:
-            start, stop = stop, stop + each.counts.size
-            model.kernel.batch(coefficients, each.state.copy(), each.inputs, outputs[start:stop])
+            start, stop = stop, stop + len(each.run)
+            model.kernel.batch(
+                coefficients, each.state.copy(), each.run.driven, outputs[start:stop]
+            )
         return outputs[:, 0]
 
     def errors(self, theta: Array) -> Array:
@@ -516,9 +499,9 @@ class FreeRuns:
 
 def free_run_rmse(model: Narx, data: TrainingData) -> float:
     """Return the RMSE of free runs from measured starts; infinite on overflow."""
-    runs = FreeRuns(model, stretches(model, data, None), Tracker())
+    whole = StretchErrors(model, stretches(model, data, None), Tracker())
     with np.errstate(over="ignore", invalid="ignore"):
-        value = float(np.sqrt(np.mean((runs.outputs(model)[runs.counts] - runs.target) ** 2)))
+        value = float(np.sqrt(np.mean((whole.outputs(model)[whole.counts] - whole.target) ** 2)))
     return value if np.isfinite(value) else np.inf
 
 

@@ -13,7 +13,6 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import Preset, preset
 
 LEAST_DAMPING, MOST_DAMPING = 0.02, 100.0
@@ -59,10 +58,6 @@ class ProcessModelEstimator(SeparableEstimator):
     def fixed_fields(self) -> tuple[str, ...]:
         """The input's offset, which is redundant with the output's."""
         return ("process-model.input_offset",)
-
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        data.timed(instead=", or use gpi")
-        return super().identify(data, tracker)
 
     @property
     def n_times(self) -> int:

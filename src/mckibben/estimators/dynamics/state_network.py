@@ -186,12 +186,12 @@ class StateNetworkEstimator(SearchEstimator):
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
         step = data.timed()
         linear = linear_oscillator(data, self.channels(data))
-        self._warm = settling_samples(linear, data)
+        warm = settling_samples(linear, data) if self.periodic else None
         merged = averaged(data) if self.periodic else data
         turned = step / linear.time_constants[0]
         fewest = int(np.clip(np.ceil(turned / ANGLE), 1, MOST_SUBSTEPS))
         template = self.start(linear, merged, self.substeps or fewest)
-        search = self.search(template, merged, tracker)
+        search = NetworkErrors(template, merged, warm, tracker)
         tracker.budget = self.n_steps
         (_, squares), *_ = trust_region(
             search.errors,
@@ -204,7 +204,7 @@ class StateNetworkEstimator(SearchEstimator):
         if not np.isfinite(squares):
             raise DataError(
                 "no start runs stably under this force",
-                channel=data.input,
+                channel=data.inputs[0].name,
                 remedy="choose another seed, or record at a higher rate",
             )
         assert tracker.best is not None
@@ -239,12 +239,8 @@ class StateNetworkEstimator(SearchEstimator):
             **channels,
         )
 
-    def search(self, template: StateNetwork, data: TrainingData, tracker: Tracker) -> NetworkRuns:
-        """Return the errors of networks of one structure on all runs."""
-        return NetworkRuns(template, data, self._warm if self.periodic else None, tracker)
 
-
-class NetworkRuns:
+class NetworkErrors:
     """Errors of networks of one structure on all runs, and their derivatives, computed with them.
 
     ``warm`` is the number of samples before those of a period, None where runs are not periodic: these
@@ -261,7 +257,7 @@ class NetworkRuns:
 
     def errors(self, theta: Array) -> Array:
         """Return the errors at scored samples; infinite for diverging runs."""
-        found = self._followed(theta, theta.size)
+        found = self._followed(theta)
         self._slopes = found[:, 1:]
         errors = found[:, 0] - self.target
         self.tracker.update(theta, float(np.sqrt(np.mean(errors**2))))
@@ -272,32 +268,26 @@ class NetworkRuns:
         del theta
         return self._slopes
 
-    def outputs(self, theta: Array) -> Array:
-        """Return the outputs at scored samples."""
-        return self._followed(theta, 0)[:, 0]
-
-    def _followed(self, theta: Array, p: int) -> Array:
-        """Return the outputs at scored samples, and derivatives by p weights, (n, 1 + p)."""
-        model = self.template
+    def _followed(self, theta: Array) -> Array:
+        """Return the outputs at scored samples, and derivatives by the p weights, (n, 1 + p)."""
+        model, columns = self.template, 1 + theta.size
         n, units = len(model.linear), len(model.hidden)
         parts: Any = np.split(theta, np.cumsum([n * (n + 2), units * (n + 2)]))
-        linear, hidden, readout = (
-            part.reshape(k, -1) for part, k in zip(parts, (n, units, n), strict=True)
-        )
+        sizes = zip(parts, (n, units, n), strict=True)
+        linear, hidden, readout = (part.reshape(k, -1) for part, k in sizes)
         found = []
         for path in self.paths:
-            given = np.empty((path.run.u.size, 1 + p))
+            given = np.empty((len(path.run), columns))
             h, u = self.rate / path.every, (path.inputs - model.input_offset) / model.input_scale
-            state = np.zeros((n, 1 + p))
+            state = np.zeros((n, columns))
             if self.at_rest:
-                held, last = np.full(1 + SETTLING, u[0]), np.empty((1, 1 + p))
-                follow_network(
-                    linear, hidden, readout, SETTLING_STEP, state, held, SETTLING, 0, last
-                )
-            along = (u, path.every, path.skipped)
-            ended = follow_network(linear, hidden, readout, h, state, *along, given)
+                held, last = np.full(1 + SETTLING, u[0]), np.empty((1, columns))
+                settle = SETTLING_STEP, state, held, SETTLING, 0, last
+                follow_network(linear, hidden, readout, *settle)
+            along = h, state, u, path.every, path.skipped, given
+            ended = follow_network(linear, hidden, readout, *along)
             if not ended or not np.isfinite(given).all():
-                return np.full((self.target.size, 1 + p), np.inf)
+                return np.full((self.target.size, columns), np.inf)
             found.append(model.output_scale * given[path.run.counts])
         together = np.concatenate(found)
         together[:, 0] += model.output_offset

@@ -79,10 +79,6 @@ class ActivationMemoryEstimator(SeparableEstimator):
     rate_time_constant: Annotated[float, Ge(0)] | None = None
     nonnegative: bool = False
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        data.timed()
-        return super().identify(data, tracker)
-
     def unit(self, data: TrainingData) -> ActivationMemory:
         """Return the model with zero parameters."""
         forces = np.concatenate([run.scheduled[:, 0] for run in data.runs])

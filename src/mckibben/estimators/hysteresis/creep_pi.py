@@ -30,7 +30,6 @@ from mckibben.estimators.core.separable import (
 )
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap
 from mckibben.estimators.hysteresis.pi import play_operators, spread
-from mckibben.estimators.optimisers.tracker import Tracker
 
 RAISED = 1e-5
 """Step of the logarithm of the input offset, for its derivative."""
@@ -92,11 +91,6 @@ class CreepPIEstimator(SeparableEstimator):
     def fixed_fields(self) -> tuple[str, ...]:
         """The offset of the operators' sum, which starts at 0."""
         return ("pi.offset",)
-
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        if self.n_creep > 0:
-            data.timed("creep depends on it", ", or use n_creep=0")
-        return super().identify(data, tracker)
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [weights, log addition, log time constants, compliances]."""

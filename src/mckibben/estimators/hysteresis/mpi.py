@@ -112,7 +112,7 @@ class MPIEstimator(SeparableEstimator):
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         if not self.rate_dependent:
             return super().identify(data, tracker)
-        step = data.timed(instead=", or use mpi")
+        step = data.timed()
         if self.rate_time_constant is not None:
             return super().identify(data, tracker)
         values = [samples * step for samples in (0, 5, 25)]
@@ -131,11 +131,11 @@ class MPIEstimator(SeparableEstimator):
 
     def fastest(self, data: TrainingData) -> float:
         """Return the largest rate in the data, per second."""
-        rates = data.once(
-            ("fastest", self.rate_time_constant),
-            lambda: np.array([np.abs(self.rate(run)).max() for run in data.runs]),
+        return data.latest(
+            "fastest",
+            np.array(self.rate_time_constant or 0.0),
+            lambda: max(float(np.abs(self.rate(run)).max()) for run in data.runs),
         )
-        return float(rates.max())
 
     @property
     def map(self) -> PolynomialMap:

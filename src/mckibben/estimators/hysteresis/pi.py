@@ -154,9 +154,8 @@ def _segments(data: TrainingData, radii: Array, rule: str) -> tuple[Array, Array
     if not np.all(lengths > SHORTEST * max(longest.values())):
         raise ModelError(
             f"on no branch do operators with thresholds up to {radii[-1]:.3g} "
-            f"{data.input_unit} begin to move in turn: the longest goes "
-            f"{max(longest.values()):.3g} {data.input_unit}, and after a reversal it "
-            "takes twice a threshold",
+            f"{data.inputs[0].unit} begin to move in turn: the longest goes "
+            f"{max(longest.values()):.3g}, and after a reversal it takes twice a threshold",
             remedy="use fewer operators, smaller thresholds, or `settings[method]=ls`",
         )
     return lengths, rises

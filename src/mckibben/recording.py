@@ -67,6 +67,9 @@ PERIODIC = "periodic"
 REST_LENGTH = 'the rest length (`rest_length=MM`, or meta["rest_length"] in Python)'
 """Remedy that states the rest length."""
 
+SAME_TIME = 1e-3
+"""Relative difference up to which sample times are equal."""
+
 PROVENANCE = ("file", "sha256")
 """Entries of ``meta`` on the file of a recording; recordings are compared without them."""
 
@@ -430,6 +433,24 @@ def sample_time_of(
         problem = f"a recording without time cannot {purpose}"
         raise DataError(problem, file=recording.source, remedy=remedy)
     return recording.sample_time
+
+
+def check_sample_times(recordings: Sequence[Recording], *, equal: bool = True) -> None:
+    """Raise a `DataError` where some recordings have no time, or sample times are not `equal`."""
+    for first, one in ((recordings[0], one) for one in recordings):
+        step, usual = one.sample_time, first.sample_time
+        if (step is None) != (usual is None):
+            raise DataError(
+                "some recordings have time and others have none",
+                file=one.source,
+                remedy="give `rate` for those without, or use them separately",
+            )
+        if equal and step and usual and abs(step - usual) > SAME_TIME * usual:
+            raise DataError(
+                f"the sample time is {step:g} s here and {usual:g} s in {first.name}",
+                file=one.source,
+                remedy=f"give `resample={max(step, usual):.3g}`",
+            )
 
 
 def _frozen(name: str, samples: ArrayLike) -> Array:

@@ -24,7 +24,7 @@ from mckibben.blocks.inverse import commands
 from mckibben.blocks.runs import FreeRun
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
-from mckibben.recording import Recording, listed
+from mckibben.recording import Recording, check_sample_times, listed
 from mckibben.signals.reversals import reversals
 from mckibben.signals.shared_rows import check_shared
 from mckibben.statistics import block_length, correlation_length
@@ -175,13 +175,7 @@ def calibration(
         )
     if not recordings:
         raise DataError("there is nothing to calibrate on", remedy="give at least one recording")
-    steps = sorted(recording.sample_time or 0.0 for recording in recordings)
-    if not np.isclose(steps[0], steps[-1], rtol=1e-3):
-        raise DataError(
-            f"sample times differ, from {steps[0]:g} to {steps[-1]:g} s",
-            file=recordings[0].source,
-            remedy="resample all to one (`resample`)",
-        )
+    check_sample_times(recordings)
     for recording in recordings:
         check_units(recording, model.outputs)
     inputs, outputs = ([c.name for c in channels] for channels in (model.inputs, model.outputs))

@@ -10,14 +10,11 @@ from mckibben.blocks.base import Block, check_units
 from mckibben.blocks.free_runs import free_run
 from mckibben.blocks.runs import FreeRun
 from mckibben.errors import DataError
-from mckibben.recording import Recording
+from mckibben.recording import Recording, check_sample_times
 from mckibben.signals.shared_rows import check_shared
 
 FEWEST, SHORTEST = 60, 10
 """Smallest number of samples that can be tested, in total and per recording."""
-
-SAME_TIME = 1e-3
-"""Relative difference up to which sample times are equal."""
 
 
 def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[FreeRun, ...]:
@@ -43,7 +40,8 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
     if not recordings:
         raise DataError("there is no recording to check the model on", remedy="give at least one")
     for recording in recordings:
-        _refuse(recording, block, recordings[0].sample_time)
+        _refuse(recording, block)
+    check_sample_times(recordings)
     total, source = sum(map(len, recordings)), recordings[0].source
     if total < FEWEST:
         raise DataError(
@@ -63,21 +61,13 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
         )
 
 
-def _refuse(recording: Recording, block: Block, step: float | None) -> None:
+def _refuse(recording: Recording, block: Block) -> None:
     check_units(recording, (*block.inputs, *block.outputs))
     if len(recording) < SHORTEST:
         raise DataError(
             f"{len(recording)} samples are too few: the residual is correlated over longer times",
             file=recording.source,
             remedy=f"leave this recording out, or record at least {SHORTEST} samples",
-        )
-    own = recording.sample_time
-    if abs((own or 0.0) - (step or 0.0)) > SAME_TIME * (step or 0.0):
-        said = ["without time" if t is None else f"{t:g} s" for t in (step, own)]
-        raise DataError(
-            f"recordings differ in sample time: {said[0]} and {said[1]}",
-            file=recording.source,
-            remedy="check them one by one, or resample them with `resample`",
         )
 
 

@@ -16,7 +16,7 @@ from mckibben.blocks.running import run_many
 from mckibben.blocks.runs import Run as Run
 from mckibben.blocks.runs import run_of
 from mckibben.errors import DataError
-from mckibben.recording import Recording, listed, sample_time_of
+from mckibben.recording import Recording, check_sample_times, listed, sample_time_of
 
 Made = TypeVar("Made")
 
@@ -121,16 +121,17 @@ class TrainingData:
         inputs = np.concatenate([run.u[run.counts] for run in self.runs])
         return float(np.dot(inputs - inputs.mean(), self.target)) < 0
 
-    def _changed(self, change: Callable[[Run], Run]) -> TrainingData:
+    def changed(self, change: Callable[[Run], Run]) -> TrainingData:
+        """Return the same data with every run changed."""
         return replace(self, runs=tuple(map(change, self.runs)))
 
     def negated(self) -> TrainingData:
         """Return the same data with the output's sign changed."""
-        return self._changed(lambda run: replace(run, outputs=-run.outputs))
+        return self.changed(lambda run: replace(run, outputs=-run.outputs))
 
     def condensed(self) -> TrainingData:
         """Return the same data with reduced runs; see `Run.condensed`."""
-        return self._changed(Run.condensed)
+        return self.changed(Run.condensed)
 
     def stretches(self, shortest: int) -> TrainingData:
         """Return the same data as runs of scored samples; see `Run.stretches`."""
@@ -162,7 +163,7 @@ class TrainingData:
             chosen = counting[np.linspace(0, counting.size - 1, share).round().astype(int)]
             return replace(run, counts=np.isin(np.arange(run.counts.size), chosen))
 
-        return self._changed(thinner)
+        return self.changed(thinner)
 
 
 def training_data(
@@ -218,7 +219,8 @@ def training_data(
         )
     first = every[0]
     for recording in every:
-        _check(recording, first, (*driven, *given, *scheduling), one_rate)
+        _check(recording, first, (*driven, *given, *scheduling))
+    check_sample_times(every, equal=one_rate)
     runs = tuple(
         run_of(r, driven, given, scheduling, np.asarray(mask, dtype=bool), index=index)
         for index, (r, mask) in enumerate(zip(every, masks, strict=True))
@@ -248,7 +250,7 @@ def training_data(
     return data
 
 
-def _check(recording: Recording, first: Recording, names: Sequence[str], one_rate: bool) -> None:
+def _check(recording: Recording, first: Recording, names: Sequence[str]) -> None:
     for name in names:
         if recording[name].size and recording.units[name] != first.units[name]:
             raise DataError(
@@ -267,19 +269,6 @@ def _check(recording: Recording, first: Recording, names: Sequence[str], one_rat
                 remedy="subtract the atmosphere, as in "
                 f"`calibration[{name}]=COLUMN:GAIN:-1.01325:bar`, the gain 1 for bar, 0.01 for kPa",
             )
-    ours, theirs = recording.sample_time, first.sample_time
-    if (ours is None) != (theirs is None):
-        raise DataError(
-            "some recordings have time and others have none",
-            file=recording.source,
-            remedy="give `rate` for those without, or fit them separately",
-        )
-    if one_rate and ours is not None and theirs is not None and abs(ours - theirs) > 1e-3 * theirs:
-        raise DataError(
-            f"the sample time is {ours:g} s here and {theirs:g} s in {first.name or first.source}",
-            file=recording.source,
-            remedy=f"give `resample={max(ours, theirs):.3g}`",
-        )
 
 
 def _is_absolute(recording: Recording, channel: str) -> bool:

@@ -157,30 +157,24 @@ class SeparableEstimator(Estimator):
         return self.search_evaluations
 
     def _search(self, data: TrainingData, tracker: Tracker) -> Array:
-        lower, upper = self.bounds(data)
+        """Return the nonlinear parameters, (m,), from many starts or a search on nearly these data."""
+        lower, upper = ends = self.bounds(data)
         if lower.size == 0:
             return lower
-        if tracker.near is not None and tracker.near.shape == lower.shape:
-            tracker.near = self._polish(np.clip(tracker.near, lower, upper), data, tracker)
-            return tracker.near
-        thin = data.thinned(SEARCH_SAMPLES)
-        if self.searches_condensed:
-            thin = thin.condensed()
-        most = self.most_evaluations(lower.size)
-        tracker.budget = self.n_starts + self.n_refined * most
-        residuals, jacobian = self._errors(thin)
-        theta = multi_start(
-            residuals,
-            self.guesses(data) + self._scattered(lower, upper),
-            lower,
-            upper,
-            tracker,
-            n_refined=self.n_refined,
-            max_evaluations=most,
-            jacobian=jacobian,
-            choices=self.choices(data),
-        )
-        tracker.near = self._polish(theta, data, tracker)
+        theta = tracker.near
+        if theta is None or theta.shape != lower.shape:
+            thin = data.thinned(SEARCH_SAMPLES)
+            if self.searches_condensed:
+                thin = thin.condensed()
+            most = self.most_evaluations(lower.size)
+            tracker.budget = self.n_starts + self.n_refined * most
+            starts = self.guesses(data) + self._scattered(lower, upper)
+            choices, refined = self.choices(data), self.n_refined
+            theta = self._least_from(starts, thin, ends, tracker, refined, most, choices)
+        own, whole = tracker.part(0.9, 1.0), data.thinned(POLISH_SAMPLES)
+        start = np.clip(theta, lower, upper)
+        tracker.near = self._least_from([start], whole, ends, own, 1, self.polish_evaluations)
+        tracker.update_from(own)
         return tracker.near
 
     def _scattered(self, lower: Array, upper: Array) -> list[Array]:
@@ -190,24 +184,35 @@ class SeparableEstimator(Estimator):
         points = qmc.Sobol(lower.size, seed=self.seed).random_base2(exponent)[: self.n_starts]
         return list(qmc.scale(points, lower, upper))
 
-    def _polish(self, theta: Array, data: TrainingData, tracker: Tracker) -> Array:
-        lower, upper = self.bounds(data)
-        if lower.size == 0:
-            return theta
-        residuals, jacobian = self._errors(data.thinned(POLISH_SAMPLES))
-        own = tracker.part(0.9, 1.0)
-        best = multi_start(
-            residuals,
-            [theta],
-            lower,
-            upper,
-            own,
-            n_refined=1,
-            max_evaluations=self.polish_evaluations,
-            jacobian=jacobian,
+    def _least_from(
+        self,
+        starts: Sequence[Array],
+        data: TrainingData,
+        ends: tuple[Array, Array],
+        tracker: Tracker,
+        n_refined: int,
+        most: int,
+        choices: Sequence[Choice] = (),
+    ) -> Array:
+        """Return the nonlinear parameters of least error.
+
+        Errors and derivatives are asked for at one place, where linear parameters are solved for once.
+        """
+
+        @lru_cache(maxsize=1)
+        def solved(place: bytes) -> tuple[Array, Array | None, Array]:
+            return self._solved(np.frombuffer(place).copy(), data)
+
+        return multi_start(
+            lambda theta: solved(theta.tobytes())[2],
+            starts,
+            *ends,
+            tracker,
+            n_refined=n_refined,
+            max_evaluations=most,
+            jacobian=lambda theta: self.jacobian(theta, *solved(theta.tobytes())[:2], data),
+            choices=choices,
         )
-        tracker.update_from(own)
-        return best
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:
         """Return the regressors at the scored samples of all runs, shape (samples, k)."""
@@ -252,26 +257,6 @@ class SeparableEstimator(Estimator):
             return matrix, None, np.full(data.target.size, WORST)
         linear, offset = self.solve(matrix, data)
         return matrix, linear, np.asarray(matrix @ linear + offset - data.target)
-
-    def _errors(
-        self, data: TrainingData
-    ) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
-        """Return functions for residuals and derivatives by the nonlinear parameters.
-
-        A search asks for both at one place, where the linear parameters are solved for once.
-        """
-
-        @lru_cache(maxsize=1)
-        def solved(place: bytes) -> tuple[Array, Array | None, Array]:
-            return self._solved(np.frombuffer(place).copy(), data)
-
-        def residuals(theta: Array) -> Array:
-            return solved(theta.tobytes())[2]
-
-        def jacobian(theta: Array) -> Array:
-            return self.jacobian(theta, *solved(theta.tobytes())[:2], data)
-
-        return residuals, jacobian
 
     def best_of(
         self, setting: str, values: Sequence[float], data: TrainingData, tracker: Tracker

@@ -52,7 +52,7 @@ from mckibben.estimators.coupled.balance_prior import (
 from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
-from mckibben.estimators.coupled.base import CoupledEstimator, of_channels
+from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.muscles.traits import TRAVELS
 from mckibben.recording import Recording, listed
@@ -317,7 +317,8 @@ class BalanceEstimator(CoupledEstimator):
             drive = drive_of(np.column_stack(pressures))
             if structure.m < drive.shape[1] <= structure.n:  # not any, and enough to balance along
                 balance = replace(balance, drive=rows(drive))
-        x = of_channels(data, balance.scheduling).stacked("scheduled")
+        names = [channel.name for channel in data.scheduled]
+        x = data.stacked("scheduled")[:, [names.index(name) for name in balance.scheduling]]
         balance = replace(balance, known=rows(np.column_stack([x.min(axis=0), x.max(axis=0)])))
 
         acting = zip(*(front(structure, values, one) for one in data.inputs), strict=True)

@@ -189,14 +189,6 @@ class CoupledEstimator(Estimator):
         return None
 
 
-def of_channels(data: TrainingData, names: Sequence[str]) -> TrainingData:
-    """Return data with some of the scheduling channels, in that order."""
-    known = [channel.name for channel in data.scheduled]
-    places = [known.index(name) for name in names]
-    runs = tuple(replace(run, scheduled=run.scheduled[:, places]) for run in data.runs)
-    return replace(data, runs=runs, scheduled=tuple(data.scheduled[place] for place in places))
-
-
 def bridged(data: TrainingData) -> TrainingData:
     """Return the runs up to their last scored output, with unscored outputs interpolated.
 

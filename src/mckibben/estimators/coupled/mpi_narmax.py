@@ -11,6 +11,7 @@ PI-NARMAX Model", Sections 3 and 4.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal
 
@@ -23,15 +24,16 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
-from mckibben.blocks.fields import Channel, rows, vector
+from mckibben.blocks.fields import rows, vector
 from mckibben.blocks.kernels import kernel
+from mckibben.blocks.running import run_many
 from mckibben.errors import DataError, MckibbenError, ModelError
-from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors
 from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.recording import Recording
+from mckibben.recording import Recording, check_sample_times
 
 UNLOADED = 0.05
 """Largest force of a run without load, relative to the largest of all runs."""
@@ -109,13 +111,12 @@ class MPINarmaxEstimator(CoupledEstimator):
                 f"there are {len(data.inputs)} inputs and {len(data.scheduled)} loads",
                 remedy="give recordings of one muscle, with a channel force",
             )
-        if len({run.sample_time for run in data.runs}) > 1 or data.runs[0].sample_time is None:
-            raise DataError("the runs differ in sample time", remedy="resample them to one")
+        check_sample_times([run.source for run in data.runs])
         tracker.reached(0.0)
         free, loaded = _parted(data)
         hysteresis = self.hysteresis(free)
         known = loaded if self.learns_from == "loaded" and loaded.runs else data
-        problem = RecurrentProblem.of(self, known, hysteresis)
+        problem = RecurrentProblem(self, after(hysteresis, known))
         even = Sets.even(*problem.ranges, self.n_sets)
         chosen = (even, np.zeros_like(even.centres))
         if self.method == "pso":
@@ -166,29 +167,26 @@ def remembered(
                 memberships[t, i, s] = np.exp(-0.5 * z * z)
 
 
+def after(hysteresis: Block, data: TrainingData) -> TrainingData:
+    """Return the data with the outputs of a hysteresis instead of its inputs."""
+
+    def driven(run: Run) -> Run:
+        found = hysteresis.simulate(run.driven, sample_time=run.sample_time)
+        return replace(run, driven=np.asarray(found))
+
+    return replace(data.changed(driven), inputs=hysteresis.outputs)
+
+
 @dataclass(frozen=True)
 class RecurrentProblem:
-    """Runs for the network: driven and scheduling inputs, (n, 1 + s), and the target."""
+    """Runs for the network, whose input is the hysteresis."""
 
     settings: MPINarmaxEstimator
-    inputs: tuple[Array, ...]
-    targets: tuple[Array, ...]
-    step: float
-    free: Channel
     data: TrainingData
 
-    @classmethod
-    def of(
-        cls, settings: MPINarmaxEstimator, data: TrainingData, hysteresis: Block
-    ) -> RecurrentProblem:
-        """Return the problem on runs, after a known hysteresis."""
-        inputs = []
-        for run in data.runs:
-            f = hysteresis.simulate(run.driven[:, 0], sample_time=run.sample_time)
-            inputs.append(np.ascontiguousarray(np.column_stack([f, run.scheduled])))
-        targets = tuple(run.outputs[:, 0] for run in data.runs)
-        step = data.timed()
-        return cls(settings, tuple(inputs), targets, step, hysteresis.outputs[0], data)
+    @property
+    def runs(self) -> Sequence[Run]:
+        return self.data.runs
 
     def regress(self, inputs: Array, past: Array) -> Array:
         """Return all regressors over a run, with given past outputs."""
@@ -206,26 +204,24 @@ class RecurrentProblem:
     @property
     def ranges(self) -> tuple[Array, Array]:
         """Lowest and highest of every regressor."""
-        x = np.concatenate(list(map(self.regress, self.inputs, self.targets)))
+        x = np.concatenate([self.regress(run.inputs, run.y) for run in self.runs])
         low, high = x.min(axis=0), x.max(axis=0)
         return low, np.where(high > low, high, low + 1.0)
 
-    def solved(
-        self, sets: Sets, feedbacks: Array, pasts: tuple[Array, ...]
-    ) -> RecurrentFuzzyNetwork:
+    def solved(self, sets: Sets, feedbacks: Array, pasts: Sequence[Array]) -> RecurrentFuzzyNetwork:
         """Return the network with least-squares consequents for given past outputs."""
         e, constants = self.settings, self.settings.constants
         solver = Consequents(constants, e.ridge)
         gram, right, n_terms = np.zeros(()), np.zeros(()), 0
-        for inputs, past, y in zip(self.inputs, pasts, self.targets, strict=True):
-            x = self.regress(inputs, past)
+        for run, past in zip(self.runs, pasts, strict=True):
+            x = self.regress(run.inputs, past)
             phi = np.empty((len(x), *sets.centres.shape))
             remembered(x, sets.centres, sets.widths, feedbacks, phi)
             fired = firing(phi)
             fired = fired / np.maximum(fired.sum(axis=1, keepdims=True), 1e-290)
             columns = regressors(x, fired, constants=constants)
             gram = gram + columns.T @ columns
-            right = right + columns.T @ y[:, np.newaxis]
+            right = right + columns.T @ run.outputs
             n_terms = x.shape[1] + constants
         consequents = solver.solve(gram, right, n_terms)
         return RecurrentFuzzyNetwork(
@@ -233,8 +229,8 @@ class RecurrentProblem:
             rows(sets.widths),
             rows(feedbacks),
             vector(consequents.ravel()),
-            self.step,
-            (self.free,),
+            self.data.timed(),
+            self.data.inputs,
             self.data.scheduled,
             self.data.outputs,
             e.output_lags,
@@ -243,18 +239,15 @@ class RecurrentProblem:
             constants,
         )
 
-    def free_run(self, network: RecurrentFuzzyNetwork, inputs: Array) -> Array:
-        """Return the network's free-running output."""
-        output = np.empty((len(inputs), 1))
-        network.bind(
-            self.step, network.initial_state(inputs[0], sample_time=self.step), inputs, output
-        )()
-        return output[:, 0]
+    def free_runs(self, network: RecurrentFuzzyNetwork) -> list[Array]:
+        """Return the network's free-running outputs."""
+        every = ((run.inputs, run.sample_time) for run in self.runs)
+        return [run_many([network], u, sample_time=step)[0, :, 0] for u, step in every]
 
-    def cost(self, outputs: list[Array]) -> float:
+    def cost(self, outputs: Sequence[Array]) -> float:
         """Return the free-running RMSE; infinite for diverging runs."""
-        errors = np.concatenate([z - y for z, y in zip(outputs, self.targets, strict=True)])
         with np.errstate(over="ignore", invalid="ignore"):
+            errors = np.concatenate(outputs) - self.data.stacked("y")
             value = float(np.sqrt(np.mean(errors**2)))
         return value if np.isfinite(value) else np.inf
 
@@ -266,18 +259,18 @@ class RecurrentProblem:
         ModelError
             If every one of them leaves all bounds.
         """
-        pasts = self.targets
+        pasts = [run.y for run in self.runs]
         found, least = None, np.inf
         for _ in range(ROUNDS):
             network = self.solved(sets, feedbacks, pasts)
-            outputs = [self.free_run(network, inputs) for inputs in self.inputs]
+            outputs = self.free_runs(network)
             cost = self.cost(outputs)
             if cost < least:
                 found, least = network, cost
             if not np.isfinite(cost):
                 break
             # halfway from what was measured to what it makes of itself: whole steps may circle
-            pasts = tuple(0.5 * (a + b) for a, b in zip(pasts, outputs, strict=True))
+            pasts = [0.5 * (a + b) for a, b in zip(pasts, outputs, strict=True)]
         if found is None:
             raise ModelError(
                 "the network diverges in a free run",
@@ -294,12 +287,9 @@ class RecurrentProblem:
         upper = np.concatenate([base + span, span, 0.3 * span])
         start = rng.uniform(lower, upper, (SWARM.particles, lower.size))
         start[0] = np.concatenate([even.vector, np.zeros(span.size)])
-        most = max(SEARCH_SAMPLES // len(self.inputs), 100)
-        thin = replace(
-            self,
-            inputs=tuple(np.ascontiguousarray(u[:most]) for u in self.inputs),
-            targets=tuple(y[:most] for y in self.targets),
-        )
+        most = max(SEARCH_SAMPLES // len(self.runs), 100)
+        thin = replace(self, data=self.data.changed(lambda run: run.cut(0, most)))
+        measured = [run.y for run in thin.runs]
 
         def split(place: Array) -> tuple[Sets, Array]:
             n = even.vector.size
@@ -307,8 +297,7 @@ class RecurrentProblem:
 
         def cost(place: Array) -> float:
             try:
-                network = thin.solved(*split(place), thin.targets)
-                return thin.cost([thin.free_run(network, inputs) for inputs in thin.inputs])
+                return thin.cost(thin.free_runs(thin.solved(*split(place), measured)))
             except (MckibbenError, np.linalg.LinAlgError):
                 return np.inf
 

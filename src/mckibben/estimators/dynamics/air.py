@@ -245,8 +245,8 @@ class AirEstimator(SeparableEstimator):
 
 def delayed(data: TrainingData, delay: int) -> TrainingData:
     """Return the same data with inputs delayed by some samples, the first value extended."""
-    runs = []
-    for run in data.runs:
-        samples = np.maximum(np.arange(len(run.driven)) - delay, 0)
-        runs.append(replace(run, driven=run.driven[samples]))
-    return replace(data, runs=tuple(runs))
+
+    def late(run: Run) -> Run:
+        return replace(run, driven=run.driven[np.maximum(np.arange(len(run)) - delay, 0)])
+
+    return data.changed(late)

@@ -90,7 +90,7 @@ def tested(plan: Plan, found: FitResult, rows: Sequence[int]) -> tuple[TestedBan
     outputs = [*found.outputs[:n], *(found.outputs[n + k] for k in rows)]
     assert found.block is not None
     held, data = plan.data.held(found.predictions, found.block), replace(plan.data, split=some)
-    banded = tested_band(found.block, held, outputs, some, data.held_out)
+    banded = tested_band(found.block, held, outputs, some)
     errors = data.test_errors(outputs)
     return banded and (banded[1], float(np.sqrt((errors**2).mean())))
 

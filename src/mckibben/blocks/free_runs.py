@@ -6,8 +6,10 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block, check_units
@@ -25,6 +27,8 @@ AT_ONCE = 2_000_000
 
 AWAY = 1e3
 """Error, in ranges of the measured output, above which a model has diverged."""
+
+Kind = TypeVar("Kind", np.float64, np.bool_)
 
 Changed = Callable[[Block, int], Block]
 """Returns a block as it runs over a recording, by the recording's index."""
@@ -155,7 +159,7 @@ class FreeRuns:
             differences = self.scored(self.modelled) - self.scored(other.modelled)
             return float(np.sqrt(np.mean(differences**2)))
 
-    def scored(self, outputs: Sequence[Array]) -> Array:
+    def scored(self, outputs: Sequence[NDArray[Kind]]) -> NDArray[Kind]:
         """Return the outputs of all runs, (n, m) each, at the samples that count, (N,)."""
         pairs = zip(outputs, self.runs, strict=True)
         return np.concatenate([table[run.counts].ravel() for table, run in pairs])

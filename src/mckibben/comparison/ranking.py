@@ -287,7 +287,7 @@ def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
     if given != data.channels.outputs:
         return row
     held = data.held(found.predictions, row.block)
-    tested = tested_band(row.block, held, found.outputs, data.split, data.held_out)
+    tested = tested_band(row.block, held, found.outputs, data.split)
     if tested is None:
         return row
     banded, band = tested

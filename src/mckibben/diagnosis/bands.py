@@ -342,11 +342,10 @@ def tested_band(
     held: Sequence[FreeRun],
     outputs: Sequence[Array],
     split: Split,
-    held_out: Sequence[Recording],
 ) -> tuple[Banded, TestedBand] | None:
     """Return a model with its band, and the band's coverage on the test; None without a band.
 
-    ``held`` are of models fitted without a part of recordings that are ``held_out``, on that part;
+    ``held`` are of models fitted without a part of the recordings, on that part;
     ``outputs``, shape (n, k) each, free-running on every training recording, then on every test
     recording.
     """
@@ -373,7 +372,7 @@ def tested_band(
     )
     by_run = np.array([inside.mean(axis=0) for inside in covered])
     lowest, highest = float(by_run.min()), float(by_run.max())
-    branches = n_branches([recording.matrix(names) for recording in held_out])
+    branches = n_branches([run.outputs for run in held])
     reasons: dict[Unknown, bool] = {
         "blocks": band.units < FEWEST,
         "branches": branches < FEWEST,

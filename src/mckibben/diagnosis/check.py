@@ -10,17 +10,22 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, check_units
+from mckibben.blocks.free_runs import free_run
 from mckibben.blocks.runs import FreeRun
 from mckibben.comparison.choosing import useful
 from mckibben.diagnosis.causes import Cause, averaged, block_length, causes
 from mckibben.diagnosis.description import ModelDescription
-from mckibben.diagnosis.free_runs import runs_of
-from mckibben.recording import Recording, listed
+from mckibben.errors import DataError
+from mckibben.recording import Recording, check_sample_times, listed
+from mckibben.signals.shared_rows import check_shared
 from mckibben.statistics import NORMAL_95, correlation_length
 from mckibben.system.progress import Tell, one_by_one, telling
 from mckibben.system.showing import DrawsItself
 from mckibben.system.threads import one_blas_thread
+
+FEWEST, SHORTEST = 60, 10
+"""Smallest number of samples that can be tested, in total and per recording."""
 
 FEWEST_BLOCKS = 6
 """Smallest number of blocks of a recording that is tested."""
@@ -238,9 +243,52 @@ def check(
     ModelError
         Where the model's output is not finite, or runs away.
     """
-    model = inside(model)
+    model, every = inside(model), listed(recordings)
+    check_usable(model, every)
+    inputs, outputs = ([c.name for c in some] for some in (model.inputs, model.outputs))
+    check_shared({"check": every}, inputs, outputs)
     with telling(progress, "checking") as tell:
-        return check_runs(model, runs_of(model, listed(recordings)), tell)
+        return check_runs(model, [free_run(model, one) for one in every], tell)
+
+
+def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
+    """Raise an error for recordings that cannot test a model; see `check`."""
+    if not recordings:
+        raise DataError("there is no recording to check the model on", remedy="give at least one")
+    for recording in recordings:
+        _refuse(recording, block)
+    check_sample_times(recordings)
+    total, source = sum(map(len, recordings)), recordings[0].source
+    if total < FEWEST:
+        raise DataError(
+            f"{total} samples are too few to distinguish a wrong model from noise",
+            file=source,
+            remedy=f"record at least {FEWEST}, better ten cycles with 50 or more each",
+        )
+    driven = [c.name for c in block.inputs if c.name not in block.scheduling]
+    still = [driven[0]] if all(_constant(recordings, name) for name in driven) else []
+    still += [c.name for c in block.outputs if _constant(recordings, c.name)]
+    if still:
+        raise DataError(
+            "the channel is constant, which does not test the model",
+            file=source,
+            channel=still[0],
+            remedy="record while it moves, or name another column with `columns[CHANNEL]=COLUMN`",
+        )
+
+
+def _refuse(recording: Recording, block: Block) -> None:
+    check_units(recording, (*block.inputs, *block.outputs))
+    if len(recording) < SHORTEST:
+        raise DataError(
+            f"{len(recording)} samples are too few: the residual is correlated over longer times",
+            file=recording.source,
+            remedy=f"leave this recording out, or record at least {SHORTEST} samples",
+        )
+
+
+def _constant(recordings: Sequence[Recording], name: str) -> bool:
+    return bool(np.ptp(np.concatenate([recording[name] for recording in recordings])) == 0)
 
 
 def check_runs(

@@ -11,8 +11,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.runs import FreeRun
 from mckibben.blocks.starts import run_on
 from mckibben.comparison.splits import Split
-from mckibben.diagnosis.check import Validation, check_runs
-from mckibben.diagnosis.free_runs import check_usable
+from mckibben.diagnosis.check import Validation, check_runs, check_usable
 from mckibben.errors import DataError
 
 

@@ -8,9 +8,9 @@ from math import comb
 
 import numpy as np
 
-from mckibben.arrays import Array, Mask
+from mckibben.arrays import Array
+from mckibben.blocks.runs import run_of
 from mckibben.comparison.splits import Split
-from mckibben.recording import Recording
 
 LARGEST_DEGREE, MOST_TERMS = 5, 60
 """Of the polynomial."""
@@ -27,13 +27,14 @@ Map = Callable[[Array], Array]
 
 def static_error(split: Split, inputs: Sequence[str], outputs: Sequence[str]) -> float:
     """Return the error on the test of a static map of the inputs, mean RMSE over outputs."""
-    train = [recording.with_derived((*inputs, *outputs)) for recording in split.train]
-    test = [recording.with_derived((*inputs, *outputs)) for recording in split.test]
-    known = [name for name in inputs if all(name in one for one in (*train, *test))]
-    kept = [~recording.bridged for recording in train]
-    found = static_map(_rows(train, kept, known), _rows(train, kept, outputs))
-    errors = found(np.concatenate(_rows(test, split.test_rows, known)))
-    errors -= np.concatenate(_rows(test, split.test_rows, outputs))
+    every = [one.with_derived((*inputs, *outputs)) for one in (*split.train, *split.test)]
+    known = [name for name in inputs if all(name in one for one in every)]
+    train = [run_of(one, known, outputs) for one in split.train]
+    pairs = zip(split.test, split.test_rows, strict=True)
+    test = [run_of(one, known, outputs, counts=rows) for one, rows in pairs]
+    given = [run.driven[run.counts] for run in train]
+    found = static_map(given, [run.outputs[run.counts] for run in train])
+    errors = np.concatenate([(found(run.driven) - run.outputs)[run.counts] for run in test])
     return float(np.sqrt((errors**2).mean(axis=0)).mean())
 
 
@@ -101,8 +102,3 @@ def _polynomial(low: Array, high: Array, degree: int) -> Map:
         return np.column_stack([scaled[:, places].prod(axis=1) for places in factors])
 
     return terms
-
-
-def _rows(runs: Sequence[Recording], rows: Sequence[Mask], names: Sequence[str]) -> list[Array]:
-    pairs = zip(runs, rows, strict=True)
-    return [run.matrix(names)[own] for run, own in pairs]

@@ -125,14 +125,6 @@ class TrainingData:
         """Return the same data with every run changed."""
         return replace(self, runs=tuple(map(change, self.runs)))
 
-    def negated(self) -> TrainingData:
-        """Return the same data with the output's sign changed."""
-        return self.changed(lambda run: replace(run, outputs=-run.outputs))
-
-    def condensed(self) -> TrainingData:
-        """Return the same data with reduced runs; see `Run.condensed`."""
-        return self.changed(Run.condensed)
-
     def stretches(self, shortest: int) -> TrainingData:
         """Return the same data as runs of scored samples; see `Run.stretches`."""
         found = [part for run in self.runs for part in run.stretches(shortest)]

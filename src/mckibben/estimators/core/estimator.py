@@ -606,11 +606,8 @@ class Estimator(ABC):
         """
         # as the model is delivered, without loads of the recordings' own
         runs = replace(self.free_runs(self.fitted, recordings), changed=as_it_is)
-        counted = [
-            np.concatenate([rows[own] for rows, own in zip(part, runs.rows, strict=True)])
-            for part in parts
-        ]
-        without = self.left_out(runs, [rows.repeat(len(runs.names)) for rows in counted])
+        m = len(runs.names)
+        without = self.left_out(runs, [runs.scored(part).repeat(m) for part in parts])
         if without is None:
             return None
         found = [table.copy() for table in runs.modelled]

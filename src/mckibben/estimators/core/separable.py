@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Annotated, ClassVar
 
@@ -139,7 +139,9 @@ class SeparableEstimator(Estimator):
         """Return the block for increasing data; mirrored for decreasing data."""
         if not (self.rises and data.falls):
             return self.identify(data, tracker)
-        rising = self.identify(data.negated(), tracker)
+        rising = self.identify(
+            data.changed(lambda run: replace(run, outputs=-run.outputs)), tracker
+        )
         channel = self.channels(data)["output"]
         return Series((rising, Negative(channel, channel)))
 
@@ -165,7 +167,7 @@ class SeparableEstimator(Estimator):
         if theta is None or theta.shape != lower.shape:
             thin = data.thinned(SEARCH_SAMPLES)
             if self.searches_condensed:
-                thin = thin.condensed()
+                thin = thin.changed(Run.condensed)
             most = self.most_evaluations(lower.size)
             tracker.budget = self.n_starts + self.n_refined * most
             starts = self.guesses(data) + self._scattered(lower, upper)

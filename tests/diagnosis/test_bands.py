@@ -187,7 +187,7 @@ def test_what_it_cannot_calibrate_on_is_refused(banded: Banded) -> None:
     drift = MODEL.simulate(runs[0]["pressure"]) + np.linspace(0.0, 5.0, len(runs[0]))
     for bad, said in (
         ([], None),
-        ([runs[0], slower], "sample times"),
+        ([runs[0], slower], "sample time"),
         ([runs[0].select(["pressure"])], "displacement"),
         ([runs[0].select(["displacement"])], "pressure"),
         ([runs[0], runs[0], runs[1]], "twice"),

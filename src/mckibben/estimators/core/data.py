@@ -90,7 +90,7 @@ class TrainingData:
     @cached_property
     def target(self) -> Array:
         """Scored outputs of all runs, sample by sample, shape (samples that count × m,)."""
-        return np.concatenate([run.outputs[run.counts].ravel() for run in self.runs])
+        return self.scored(lambda run: run.outputs).ravel()
 
     @property
     def spread(self) -> Array:
@@ -118,7 +118,7 @@ class TrainingData:
     @property
     def falls(self) -> bool:
         """Whether the output decreases with the input, as a muscle's length does."""
-        inputs = np.concatenate([run.u[run.counts] for run in self.runs])
+        inputs = self.scored(lambda run: run.u)
         return float(np.dot(inputs - inputs.mean(), self.target)) < 0
 
     def changed(self, change: Callable[[Run], Run]) -> TrainingData:
@@ -134,6 +134,10 @@ class TrainingData:
     def stacked(self, what: str) -> Array:
         """Return a field of all runs, concatenated."""
         return np.concatenate([getattr(run, what) for run in self.runs])
+
+    def scored(self, of_run: Callable[[Run], Array]) -> Array:
+        """Return a quantity of every run, (n, ...), at the scored samples of all runs."""
+        return np.concatenate([of_run(run)[run.counts] for run in self.runs])
 
     def simulated(self, blocks: Sequence[Block]) -> Array:
         """Return outputs of blocks, from rest, at the scored samples, shape (blocks, as `target`)."""
@@ -222,7 +226,7 @@ def training_data(
         return tuple(Channel(name, first.units[name]) for name in names)
 
     data = TrainingData(runs, channels(driven), channels(given), channels(scheduling), spans=spans)
-    counting = np.concatenate([run.outputs[run.counts] for run in runs])
+    counting = data.scored(lambda run: run.outputs)
     if len(counting) < FEWEST_SAMPLES:
         raise DataError(
             f"{len(counting)} samples are too few to identify a model",

@@ -7,7 +7,7 @@ are the exact (non-negative) least-squares solution, so the search runs in a han
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Annotated, ClassVar
@@ -101,8 +101,9 @@ class SeparableEstimator(Estimator):
 
         Shape (samples that count, m); by finite differences of the basis.
         """
-        here = self.matrix(theta, data) @ linear
-        steps = differences(theta, *self.bounds(data))
+        here, (lower, upper) = self.matrix(theta, data) @ linear, self.bounds(data)
+        steps = DIFFERENCE * (upper - lower)
+        steps = np.where(theta + steps <= upper, steps, -steps)
         columns = []
         for index in range(theta.size):
             moved = theta.copy()
@@ -203,7 +204,11 @@ class SeparableEstimator(Estimator):
 
         @lru_cache(maxsize=1)
         def solved(place: bytes) -> tuple[Array, Array | None, Array]:
-            return self._solved(np.frombuffer(place).copy(), data)
+            matrix = self.matrix(np.frombuffer(place).copy(), data)
+            if not np.isfinite(matrix).all():
+                return matrix, None, np.full(data.target.size, WORST)
+            linear, offset = self.solve(matrix, data)
+            return matrix, linear, matrix @ linear + offset - data.target
 
         return multi_start(
             lambda theta: solved(theta.tobytes())[2],
@@ -218,7 +223,7 @@ class SeparableEstimator(Estimator):
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:
         """Return the regressors at the scored samples of all runs, shape (samples, k)."""
-        return counting(data, lambda run: self.basis(theta, run, data))
+        return data.scored(lambda run: self.basis(theta, run, data))
 
     def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
         """Return the least-squares linear parameters and offset."""
@@ -252,14 +257,6 @@ class SeparableEstimator(Estimator):
         floor[0] = LEAST_REVERSIBLE * span / reach if reach > 0 else 0.0
         return floor
 
-    def _solved(self, theta: Array, data: TrainingData) -> tuple[Array, Array | None, Array]:
-        """Return regressors, linear parameters if finite, and residuals."""
-        matrix = self.matrix(theta, data)
-        if not np.isfinite(matrix).all():
-            return matrix, None, np.full(data.target.size, WORST)
-        linear, offset = self.solve(matrix, data)
-        return matrix, linear, np.asarray(matrix @ linear + offset - data.target)
-
     def best_of(
         self, setting: str, values: Sequence[float], data: TrainingData, tracker: Tracker
     ) -> Block:
@@ -273,14 +270,3 @@ class SeparableEstimator(Estimator):
         block, best = min(found, key=lambda item: item[1].best_cost)
         tracker.best_cost, tracker.best = best.best_cost, best.best
         return block
-
-
-def counting(data: TrainingData, of_run: Callable[[Run], Array]) -> Array:
-    """Return a quantity of every run, shape (n, ...), at the scored samples of all runs."""
-    return np.concatenate([of_run(run)[run.counts] for run in data.runs])
-
-
-def differences(theta: Array, lower: Array, upper: Array) -> Array:
-    """Return steps of finite differences within the bounds."""
-    steps = DIFFERENCE * (upper - lower)
-    return np.where(theta + steps <= upper, steps, -steps)

@@ -86,7 +86,7 @@ class PlayRidgeEstimator(CoupledEstimator):
 
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
         lags = self.lags if data.sample_time is not None else (0.0,)
-        spans = np.ptp(np.concatenate([run.inputs for run in data.runs]), axis=0)
+        spans = np.ptp(data.stacked("inputs"), axis=0)
         width = readout_width(
             spans.size, len(lags), len(self.thresholds), self.degree, self.crossed
         )

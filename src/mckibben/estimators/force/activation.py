@@ -81,7 +81,7 @@ class ActivationMemoryEstimator(SeparableEstimator):
 
     def unit(self, data: TrainingData) -> ActivationMemory:
         """Return the model with zero parameters."""
-        forces = np.concatenate([run.scheduled[:, 0] for run in data.runs])
+        forces = data.stacked("scheduled")
         low, high = data.input_range
         weakest, strongest = float(forces.min()), float(forces.max())
         varies = strongest - weakest > 1e-6 * max(abs(strongest), 1.0)
@@ -211,7 +211,7 @@ class ActivationPressureEstimator(SearchEstimator):
         rate, rest, middle = whole - static, data.target - static, float(at.mean())
         rises = (at - middle) / max(middle, 1e-9)
         rise = np.repeat(rises, [int(run.counts.sum()) for run in data.runs])
-        force = np.concatenate([run.scheduled[run.counts, 0] for run in data.runs])
+        force = data.scored(lambda run: run.scheduled[:, 0])
         largest = max(float(np.abs(force).max()), 1.0)
         powers = np.vander(force / largest, 4)
         start = np.linalg.lstsq(powers * rate[:, np.newaxis], rest, rcond=1e-9)[0]

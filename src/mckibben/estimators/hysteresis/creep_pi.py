@@ -23,11 +23,7 @@ from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.memoryless import Logarithm
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, Operators
-from mckibben.estimators.core.separable import (
-    LEAST_REVERSIBLE,
-    SeparableEstimator,
-    counting,
-)
+from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap
 from mckibben.estimators.hysteresis.pi import play_operators, spread
 
@@ -178,7 +174,7 @@ class CreepPIEstimator(SeparableEstimator):
             moved = creep_moves(given, taus, compliances, run.sample_time)
             return np.column_stack([crept, moved])
 
-        return counting(data, of)
+        return data.scored(of)
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every piece, so that the map increases."""

@@ -15,7 +15,7 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
-from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator, counting
+from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import MAPS, PolynomialMap
 from mckibben.estimators.hysteresis.pi import play_operators, spread
 from mckibben.estimators.optimisers.linear import solve_linear
@@ -199,7 +199,7 @@ class MPIEstimator(SeparableEstimator):
 
     def _plays(self, radii: Array, data: TrainingData) -> Array:
         """Return play operators at the samples that count."""
-        return counting(data, lambda run: play_operators(run.u, radii, self.starting_rule))
+        return data.scored(lambda run: play_operators(run.u, radii, self.starting_rule))
 
     def operators(self, radii: Array, run: Run, data: TrainingData) -> Array:
         """Return play operators over the run, then their products with the relative rate."""
@@ -246,7 +246,7 @@ class MPIEstimator(SeparableEstimator):
         key = ("operators", self.n_operators, self.initial, *rate)
 
         def computed() -> Array:
-            return counting(data, lambda run: self.operators(radii, run, data))
+            return data.scored(lambda run: self.operators(radii, run, data))
 
         return data.latest(key, radii, computed)
 
@@ -261,7 +261,7 @@ class MPIEstimator(SeparableEstimator):
         if self.identified:
             low, high = data.input_range
             half, radii = 0.5 * (high - low), self.radii(theta, data) + RAISED * (high - low)
-            there = counting(data, lambda run: self.operators(radii, run, data))
+            there = data.scored(lambda run: self.operators(radii, run, data))
             by_radii = weights * (there - operators) / (RAISED * (high - low)) * half
             by_radii = by_radii.reshape(len(operators), -1, self.n_operators).sum(axis=1)
             columns = np.column_stack([operators, by_radii])

@@ -145,7 +145,7 @@ STILL = np.full(600, 2.0)
         ([recording(STILL, GOOD["displacement"])], "pressure"),
         ([recording(GOOD["pressure"], STILL)], "displacement"),
         ([GOOD, Recording(dict(GOOD.channels), 0.05)], "resample"),
-        ([GOOD, Recording(dict(GOOD.channels))], "without time"),
+        ([GOOD, Recording(dict(GOOD.channels))], "none"),
     ],
 )
 def test_what_cannot_be_checked_is_refused(recordings: list[Recording], said: str) -> None:

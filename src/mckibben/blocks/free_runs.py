@@ -117,7 +117,7 @@ class FreeRuns:
     @cached_property
     def from_rest(self) -> FreeRuns:
         """The same runs, begun at rest at their first inputs."""
-        return replace(self, runs=[replace(run, start=None) for run in self.runs])
+        return replace(self, runs=[replace(run, from_outputs=False) for run in self.runs])
 
     @property
     def names(self) -> list[str]:

@@ -29,9 +29,8 @@ class Run:
         Samples whose outputs are scored; outputs elsewhere are never looked at.
     sample_time : float or None
         [s].
-    start : array, shape (m,), or None
-        The outputs that a free run begins from (see `mckibben.blocks.starts`); None where the first are
-        not known, and it begins at rest.
+    from_outputs : bool
+        Whether a free run begins from the first outputs, if these count; otherwise at rest.
     index, place : int
         Of its recording among all, and its own among all runs.
     unmeasured : tuple of str
@@ -44,7 +43,7 @@ class Run:
     scheduled: Array
     counts: Mask
     sample_time: float | None
-    start: Array | None = None
+    from_outputs: bool = True
     index: int = 0
     place: int = 0
     unmeasured: tuple[str, ...] = ()
@@ -71,6 +70,12 @@ class Run:
     def inputs(self) -> Array:
         """Inputs of a block, shape (n, k + s): driven and scheduling."""
         return np.ascontiguousarray(np.hstack([self.driven, self.scheduled]))
+
+    @property
+    def start(self) -> Array | None:
+        """The outputs that a free run begins from, shape (m,); None where it begins at rest."""
+        known = self.from_outputs and self.counts[0] and self.outputs.shape[1]
+        return self.outputs[0] if known else None
 
     @property
     def first(self) -> Array:
@@ -160,8 +165,5 @@ def run_of(
         recording.matrix(names) if names else np.empty((len(recording), 0))
         for names in (driven, outputs, scheduling)
     )
-    known = bool(counts[0]) and len(outputs) > 0 and not recording.periodic
-    start = measured[0] if known else None
-    return Run(
-        recording, given, measured, scheduled, counts, recording.sample_time, start, index, index
-    )
+    step, begins = recording.sample_time, not recording.periodic
+    return Run(recording, given, measured, scheduled, counts, step, begins, index, index)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from mckibben import registry
-from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.inverse import Inverse
@@ -86,9 +85,6 @@ def refitted(
         if thresholds is not None and "n_operators" in {one.name for one in fields(estimator)}:
             settings["n_operators"] = len(thresholds) - (thresholds[0] == 0)
 
-    def missed(block: Block, log: Recording) -> Array:
-        return np.asarray(block.simulate(log).matrix(outputs) - log.matrix(outputs))
-
     parts = parts_of(whole, Channels(tuple(driving), tuple(outputs), tuple(old.scheduling) or None))
     if not parts:
         return "The log is too short to leave parts of it out."
@@ -96,7 +92,8 @@ def refitted(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)
-            before = [missed(old, log) for log in whole]
+            pairs = [(old.simulate(log).matrix(outputs), log.matrix(outputs)) for log in whole]
+            before = [modelled - measured for modelled, measured in pairs]
             refit = estimator(**settings).fit([*whole, *older_runs])
             found = refit.held_out([*whole, *older_runs], [(*part, *kept) for part in parts])
     except MckibbenError as error:
@@ -104,11 +101,11 @@ def refitted(
     if found is None:
         return "The model has too many parameters to leave parts of the log out."
     new = refit.fitted
-    pairs = zip(found, whole, strict=False)  # older recordings come last
-    after = [table - log.matrix(outputs) for table, log in pairs]
+    # older recordings come last
+    after = [table - measured for table, (_, measured) in zip(found, pairs, strict=False)]
     if not any(errors.any() for errors in before):
         return "The model has no error on the log."
-    spans = np.ptp(np.concatenate([log.matrix(outputs) for log in whole]), axis=0)
+    spans = np.ptp(np.concatenate([measured for _, measured in pairs]), axis=0)
     sizes = spans if len(outputs) > 1 else np.ones(1)
     squares = [((errors / sizes) ** 2).mean(axis=1) for errors in after]
     bootstrap = BlockBootstrap([len(log) for log in whole], seed, correlation_length(squares))

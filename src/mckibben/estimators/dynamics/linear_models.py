@@ -224,13 +224,10 @@ class PredictionErrorEstimator(Estimator):
                 theta = minimise(runs, orders, [with_noise(theta, orders, runs)], own, start)
                 tracker.update_from(own)
                 tracker.best, tracker.best_cost = own.best, own.best_cost
+        deviation = wanted * evaluate(theta, orders, runs, start)[2]
         theta[: orders.zeros] *= np.repeat(wanted / given, orders.b)
         theta[-1] *= wanted
-        runs = [
-            replace(run, driven=given * run.driven, outputs=wanted * run.outputs) for run in runs
-        ]
         p = Polynomials.of(theta, orders)
-        deviation = evaluate(theta, orders, runs, start)[2]
         noise = (vector(p.c), vector(p.poles[0] if orders.a else p.d), deviation)
         constant = p.constant / (1.0 + float(p.poles.sum())) if orders.a else p.constant
         found, ends = [], list(zip(data.lowest.tolist(), data.highest.tolist(), strict=True))

@@ -10,7 +10,8 @@ from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
-from typing import Annotated, Any, ClassVar, Literal, Self
+from inspect import get_annotations
+from typing import Annotated, Any, ClassVar, Literal, Self, dataclass_transform, get_type_hints
 
 import numpy as np
 from annotated_types import Interval
@@ -121,11 +122,14 @@ class Diagnostics:
         return tuple(np.sqrt(np.diag(self.covariance)).tolist())
 
 
+@dataclass_transform(kw_only_default=True, eq_default=False)
 @dataclass(kw_only=True, repr=False, eq=False)
 class Estimator(ABC):
     """Base class of all estimators; one input and one output unless a class overrides that.
 
     Settings are the fields of the class, to be read, changed, cloned and searched over by scikit-learn.
+    Every subclass is a dataclass without a decorator. One that only assigns other defaults and
+    declarations is a preset: the same model under a name and title of its own.
 
     Parameters
     ----------
@@ -189,6 +193,14 @@ class Estimator(ABC):
     errors_known: ClassVar[bool] = True
     """Whether standard errors of the parameters are computed."""
 
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        own, known = get_annotations(cls), {setting.name for setting in fields(cls)}
+        if changed := known & vars(cls).keys() - own.keys():  # defaults, of the types of the bases
+            hints = get_type_hints(cls, include_extras=True)
+            cls.__annotations__ = own | {name: hints[name] for name in changed}
+        dataclass(kw_only=True, repr=False, eq=False)(cls)
+
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """Return the settings by name; ``deep`` has no effect."""
         return {name: getattr(self, name) for name in self._names()}
@@ -212,8 +224,10 @@ class Estimator(ABC):
         return self
 
     def __repr__(self) -> str:
-        values = [(each, repr(getattr(self, each.name))) for each in fields(self)]
-        changed = [f"{each.name}={text}" for each, text in values if text != repr(each.default)]
+        usual, given = (
+            {k: repr(v) for k, v in e.get_params().items()} for e in (type(self)(), self)
+        )
+        changed = [f"{name}={text}" for name, text in given.items() if text != usual[name]]
         return f"{type(self).__name__}({', '.join(changed)})"
 
     def __sklearn_tags__(self) -> Any:
@@ -596,7 +610,6 @@ class Estimator(ABC):
         return tuple(np.flatnonzero(vanishing(block.pack())).tolist())
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class SearchEstimator(Estimator):
     """An estimator of one input and one output with its own search.
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import field, replace
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -27,6 +27,7 @@ from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.estimator import InverseKind
 from mckibben.estimators.coupled.base import CoupledEstimator, alone
 from mckibben.estimators.coupled.fuzzy import (
     Consequents,
@@ -40,7 +41,6 @@ from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.metrics import rmse
-from mckibben.presets import preset
 from mckibben.recording import Recording
 
 BEYOND = 0.1
@@ -49,13 +49,10 @@ BEYOND = 0.1
 FRICTION = (0.002, 0.1)
 """Smallest and largest threshold of a muscle's friction, relative to its travel."""
 
-ARBITRARY = "its network is arbitrary where muscles move in other combinations"
-
 LEAST_SLOPE = 0.05
 """Smallest slope of a displacement alone, just after a reversal."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class SDCHMEstimator(CoupledEstimator):
     """Hysteresis of every muscle, coupling, a network scheduled by stiffness, and friction.
 
@@ -105,10 +102,10 @@ class SDCHMEstimator(CoupledEstimator):
         "Strong rate dependence; with little damping (ridge) its network is arbitrary away from"
         " the recorded runs."
     )
-    inverse_kind = "solved"
-    effort: ClassVar[float] = 20.0
-    each_alone: ClassVar[bool] = True
-    fewest_inputs: ClassVar[int] = 2
+    inverse_kind: ClassVar[InverseKind] = "solved"
+    effort = 20.0
+    each_alone = True
+    fewest_inputs = 2
 
     n_sets: Annotated[int, Interval(ge=0, le=6)] = 3
     memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] | None = "cpi"
@@ -260,6 +257,52 @@ class SDCHMEstimator(CoupledEstimator):
         # from rest, as the whole model of several muscles begins
         block: Block = estimator.find(estimator.data(recording, [run.counts]), Tracker())[0]
         return block
+
+
+class CoupledPIEstimator(SDCHMEstimator):
+    """Hysteresis of every muscle and a coupling, whatever the stiffness: a baseline."""
+
+    title = "Coupled Prandtl–Ishlinskii model"
+    can = "Hysteresis of every muscle, and a constant coupling."
+    cannot = "The coupling does not change with stiffness."
+    inverse_kind = "exact"
+    quick = True
+    memory = "gpi"
+    n_sets = 0
+    n_friction = 0
+
+
+class PublishedSDCHMEstimator(SDCHMEstimator):
+    """SDCHM identified as in its paper: GPI, coupling, and a network trained by particle swarm."""
+
+    title = "SDCHM identified as in its paper"
+    can = "As sdchm, identified as in its paper."
+    cannot = "Combinations of pressures unlike those recorded: its network is arbitrary there."
+    caution = "its network is arbitrary where muscles move in other combinations"
+    effort = 25.0
+    constants = False
+    method = "pso"
+    ridge = 1e-9
+    memory = "gpi"
+    memory_settings: dict[str, Any] | None = field(
+        default_factory=lambda: {"threshold_rule": "paper", "initial": "virgin"}
+    )
+    n_friction = 0
+
+
+class TSFNNEstimator(SDCHMEstimator):
+    """Fuzzy network on the raw pressures: the paper's baseline, without memory."""
+
+    title = "Takagi–Sugeno fuzzy network of raw pressures (TSFNN)"
+    can = "A network without memory, as a baseline."
+    cannot = "Hysteresis; combinations of pressures unlike those recorded."
+    caution = PublishedSDCHMEstimator.caution
+    effort = 5.0
+    paired = False
+    each_alone = False
+    memory = None
+    constants = False
+    n_friction = 0
 
 
 def as_block(
@@ -416,48 +459,3 @@ def learned_inverse(
         learned, data.outputs, network.driven, data.scheduled, limits, network.constants
     )
     return Series((*before, swapped, coupling.inverse(), hysteresis.inverse()))
-
-
-COUPLED_PI = preset(
-    SDCHMEstimator,
-    "Hysteresis of every muscle and a coupling, whatever the stiffness: a baseline.",
-    title="Coupled Prandtl–Ishlinskii model",
-    can="Hysteresis of every muscle, and a constant coupling.",
-    cannot="The coupling does not change with stiffness.",
-    inverse_kind="exact",
-    quick=True,
-    memory="gpi",
-    n_sets=0,
-    n_friction=0,
-)
-
-SDCHM_PUBLISHED = preset(
-    SDCHMEstimator,
-    "SDCHM identified as in its paper: GPI, coupling, and a network trained by particle swarm.",
-    title="SDCHM identified as in its paper",
-    can="As sdchm, identified as in its paper.",
-    cannot="Combinations of pressures unlike those recorded: its network is arbitrary there.",
-    caution=ARBITRARY,
-    effort=25.0,
-    constants=False,
-    method="pso",
-    ridge=1e-9,
-    memory="gpi",
-    memory_settings={"threshold_rule": "paper", "initial": "virgin"},
-    n_friction=0,
-)
-
-TSFNN = preset(
-    SDCHMEstimator,
-    "Fuzzy network on the raw pressures: the paper's baseline, without memory.",
-    title="Takagi–Sugeno fuzzy network of raw pressures (TSFNN)",
-    can="A network without memory, as a baseline.",
-    cannot="Hysteresis; combinations of pressures unlike those recorded.",
-    caution=ARBITRARY,
-    effort=5.0,
-    paired=False,
-    each_alone=False,
-    memory=None,
-    constants=False,
-    n_friction=0,
-)

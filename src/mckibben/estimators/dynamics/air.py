@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, cast
+from dataclasses import replace
+from typing import Annotated, Any, cast
 
 import numpy as np
 from annotated_types import Ge
@@ -35,7 +35,6 @@ NO_WORSE = 1e-6
 """Relative increase of the error up to which hysteresis is left out."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class AirEstimator(SeparableEstimator):
     """Valve or regulator with air: gain and offset solved for, lags and dead time searched.
 
@@ -65,9 +64,9 @@ class AirEstimator(SeparableEstimator):
         "a large step, fills at a different speed."
     )
     inverse_kind = "exact"
-    needs_time: ClassVar[bool] = True
+    needs_time = True
 
-    effort: ClassVar[float] = 1.0
+    effort = 1.0
 
     input: str = "voltage"
     output: str = "pressure"
@@ -78,8 +77,8 @@ class AirEstimator(SeparableEstimator):
     ambient: float | None = None
     supply: float | None = None
 
-    rises: ClassVar[bool] = False
-    searches_condensed: ClassVar[bool] = False
+    rises = False
+    searches_condensed = False
 
     @classmethod
     def objection(

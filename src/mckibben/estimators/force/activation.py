@@ -8,8 +8,8 @@ the paper has a particle swarm.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar
+from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Interval
@@ -32,7 +32,6 @@ SMOOTHED = 3.0
 # -- with memory -----------------------------------------------------------------------------
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class ActivationMemoryEstimator(SeparableEstimator):
     """Activation pressure for any frequency.
 
@@ -63,11 +62,11 @@ class ActivationMemoryEstimator(SeparableEstimator):
         "beyond the recorded forces and contractions."
     )
     quick = True
-    effort: ClassVar[float] = 1.0
-    needs_time: ClassVar[bool] = True
-    made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
-    input_settings: ClassVar[tuple[str, ...]] = ("force",)
-    rises: ClassVar[bool] = False
+    effort = 1.0
+    needs_time = True
+    made_for = ("contraction", "pressure")
+    input_settings = ("force",)
+    rises = False
 
     input: str = "contraction"
     output: str = "pressure"
@@ -145,7 +144,6 @@ pressure, and no rate terms.
 """
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class ActivationPressureEstimator(SearchEstimator):
     """Activation pressure by characteristic points, and gamma and phi by least squares.
 
@@ -164,9 +162,9 @@ class ActivationPressureEstimator(SearchEstimator):
     purpose = "force"
     can = "Pressure for a contraction under a force, at one frequency of a sine; as in its paper."
     cannot = "No minor loops, one frequency: its hysteresis is a term in the rate."
-    needs_time: ClassVar[bool] = True
-    made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
-    input_settings: ClassVar[tuple[str, ...]] = ("force",)
+    needs_time = True
+    made_for = ("contraction", "pressure")
+    input_settings = ("force",)
 
     input: str = "contraction"
     output: str = "pressure"

@@ -8,7 +8,6 @@ while the input is held. Everything is identified jointly by variable projection
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -45,7 +44,6 @@ MOST_CREEP = 0.3
 """Largest compliance of an element, relative to the immediate response."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class CreepPIEstimator(SeparableEstimator):
     """Prandtl-Ishlinskii memory on the logarithm of the input, an increasing map, and creep.
 
@@ -75,9 +73,9 @@ class CreepPIEstimator(SeparableEstimator):
     quick = True
     param_grid: ClassVar[Grid] = {"n_operators": (4, 6, 8), "n_creep": (1, 2, 3)}
     makes = ("logarithm pi polynomial creep",)
-    effort: ClassVar[float] = 1.0
-    needs_time: ClassVar[bool] = True
-    searches_condensed: ClassVar[bool] = False
+    effort = 1.0
+    needs_time = True
+    searches_condensed = False
 
     n_operators: Operators = 10
     n_creep: Annotated[int, Interval(ge=0, le=5)] = 2
@@ -86,7 +84,7 @@ class CreepPIEstimator(SeparableEstimator):
     n_starts: Annotated[int, Ge(1)] = 8
     n_refined: Annotated[int, Ge(1)] = 3
 
-    search_evaluations: ClassVar[int] = 30  # the valleys are flat
+    search_evaluations = 30  # the valleys are flat
 
     @property
     def fixed_fields(self) -> tuple[str, ...]:

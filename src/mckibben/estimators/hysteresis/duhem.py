@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar
+from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Interval
@@ -16,7 +16,6 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class DuhemEstimator(SeparableEstimator):
     """Duhem model by variable projection: its output is linear in both polynomials.
 
@@ -36,7 +35,7 @@ class DuhemEstimator(SeparableEstimator):
         "slopes stay positive."
     )
     makes = ("duhem",)
-    effort: ClassVar[float] = 1.1
+    effort = 1.1
 
     nonnegative: bool = False
     degree: Annotated[int, Interval(ge=1, le=9)] = 4

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge
@@ -21,7 +20,6 @@ from mckibben.estimators.hysteresis.pi import spread
 CUBIC = PolynomialMap(3)
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class EUPIEstimator(SeparableEstimator):
     """Extended unparallel Prandtl-Ishlinskii model by variable projection.
 
@@ -40,7 +38,7 @@ class EUPIEstimator(SeparableEstimator):
     cannot = "One asymmetry for all operators; the inverse needs non-negative weights."
     inverse_kind = "solved"
     makes = ("eupi",)
-    effort: ClassVar[float] = 0.3
+    effort = 0.3
 
     n_operators: Operators = 10
     n_starts: Annotated[int, Ge(1)] = 16

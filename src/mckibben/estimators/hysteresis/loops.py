@@ -9,7 +9,7 @@ such a sum rises with its input, so it has an inverse; and loops may lag (w) or 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Interval
@@ -25,7 +25,6 @@ from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap
 from mckibben.estimators.hysteresis.pi import spread
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.presets import preset
 
 LEAST_SLOPE = 1e-4
 """Smallest share of the output's range for each piece of the polynomial."""
@@ -97,7 +96,6 @@ def relative(run: Run, data: TrainingData) -> Array:
     return (run.u - low) / (high - low)
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class BoucWenEstimator(SeparableEstimator):
     """Bouc-Wen model by variable projection: rate and shape searched, the rest solved for.
 
@@ -118,7 +116,7 @@ class BoucWenEstimator(SeparableEstimator):
     cannot = "Minor loops need not close; loops are symmetric but for the polynomial."
     quick = True
     makes = ("bouc-wen",)
-    effort: ClassVar[float] = 0.6
+    effort = 0.6
 
     degree: Degree = 5
     exponent: Literal[1, 2] | None = None
@@ -182,20 +180,18 @@ class BoucWenEstimator(SeparableEstimator):
         return replace(unit, polynomial=vector(polynomial), weight=float(weights[0]))
 
 
-GBW = preset(
-    BoucWenEstimator,
-    "Generalized Bouc-Wen model: rate and shape are searched, the rest is solved for.",
-    title="Generalized Bouc–Wen model (GBW)",
-    can="Asymmetric saturating loops, with five shape parameters.",
-    cannot="Minor loops need not close; many starts are needed to identify it.",
-    quick=False,
-    makes=("generalized-bouc-wen",),
-    effort=1.3,
-    asymmetric=True,
-)
+class GBWEstimator(BoucWenEstimator):
+    """Generalized Bouc-Wen model: rate and shape are searched, the rest is solved for."""
+
+    title = "Generalized Bouc–Wen model (GBW)"
+    can = "Asymmetric saturating loops, with five shape parameters."
+    cannot = "Minor loops need not close; many starts are needed to identify it."
+    quick = False
+    makes = ("generalized-bouc-wen",)
+    effort = 1.3
+    asymmetric = True
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class MaxwellSlipEstimator(SeparableEstimator):
     """Maxwell-slip model by least squares; ratios of its directions, if any, are searched.
 
@@ -209,9 +205,13 @@ class MaxwellSlipEstimator(SeparableEstimator):
         Whether rising and falling differ in stiffness and in slip, by ratios that are searched.
     """
 
+    title = "Maxwell-slip model"
     purpose = "memory"
     inverse_kind = "solved"
-    effort: ClassVar[float] = 0.02
+    can = "Slipping springs in parallel with a reversible curve; symmetric loops."
+    cannot = "Asymmetry only by the curve."
+    quick = True
+    effort = 0.02
 
     degree: Degree = 5
     n_operators: Operators = 8
@@ -276,22 +276,12 @@ class MaxwellSlipEstimator(SeparableEstimator):
         return replace(springs, weights=vector(weights), polynomial=vector(polynomial))
 
 
-MAXWELL_SLIP = preset(
-    MaxwellSlipEstimator,
-    "Maxwell-slip model by least squares.",
-    title="Maxwell-slip model",
-    can="Slipping springs in parallel with a reversible curve; symmetric loops.",
-    cannot="Asymmetry only by the curve.",
-    quick=True,
-    asymmetric=False,
-)
+class MMSEstimator(MaxwellSlipEstimator):
+    """Modified Maxwell-slip model: the two ratios of its directions are searched."""
 
-MMS = preset(
-    MaxwellSlipEstimator,
-    "Modified Maxwell-slip model: the two ratios of its directions are searched.",
-    title="Modified Maxwell-slip model (MMS)",
-    can="Springs that slip, with different stiffness and limit for rising and falling input.",
-    cannot="One asymmetry for all springs.",
-    asymmetric=True,
-    effort=0.5,
-)
+    title = "Modified Maxwell-slip model (MMS)"
+    can = "Springs that slip, with different stiffness and limit for rising and falling input."
+    cannot = "One asymmetry for all springs."
+    quick = False
+    effort = 0.5
+    asymmetric = True

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -54,7 +53,6 @@ SHORTEST = 0.02
 """Shortest segment with a significant slope, relative to the longest branch."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class PIEstimator(SeparableEstimator):
     """Classical Prandtl-Ishlinskii model by (non-negative) least squares.
 
@@ -82,7 +80,7 @@ class PIEstimator(SeparableEstimator):
     quick = True
     param_grid: ClassVar[Grid] = {"n_operators": (5, 10, 20)}
     makes = ("pi",)
-    effort: ClassVar[float] = 0.01
+    effort = 0.01
 
     method: Literal["ls", "slopes"] = "ls"
     n_operators: Operators = 10

@@ -233,7 +233,9 @@ class Estimator(ABC):
     def __sklearn_tags__(self) -> Any:
         from sklearn.base import BaseEstimator  # scikit-learn alone asks, so it is there already
 
-        return BaseEstimator().__sklearn_tags__()
+        tags = BaseEstimator().__sklearn_tags__()
+        tags.input_tags.one_d_array = isinstance(self.input, str) and not self._further_inputs()
+        return tags
 
     @classmethod
     def _names(cls) -> list[str]:
@@ -373,7 +375,7 @@ class Estimator(ABC):
         ----------
         recordings : Recording, data frame, or sequence of these; or array, shape (n,) or (n, inputs)
             Training data; every recording starts with its own memory. With ``y``, an array of the
-            inputs, in the package's units.
+            inputs, in the package's units: of `input`, then what settings name besides.
         y : array, shape (n,) or (n, outputs), optional
             The outputs.
         sample_time : float, optional
@@ -405,22 +407,14 @@ class Estimator(ABC):
             vars(self).update(before)
             raise
 
-    def _recording(self, u: Any, y: Any, sample_time: float | None) -> Recording:
-        """Return arrays as a recording with this estimator's channels; ``y`` may be None."""
-        channels: dict[str, Array] = {}
-        for given, names in ((u, self.input), (y, self.output)):
-            columns = np.asarray(() if given is None else given, dtype=float)
-            columns = columns[:, None] if columns.ndim == 1 else columns
-            if given is None:
-                continue
-            named = (names,) if isinstance(names, str) else names
-            if named is None or columns.ndim != 2 or columns.shape[1] != len(named):
-                raise DataError(
-                    f"arrays of shape {columns.shape} are not the channels {names}",
-                    remedy="name the columns: mckibben.Recording({'pressure_1': ...}, sample_time)",
-                )
-            channels |= dict(zip(named, columns.T, strict=True))
-        return Recording(channels, sample_time)
+    def _recording(self, u: Any, y: ArrayLike, sample_time: float | None) -> Recording:
+        """Return arrays as a recording, with the channels of the settings."""
+        scheduling = self.get_params().get("scheduling") or ()
+        inputs, outputs = ((a,) if isinstance(a, str) else a for a in (self.input, self.output))
+        if inputs is not None:
+            inputs = (*inputs, *self._further_inputs(), *scheduling)
+        given = by_channel(u, inputs, "pressure") | by_channel(y, outputs, "displacement")
+        return Recording(given, sample_time)
 
     def _fit(
         self,
@@ -491,20 +485,33 @@ class Estimator(ABC):
         array, shape (n,), or (n, m) of a model of m outputs
             Of one recording; a list of these of a sequence.
         """
+        block = self.fitted
         if isinstance(recordings, np.ndarray):
-            recordings = self._recording(recordings, None, sample_time)
+            columns = by_channel(recordings, [channel.name for channel in block.inputs], "")
+            recordings = Recording(columns, sample_time)
         if isinstance(recordings, Recording) or is_frame(recordings):
             return self.predict(listed(recordings))[0]
-        block = self.fitted
         given = [channel.name for channel in block.outputs]
         found = [run_free(block, recording, given) for recording in listed(recordings)]
         return [outputs[:, 0] for outputs in found] if len(given) == 1 else found
 
-    def score(self, recordings: Recording | Sequence[Recording], y: None = None) -> float:
-        """Return R² of `predict` over all recordings, averaged over outputs."""
-        every = listed(recordings)
+    def score(
+        self,
+        recordings: Recording | Sequence[Recording] | ArrayLike,
+        y: ArrayLike | None = None,
+        *,
+        sample_time: float | None = None,
+    ) -> float:
+        """Return R² of `predict` over all recordings, or arrays as of `fit`, averaged over outputs."""
+        inputs, given = (
+            [c.name for c in side] for side in (self.fitted.inputs, self.fitted.outputs)
+        )
+        if y is None:
+            every = listed(recordings)
+        else:
+            columns = by_channel(recordings, inputs, "") | by_channel(y, given, "")
+            every = [Recording(columns, sample_time)]
         predicted = np.concatenate(self.predict(every))
-        given = [channel.name for channel in self.fitted.outputs]
         measured = np.concatenate([recording.matrix(given) for recording in every])
         residual = measured - predicted.reshape(measured.shape)
         around = measured - measured.mean(axis=0)
@@ -640,6 +647,30 @@ def refuse_useless(found: Diagnostics, data: TrainingData) -> None:
             f"the model found explains no more than the mean: RMSE on its data {'; '.join(figures)}",
             remedy="change its settings, or fit another model: `compare()` ranks those that apply",
         )
+
+
+def by_channel(given: Any, names: Sequence[str] | None, quantity: str) -> dict[str, Array]:
+    """Return an array, shape (n,) or (n, channels), by channel; without names those of a quantity.
+
+    Raises
+    ------
+    ValueError
+        On what `sklearn.utils.check_array` refuses, such as complex, sparse and infinite values.
+    DataError
+        If there are other than as many columns as channels.
+    """
+    from sklearn.utils import check_array
+
+    columns = check_array(given, dtype=float, ensure_2d=False)
+    columns = columns.reshape(len(columns), -1)
+    n = columns.shape[1]
+    usual = [f"{quantity}_{k + 1}" for k in range(n)] if n > 1 else [quantity]
+    if n != len(names or usual):
+        raise DataError(
+            f"arrays of shape {columns.shape} are not the channels {', '.join(names or usual)}",
+            remedy="name the columns: mckibben.Recording({'pressure_1': ...}, sample_time)",
+        )
+    return dict(zip(names or usual, columns.T, strict=True))
 
 
 def resting(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:

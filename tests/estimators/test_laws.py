@@ -17,7 +17,6 @@ from mckibben import GPI, DataError, ModelError, RateDependentPI, Recording, com
 from mckibben.blocks.base import Block
 from mckibben.blocks.notation import meanings
 from mckibben.estimators.catalogue import defaults
-from mckibben.estimators.core.settings import check_settings
 from mckibben.metrics import rmse
 from mckibben.registry import load, names
 from tests.estimators.examples import CASES, KINDS, example_for, kinds_for, quick, recorded
@@ -58,7 +57,7 @@ def test_settings_are_the_arguments_survive_cloning_and_are_documented(name: str
     with pytest.raises(ValueError, match="n_operator_"):
         estimator.set_params(seed=3, n_operator_=5)
     assert estimator.set_params(seed=4).seed == 4
-    check_settings(made())
+    made().check_settings()
     assert meanings(made).keys() >= defaults(name).keys()
 
 

@@ -9,7 +9,6 @@ from typing import Any
 from mckibben import registry
 from mckibben.errors import ModelError
 from mckibben.estimators.core.estimator import Estimator, Purpose
-from mckibben.estimators.core.settings import check_settings
 
 
 @dataclass(frozen=True)
@@ -169,5 +168,5 @@ def settings_of_all(
             found[model][name] = value
     for model, settings in found.items():
         if settings:  # now, and not when this model's turn has come
-            check_settings(estimators[model](**settings))
+            estimators[model](**settings).check_settings()
     return found

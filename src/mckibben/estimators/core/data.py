@@ -216,15 +216,8 @@ class TrainingData:
         """Sample time of all runs, or None if one has none."""
         return self.runs[0].sample_time
 
-    def timed(self, why: str = "this model depends on rate", instead: str = "") -> float:
+    def timed(self) -> float:
         """Return the sample time of all runs.
-
-        Parameters
-        ----------
-        why : str
-            What needs it.
-        instead : str
-            What could be done without.
 
         Raises
         ------
@@ -233,8 +226,8 @@ class TrainingData:
         """
         if self.sample_time is None:
             raise DataError(
-                f"the recordings have no time, and {why}",
-                remedy="read them with a time column or `rate`" + instead,
+                "the recordings have no time, and this model depends on rate",
+                remedy="read them with a time column or `rate`, or use gpi",
             )
         return self.sample_time
 

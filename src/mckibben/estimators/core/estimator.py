@@ -16,6 +16,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, dataclass_transform,
 import numpy as np
 from annotated_types import Interval
 from numpy.typing import ArrayLike
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
@@ -25,7 +26,6 @@ from mckibben.errors import DataError, MckibbenError, ModelError, ModelWarning
 from mckibben.estimators.core.data import TrainingData, training_data
 from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.core.leaving_out import stepped
-from mckibben.estimators.core.settings import check_settings
 from mckibben.estimators.core.uncertainty import covariance_of, unknown, vanishing
 from mckibben.estimators.optimisers.tracker import Progress, Tracker
 from mckibben.recording import REST_LENGTH, Recording, conversion, is_frame, listed
@@ -52,6 +52,8 @@ Start = Literal["first_sample", "virgin"]
 """State before the first sample of every recording: what its first output determines, and at rest at
 the first input for the rest (see `mckibben.blocks.starts`); or as if nothing had ever happened.
 """
+
+STRICT_SETTINGS = ConfigDict(strict=True, allow_inf_nan=False)
 
 MOST_PASTS, MATTERS = 3, 0.1
 """Maximum number of fits after pasts that the last fit shows; and the effect of these on outputs, or the
@@ -426,6 +428,8 @@ class Estimator(ABC):
         self.check_settings()
         tracker = Tracker(progress=progress)
         data = self.data(recordings, rows)
+        if self.needs_time:
+            data.timed()
         self.model_ = self.find(data, tracker)[0]
         runs = self.free_runs(self.model_, listed(recordings), rows)
         elsewhere = not self.begins_measured and any(map(len, runs.pasts))
@@ -462,7 +466,18 @@ class Estimator(ABC):
         ModelError
             Naming the setting, what it is, and what it may be.
         """
-        check_settings(self)
+        hints = get_type_hints(type(self), include_extras=True)
+        for name, given in self.get_params().items():
+            value = given.tolist() if isinstance(given, np.generic | np.ndarray) else given
+            try:
+                TypeAdapter(hints[name], config=STRICT_SETTINGS).validate_python(value)
+            except ValidationError as error:
+                wanted = error.errors()[0]["msg"]
+                raise ModelError(
+                    f"it is {value!r}: {wanted[0].lower()}{wanted[1:]}",
+                    parameter=name,
+                    remedy="give another, or leave it out",
+                ) from None
 
     def predict(
         self,

@@ -31,7 +31,6 @@ from mckibben.estimators.core.estimator import InverseKind
 from mckibben.estimators.coupled.base import CoupledEstimator, alone
 from mckibben.estimators.coupled.fuzzy import (
     Consequents,
-    Fitted,
     Method,
     Search,
     fit_network,
@@ -197,19 +196,16 @@ class SDCHMEstimator(CoupledEstimator):
     ) -> FuzzyNetwork:
         """Return a network from driven and scheduling inputs to displacements."""
         swarm = printed_swarm(self.particles, self.iterations)
-        found = fit_network(
+        return fit_network(
             x,
             y,
             self.n_sets,
             Consequents(self.constants, self.ridge),
             Search(self.method, self.search_samples, swarm, self.seed),
+            (driven, data.scheduled, data.outputs),
+            beyond=BEYOND,
             tracker=tracker,
         )
-        n = len(driven)
-        low, high = x[:, :n].min(axis=0), x[:, :n].max(axis=0)
-        margin = BEYOND * (high - low)
-        limits = np.column_stack([low - margin, high + margin])
-        return as_block(found, driven, data.outputs, data.scheduled, limits, self.constants)
 
     def friction(self, given: list[Array], wanted: list[Array], channel: Channel) -> PI:
         """Return the friction memory of a muscle: play operators with positive partial sums."""
@@ -303,29 +299,6 @@ class TSFNNEstimator(SDCHMEstimator):
     memory = None
     constants = False
     n_friction = 0
-
-
-def as_block(
-    fitted: Fitted,
-    driven: tuple[Channel, ...],
-    given: tuple[Channel, ...],
-    scheduled: tuple[Channel, ...],
-    limits: Array,
-    constants: bool,
-) -> FuzzyNetwork:
-    """Return a fitted network as a block."""
-    n_terms = len(driven) + len(scheduled) + constants
-    consequents = fitted.consequents.reshape(-1, n_terms, len(given))
-    return FuzzyNetwork(
-        rows(fitted.sets.centres),
-        rows(fitted.sets.widths),
-        vector(np.moveaxis(consequents, 2, 1).ravel()),
-        driven,
-        given,
-        scheduled,
-        constants,
-        rows(limits),
-    )
 
 
 def network_inputs(front: Sequence[Block], runs: Sequence[Run]) -> Array:
@@ -445,17 +418,14 @@ def learned_inverse(
     with warnings.catch_warnings():  # noise at the ends is clipped
         warnings.simplefilter("ignore", ModelWarning)
         y = network_inputs(before, [replace(run, driven=run.outputs) for run in data.runs])
-    reached = y[:, : len(data.outputs)]
-    learned = fit_network(
+    swapped = fit_network(
         y,
         h,
         len(network.centres[0]),
         Consequents(network.constants, ridge),
         search or Search("pso", SDCHMEstimator.search_samples, printed_swarm(), 0),
+        (data.outputs, data.scheduled, network.driven),
+        beyond=0.0,
         tracker=tracker or Tracker(),
-    )
-    limits = np.column_stack([reached.min(axis=0), reached.max(axis=0)])
-    swapped = as_block(
-        learned, data.outputs, network.driven, data.scheduled, limits, network.constants
     )
     return Series((*before, swapped, coupling.inverse(), hysteresis.inverse()))

@@ -181,7 +181,7 @@ class PredictionErrorEstimator(Estimator):
 
     def _of_output(self, data: TrainingData, tracker: Tracker) -> tuple[TransferFunction, ...]:
         """Return the transfer functions from every input to the output."""
-        step = data.timed(instead=", or use gpi")
+        step = data.timed()
         orders = replace(self.orders, inputs=len(data.inputs))
         start: Beginning = "estimated" if orders.a or orders.c or orders.d else self.initial
         if data.target.size <= orders.size + orders.poles * len(data.runs):

@@ -134,7 +134,6 @@ class NarxEstimator(SearchEstimator):
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the best bounded model, and the data."""
-        data.timed(instead=", or use gpi")
         found = self._polynomials if self.mapping == "polynomial" else self._networks
         error = cache(partial(free_run_rmse, data=data))
         paths: list[list[Narx]] = []

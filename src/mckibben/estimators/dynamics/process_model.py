@@ -12,7 +12,6 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.optimisers.tracker import Tracker
 
 LEAST_DAMPING, MOST_DAMPING = 0.02, 100.0
 """Bounds of the damping, within those of the decay; see `damping_range`."""
@@ -50,10 +49,6 @@ class ProcessModelEstimator(SeparableEstimator):
     structure: Structure = "P1"
     nonnegative = False
     n_starts = 16
-
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        data.timed(instead=", or use gpi")
-        return super().identify(data, tracker)
 
     @property
     def n_times(self) -> int:

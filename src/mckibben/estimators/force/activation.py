@@ -68,8 +68,8 @@ class ActivationMemoryEstimator(SeparableEstimator):
     input_settings = ("force",)
     rises = False
 
-    input: str = "contraction"
-    output: str = "pressure"
+    input = "contraction"
+    output = "pressure"
     force: str = "force"
     degree: Annotated[int, Interval(ge=1, le=9)] = 4
     force_degree: Annotated[int, Interval(ge=0, le=5)] = 3
@@ -77,11 +77,7 @@ class ActivationMemoryEstimator(SeparableEstimator):
     largest: Annotated[float, Interval(gt=0, le=0.5)] = 0.2
     time_constants: tuple[float, ...] = (0.1, 0.6, 4.0)
     rate_time_constant: Annotated[float, Ge(0)] | None = None
-    nonnegative: bool = False
-
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        data.timed()
-        return super().identify(data, tracker)
+    nonnegative = False
 
     def unit(self, data: TrainingData) -> ActivationMemory:
         """Return the model with zero parameters."""
@@ -166,8 +162,8 @@ class ActivationPressureEstimator(SearchEstimator):
     made_for = ("contraction", "pressure")
     input_settings = ("force",)
 
-    input: str = "contraction"
-    output: str = "pressure"
+    input = "contraction"
+    output = "pressure"
     force: str = "force"
     rate_time_constant: Annotated[float, Ge(0)] | None = None
     frequency: Annotated[float, Ge(0)] | None = None

@@ -23,7 +23,6 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.force.laws import ORDERS, Law, force_columns, force_law
 from mckibben.estimators.optimisers.multi_start import Choice
-from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed
 
 Structure = Literal["eleven", "each-way", "eighteen"]
@@ -117,10 +116,6 @@ class MultistateEstimator(SeparableEstimator):
         if isinstance(self.elements, str):
             return STRUCTURES[self.elements]
         return tuple(self.elements)
-
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        data.timed("friction depends on rate")
-        return super().identify(data, tracker)
 
     @property
     def _n_pairs(self) -> list[int]:

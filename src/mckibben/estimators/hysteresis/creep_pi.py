@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Annotated, ClassVar
 
 import numpy as np
-from annotated_types import Ge, Interval
+from annotated_types import Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
@@ -29,7 +29,6 @@ from mckibben.estimators.core.separable import (
 )
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap
 from mckibben.estimators.hysteresis.pi import play_operators, spread
-from mckibben.estimators.optimisers.tracker import Tracker
 
 RAISED = 1e-5
 """Step of the logarithm of the input offset, for its derivative."""
@@ -76,25 +75,15 @@ class CreepPIEstimator(SeparableEstimator):
     effort = 1.0
     needs_time = True
     searches_condensed = False
+    search_evaluations = 30  # the valleys are flat
+    fixed_fields = ("pi.offset",)  # of the operators' sum, which starts at 0
 
     n_operators: Operators = 10
     n_creep: Annotated[int, Interval(ge=0, le=5)] = 2
     map_size: Annotated[int, Interval(ge=1, le=12)] = 6
     threshold_share: Annotated[float, Interval(gt=0, le=1)] = 1.0
-    n_starts: Annotated[int, Ge(1)] = 8
-    n_refined: Annotated[int, Ge(1)] = 3
-
-    search_evaluations = 30  # the valleys are flat
-
-    @property
-    def fixed_fields(self) -> tuple[str, ...]:
-        """The offset of the operators' sum, which starts at 0."""
-        return ("pi.offset",)
-
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        if self.n_creep > 0:
-            data.timed("creep depends on it", ", or use n_creep=0")
-        return super().identify(data, tracker)
+    n_starts = 8
+    n_refined = 3
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [weights, log addition, log time constants, compliances]."""

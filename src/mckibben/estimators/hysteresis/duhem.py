@@ -37,7 +37,7 @@ class DuhemEstimator(SeparableEstimator):
     makes = ("duhem",)
     effort = 1.1
 
-    nonnegative: bool = False
+    nonnegative = False
     degree: Annotated[int, Interval(ge=1, le=9)] = 4
     slope_degree: Annotated[int, Interval(ge=0, le=9)] = 3
 

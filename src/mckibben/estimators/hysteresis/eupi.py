@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
-from annotated_types import Ge
 
 from mckibben.arrays import Array
 from mckibben.blocks.fields import vector
@@ -41,7 +38,7 @@ class EUPIEstimator(SeparableEstimator):
     effort = 0.3
 
     n_operators: Operators = 10
-    n_starts: Annotated[int, Ge(1)] = 16
+    n_starts = 16
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of the falling edge's slope and threshold ratio."""

@@ -22,7 +22,7 @@ from mckibben.blocks.hysteresis.maxwell_slip import MaxwellSlip, slip_matrix
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.hysteresis.output_maps import PolynomialMap
+from mckibben.estimators.hysteresis.output_maps import PolynomialMap, centred
 from mckibben.estimators.hysteresis.pi import spread
 from mckibben.estimators.optimisers.tracker import Tracker
 
@@ -175,8 +175,7 @@ class BoucWenEstimator(SeparableEstimator):
         slopes = self.steepest(theta, unit)
         polynomial, weights = self.linear.weights(linear, offset, slopes)
         if self.asymmetric:  # whose polynomial is of -1 to 1 over the range, not of 0 to 1
-            turned = np.polynomial.Polynomial(polynomial)(np.polynomial.Polynomial([0.5, 0.5])).coef
-            polynomial = np.pad(turned, (0, polynomial.size - turned.size))
+            polynomial = centred(polynomial)
         return replace(unit, polynomial=vector(polynomial), weight=float(weights[0]))
 
 

@@ -88,6 +88,10 @@ class MPIEstimator(SeparableEstimator):
     quick = True
     makes = ("pi polynomial",)
     effort = 0.2
+    # operators are computed once a fit, so there is nothing to gain from fewer inputs
+    searches_condensed = False
+    # of the operators' sum, which starts at the output's lowest value
+    fixed_fields = ("pi.offset", "rate-dependent-pi.offset")
 
     n_operators: Operators = 10
     thresholds: Literal["spread", "identified"] = "spread"
@@ -95,21 +99,13 @@ class MPIEstimator(SeparableEstimator):
     map_size: Annotated[int, Interval(ge=1, le=50)] = 5
     rate_dependent: bool = False
     rate_time_constant: Annotated[float, Ge(0)] | None = None
-    n_starts: Annotated[int, Ge(1)] = 8
-    n_refined: Annotated[int, Ge(1)] = 3
-
-    # Operators are computed once a fit, so there is nothing to gain from fewer inputs.
-    searches_condensed = False
-
-    @property
-    def fixed_fields(self) -> tuple[str, ...]:
-        """The offset of the operators' sum, which starts at the output's lowest value."""
-        return ("pi.offset", "rate-dependent-pi.offset")
+    n_starts = 8
+    n_refined = 3
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         if not self.rate_dependent:
             return super().identify(data, tracker)
-        step = data.timed(instead=", or use mpi")
+        step = data.timed()
         if self.rate_time_constant is not None:
             return super().identify(data, tracker)
         values = [samples * step for samples in (0, 5, 25)]

@@ -34,8 +34,14 @@ from mckibben.blocks.hysteresis.play_operators import (
     start_sum,
 )
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import inlined, kernel, step, summing_step
-from mckibben.blocks.learning import Learnable, learnable_operators, learning_kernels
+from mckibben.blocks.kernels import kernel, step, summing_step
+from mckibben.blocks.learning import (
+    Learnable,
+    follow_learning,
+    inverse_at,
+    learnable_operators,
+    start_learning,
+)
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solved_kernels
 
@@ -87,13 +93,25 @@ def pi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: b
     state[n], state[n + 1] = inputs[0], 0.0
 
 
-@inlined
-def reversible(way: float, c: Array, state: Array, n: int) -> float:
-    """Return the input, which is the operator without dead zone."""
-    return state[0]
+@step
+def pi_adaptive_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
+    """Advance the inverse of a PI model, and adapt its weights and offset to measurements."""
+    n = int(coefficients[0]) - 1
+    r = coefficients[inverse_at(coefficients) + 3 : inverse_at(coefficients) + n + 3]
+    s, last, adapted = state[:n], state[n : n + 3], state[n + 3 :]
+    follow_learning(coefficients, r, s, last, adapted, scratch, inputs[0], inputs[1])
+    outputs[0] = s[0]
 
 
-pi_learning = learning_kernels(pi_inverse_start, reversible, 0)
+@kernel
+def pi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start as the inverse does, with the fitted weights."""
+    n = int(coefficients[0]) - 1
+    pi_inverse_start(coefficients[inverse_at(coefficients) :], state[: n + 2], inputs, virgin)
+    state[n + 2] = 0.0
+    start_learning(coefficients, state[n + 3 :])
 
 
 @dataclass(frozen=True, config=fields.STRICT)
@@ -166,7 +184,8 @@ class PI(Invertible):
             self,
             self.input_limits,
             self.offset,
-            *pi_learning,
+            pi_adaptive_step,
+            pi_adaptive_start,
             lambda theta: replace(self, weights=fields.vector(theta[:-1]), offset=float(theta[-1])),
         )
 

@@ -1,9 +1,9 @@
-"""Identification of loops on an increasing reversible polynomial: Bouc-Wen and Maxwell-slip.
+"""Identification of Bouc-Wen and Maxwell-slip loops on a reversible polynomial, and of Duhem's model.
 
-y = offset + sum_k a_k B_k(x) + sum_j w_j (s_j x - z_j) + sum_j v_j z_j, all of a, w and v at least
-0, where x runs from 0 to 1 over the input's range, the B_k are integrals of Bernstein polynomials,
-the z_j are what the loops are made of, and s_j bounds the slope of z_j by x. Whatever the data,
-such a sum rises with its input, so it has an inverse; and loops may lag (w) or lead (v).
+For the first two, y = offset + sum_k a_k B_k(x) + sum_j w_j (s_j x - z_j) + sum_j v_j z_j, all of a, w
+and v at least 0, where x runs from 0 to 1 over the input's range, the B_k are integrals of Bernstein
+polynomials, the z_j are what the loops are made of, and s_j bounds the slope of z_j by x. Whatever the
+data, such a sum rises with its input, so it has an inverse; and loops may lag (w) or lead (v).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from annotated_types import Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.differential import BoucWen, GeneralizedBoucWen
+from mckibben.blocks.hysteresis.differential import BoucWen, Duhem, GeneralizedBoucWen
 from mckibben.blocks.hysteresis.maxwell_slip import MaxwellSlip, slip_matrix
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
@@ -284,3 +284,61 @@ class MMSEstimator(MaxwellSlipEstimator):
     quick = False
     effort = 0.5
     asymmetric = True
+
+
+class DuhemEstimator(SeparableEstimator):
+    """Duhem model by variable projection: its output is linear in both polynomials.
+
+    Parameters
+    ----------
+    degree : int
+        Of the curve that the output tends to.
+    slope_degree : int
+        Of the slope right after a reversal.
+    """
+
+    title = "Duhem model"
+    purpose = "memory"
+    can = "Loops that tend to a curve, with polynomial slopes; in closed form."
+    cannot = (
+        "Minor loops are not congruent and need not close; the inverse exists only where the "
+        "slopes stay positive."
+    )
+    makes = ("duhem",)
+    effort = 1.1
+
+    nonnegative = False
+    degree: Annotated[int, Interval(ge=1, le=9)] = 4
+    slope_degree: Annotated[int, Interval(ge=0, le=9)] = 3
+
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return bounds of [log alpha], alpha by half the input range."""
+        return np.array([np.log(0.1)]), np.array([np.log(100.0)])
+
+    def guesses(self, data: TrainingData) -> list[Array]:
+        """Return a few rates."""
+        return [np.array([np.log(alpha)]) for alpha in (0.5, 1.5, 4.0, 12.0)]
+
+    def unit(self, theta: Array, data: TrainingData) -> Duhem:
+        """Return the model with zero polynomials."""
+        low, high = data.input_range
+        half = 0.5 * (high - low)
+        return Duhem(
+            (0.0,) * (self.degree + 1),
+            (0.0,) * (self.slope_degree + 1),
+            float(np.exp(theta[0])),
+            low + half,
+            half,
+            **self.common_fields(data),
+        )
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the output per coefficient, without the constant, over the run."""
+        unit = self.unit(theta, data)
+        n = unit.n_parameters - 1
+        alone = np.column_stack([np.eye(n)[1:], np.full(n - 1, unit.alpha)])
+        return np.column_stack([unit.unpack(row).simulate(run.u) for row in alone])
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
+        target = (offset, *linear[: self.degree].tolist())
+        return replace(self.unit(theta, data), target=target, slope=vector(linear[self.degree :]))

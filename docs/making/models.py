@@ -228,18 +228,6 @@ def source(block: Any) -> list[str]:
 
 def fitting(model: str, estimator: Any, block: Any) -> list[str]:
     """Return how a model is fitted, in commands and in Python."""
-    cls = getattr(estimator, "of", estimator)
-    preset = cls is not estimator
-    made = (
-        [f'estimator = registry.load("estimators", "{model}")()']
-        if preset
-        else [f"estimator = {cls.__name__}()"]
-    )
-    imported = (
-        "from mckibben import registry"
-        if preset
-        else f"from {cls.__module__} import {cls.__name__}"
-    )
     lines = ["```bash", f"mckibben fit {model} recording.csv -o model.json"]
     if not compensates(block):
         try:
@@ -253,10 +241,10 @@ def fitting(model: str, estimator: Any, block: Any) -> list[str]:
         "",
         "```python",
         "import mckibben",
-        imported,
+        f"from {estimator.__module__} import {estimator.__name__}",
         "",
         'recordings = mckibben.read("recording.csv")',
-        *made,
+        f"estimator = {estimator.__name__}()",
         "model = estimator.fit(recordings).model_",
         'model.save("model.json")',
         "```",

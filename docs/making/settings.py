@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 from making.pages import plain, table
@@ -50,18 +50,17 @@ def limited(limit: Any) -> str:
     return " ".join(found)
 
 
-def settings_table(estimator: Any) -> list[str]:
+def settings_table(estimator: type[Any]) -> list[str]:
     """Return the settings of an estimator: default, allowed values, meaning."""
-    cls = getattr(estimator, "of", estimator)
-    hints, said = get_type_hints(cls, include_extras=True), meanings(cls)
+    hints, said = get_type_hints(estimator, include_extras=True), meanings(estimator)
+    usual = estimator()
     rows = [
         [
             f"`{one.name}`",
-            f"`{one.default}`",
+            f"`{getattr(usual, one.name)}`",
             allowed(hints[one.name]),
             plain(said.get(one.name, "")),
         ]
         for one in fields(estimator)
-        if one.default is not MISSING
     ]
     return table(["setting", "default", "allowed values", "meaning"], rows)

@@ -5,8 +5,6 @@ F_r is the play operator of threshold r. Source: title of the paper, equations, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass as settings
-
 import numpy as np
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
@@ -82,7 +80,6 @@ class ElasticPlastic(Invertible):
         return min(self.gain, self.gain + self.weight)
 
 
-@settings(kw_only=True, repr=False, eq=False)
 class ElasticPlasticEstimator(SeparableEstimator):
     """Elastic-plastic model: the threshold is searched, the slopes are solved for by least squares."""
 

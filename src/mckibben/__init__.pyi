@@ -30,9 +30,9 @@ from .errors import DataWarning as DataWarning
 from .errors import MckibbenError as MckibbenError
 from .errors import ModelError as ModelError
 from .errors import ModelWarning as ModelWarning
-from .estimators.hysteresis.eupi import EUPIEstimator as EUPIEstimator
 from .estimators.hysteresis.gpi import GPIEstimator as GPIEstimator
 from .estimators.hysteresis.mpi import MPIEstimator as MPIEstimator
+from .estimators.hysteresis.pi import EUPIEstimator as EUPIEstimator
 from .estimators.hysteresis.pi import PIEstimator as PIEstimator
 from .files import read as read
 from .files import write as write

@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import asdict, fields, is_dataclass, replace
 from functools import cache
 from importlib.metadata import version
-from inspect import getsourcefile, unwrap
+from inspect import getsourcefile
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -27,7 +27,6 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.saving import LARGEST_FILE, from_dict, to_dict
 from mckibben.errors import DataWarning, MckibbenError
 from mckibben.outputs import UNFINISHED
-from mckibben.presets import Chosen
 from mckibben.recording import PROVENANCE, Recording
 from mckibben.system import ordinary
 from mckibben.system.atomic import PART, write_text, written
@@ -149,10 +148,9 @@ def program() -> str:
 
 
 def source(plugin: Any) -> str:
-    """Return a digest of an estimator's source file, and of its preset settings."""
-    path = getsourcefile(unwrap(plugin))
-    own = str(plugin) if isinstance(plugin, Chosen) else ""
-    return "" if path is None else digest(Path(path).read_bytes(), own)
+    """Return a digest of an estimator's source file."""
+    path = getsourcefile(plugin)
+    return "" if path is None else digest(Path(path).read_bytes())
 
 
 def _to_json(value: Any) -> Any:

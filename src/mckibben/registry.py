@@ -12,7 +12,6 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from mckibben.errors import ModelError
-from mckibben.presets import Chosen, Preset
 
 PLUGINS: dict[str, dict[str, str]] = {
     "blocks": {
@@ -88,52 +87,52 @@ PLUGINS: dict[str, dict[str, str]] = {
         "activation-memory": ("mckibben.estimators.force.activation:ActivationMemoryEstimator"),
         "activation-pressure": ("mckibben.estimators.force.activation:ActivationPressureEstimator"),
         "air": "mckibben.estimators.dynamics.air:AirEstimator",
-        "armax": "mckibben.estimators.dynamics.linear_models:ARMAX",
-        "arx": "mckibben.estimators.dynamics.linear_models:ARX",
+        "armax": "mckibben.estimators.dynamics.linear_models:ARMAXEstimator",
+        "arx": "mckibben.estimators.dynamics.linear_models:ARXEstimator",
         "balance": "mckibben.estimators.coupled.balance:BalanceEstimator",
         "balance-force": "mckibben.estimators.coupled.balance_force:BalanceForceEstimator",
-        "bj": "mckibben.estimators.dynamics.linear_models:BJ",
+        "bj": "mckibben.estimators.dynamics.linear_models:BJEstimator",
         "bouc-wen": "mckibben.estimators.hysteresis.loops:BoucWenEstimator",
-        "coupled-memory": "mckibben.estimators.coupled.play_ridge:COUPLED_MEMORY",
-        "coupled-pi": "mckibben.estimators.coupled.sdchm:COUPLED_PI",
+        "coupled-memory": "mckibben.estimators.coupled.play_ridge:CoupledMemoryEstimator",
+        "coupled-pi": "mckibben.estimators.coupled.sdchm:CoupledPIEstimator",
         "cpi": "mckibben.estimators.hysteresis.creep_pi:CreepPIEstimator",
-        "duhem": "mckibben.estimators.hysteresis.duhem:DuhemEstimator",
-        "eupi": "mckibben.estimators.hysteresis.eupi:EUPIEstimator",
-        "force-bilinear": "mckibben.estimators.force.laws:FORCE_BILINEAR",
+        "duhem": "mckibben.estimators.hysteresis.loops:DuhemEstimator",
+        "eupi": "mckibben.estimators.hysteresis.pi:EUPIEstimator",
+        "force-bilinear": "mckibben.estimators.force.laws:BilinearForceEstimator",
         "force-chou": "mckibben.estimators.force.laws:ChouHannafordEstimator",
-        "force-minh": "mckibben.estimators.force.laws:FORCE_MINH",
-        "force-petrovic": "mckibben.estimators.force.laws:FORCE_PETROVIC",
-        "force-schindele": "mckibben.estimators.force.laws:FORCE_SCHINDELE",
+        "force-minh": "mckibben.estimators.force.laws:MinhForceEstimator",
+        "force-petrovic": "mckibben.estimators.force.laws:PetrovicForceEstimator",
+        "force-schindele": "mckibben.estimators.force.laws:SchindeleForceEstimator",
         "force-tondu": "mckibben.estimators.force.laws:TonduLopezEstimator",
-        "gbw": "mckibben.estimators.hysteresis.loops:GBW",
+        "gbw": "mckibben.estimators.hysteresis.loops:GBWEstimator",
         "gpi": "mckibben.estimators.hysteresis.gpi:GPIEstimator",
-        "kp": "mckibben.estimators.hysteresis.preisach:KP",
-        "maxwell-slip": "mckibben.estimators.hysteresis.loops:MAXWELL_SLIP",
-        "mms": "mckibben.estimators.hysteresis.loops:MMS",
+        "kp": "mckibben.estimators.hysteresis.preisach:KPEstimator",
+        "maxwell-slip": "mckibben.estimators.hysteresis.loops:MaxwellSlipEstimator",
+        "mms": "mckibben.estimators.hysteresis.loops:MMSEstimator",
         "mpi": "mckibben.estimators.hysteresis.mpi:MPIEstimator",
         "mpi-narmax": "mckibben.estimators.coupled.mpi_narmax:MPINarmaxEstimator",
-        "multistate": "mckibben.estimators.force.multistate:MULTISTATE",
-        "multistate-11": "mckibben.estimators.force.multistate:MULTISTATE_11",
-        "multistate-18": "mckibben.estimators.force.multistate:MULTISTATE_18",
+        "multistate": "mckibben.estimators.force.multistate:EachWayMultistateEstimator",
+        "multistate-11": "mckibben.estimators.force.multistate:Multistate11Estimator",
+        "multistate-18": "mckibben.estimators.force.multistate:Multistate18Estimator",
         "narx": "mckibben.estimators.dynamics.narx:NarxEstimator",
-        "narx-network": "mckibben.estimators.dynamics.narx:NARX_NETWORK",
-        "narx-play": "mckibben.estimators.dynamics.narx:NARX_PLAY",
-        "oe": "mckibben.estimators.dynamics.linear_models:OE",
-        "p1": "mckibben.estimators.dynamics.process_model:P1",
-        "p1z": "mckibben.estimators.dynamics.process_model:P1Z",
-        "p2": "mckibben.estimators.dynamics.process_model:P2",
-        "p2u": "mckibben.estimators.dynamics.process_model:P2U",
-        "p2uz": "mckibben.estimators.dynamics.process_model:P2UZ",
-        "p2z": "mckibben.estimators.dynamics.process_model:P2Z",
-        "p3": "mckibben.estimators.dynamics.process_model:P3",
+        "narx-network": "mckibben.estimators.dynamics.narx:NarxNetworkEstimator",
+        "narx-play": "mckibben.estimators.dynamics.narx:NarxPlayEstimator",
+        "oe": "mckibben.estimators.dynamics.linear_models:OEEstimator",
+        "p1": "mckibben.estimators.dynamics.process_model:P1Estimator",
+        "p1z": "mckibben.estimators.dynamics.process_model:P1ZEstimator",
+        "p2": "mckibben.estimators.dynamics.process_model:P2Estimator",
+        "p2u": "mckibben.estimators.dynamics.process_model:P2UEstimator",
+        "p2uz": "mckibben.estimators.dynamics.process_model:P2UZEstimator",
+        "p2z": "mckibben.estimators.dynamics.process_model:P2ZEstimator",
+        "p3": "mckibben.estimators.dynamics.process_model:P3Estimator",
         "pi": "mckibben.estimators.hysteresis.pi:PIEstimator",
         "play-ridge": "mckibben.estimators.coupled.play_ridge:PlayRidgeEstimator",
-        "preisach": "mckibben.estimators.hysteresis.preisach:PREISACH",
-        "rdpi": "mckibben.estimators.hysteresis.mpi:RDPI",
+        "preisach": "mckibben.estimators.hysteresis.preisach:PreisachEstimator",
+        "rdpi": "mckibben.estimators.hysteresis.mpi:RDPIEstimator",
         "sdchm": "mckibben.estimators.coupled.sdchm:SDCHMEstimator",
-        "sdchm-published": "mckibben.estimators.coupled.sdchm:SDCHM_PUBLISHED",
+        "sdchm-published": "mckibben.estimators.coupled.sdchm:PublishedSDCHMEstimator",
         "state-network": "mckibben.estimators.dynamics.state_network:StateNetworkEstimator",
-        "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNN",
+        "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNNEstimator",
     },
     "faces": {
         "card": "mckibben.report.notebook:card",
@@ -217,13 +216,12 @@ def load(group: str, name: str) -> Any:
         )
     module, _, attribute = locations[name].partition(":")
     try:
-        found: Any = getattr(import_module(module), attribute)
+        return getattr(import_module(module), attribute)
     except (ImportError, AttributeError, SyntaxError) as error:
         raise ModelError(
             f"{name!r} of the {group} cannot be imported: {error}",
             remedy=f"correct {locations[name]}, or take it out of the registry",
         ) from error
-    return Chosen(name, found) if isinstance(found, Preset) else found
 
 
 @cache

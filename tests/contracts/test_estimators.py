@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -100,6 +101,12 @@ def test_predict_and_score_are_of_the_measured_outputs(name: str, kind: str) -> 
         np.mean(1 - ((y - z) ** 2).mean(axis=0) / y.var(axis=0))
     )
     assert estimator.score(runs) > 0.3
+    run, block = runs[-1], estimator.model_
+    u, y = (run.matrix([c.name for c in side]) for side in (block.inputs, block.outputs))
+    assert estimator.score(u, y, sample_time=run.sample_time) == estimator.score(run)
+    again = pickle.loads(pickle.dumps(estimator))
+    assert type(again) is type(estimator)
+    np.testing.assert_array_equal(again.predict(runs[0]), predicted[0])
     with pytest.raises(NotFittedError):
         clone(estimator).predict(runs)
 

@@ -14,7 +14,7 @@ import mckibben
 SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
-    {"errors", "arrays", "registry", "presets", "numerals", "version", "system"},
+    {"errors", "arrays", "registry", "numerals", "version", "system"},
     {"recording", "signals", "channels", "metrics", "statistics"},
     {"files"},
     {"rigs"},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from mckibben.blocks.feedback import BASE, FeedforwardFeedback
 from mckibben.blocks.fields import MEASURED, Channel
 from mckibben.control.connecting import Offer
 from mckibben.control.preview import preview_time
+from mckibben.errors import require
 
 Ahead = tuple[Array, Array]
 
@@ -116,3 +117,118 @@ class BlockController(Controller):
             given = np.concatenate((reference, scheduled, measured, found))
             found = self._feedback.step(self._pid_inputs(given))
         return self._commands(found)
+
+
+@dataclass
+class DisturbanceObserver(Controller):
+    """A compensator and its model in parallel with the plant, which correct the reference.
+
+    The forward model runs on the applied pressures; the low-passed difference between measurement and
+    model is an output disturbance (a load, a drift, an error of the model), and the compensator is asked
+    for the reference without it. With an exact inverse this is internal model control (Morari and
+    Zafiriou, "Robust Process Control"): no gain to tune but the filter's time.
+
+    Parameters
+    ----------
+    compensator : Block
+        From displacements, and what schedules it, to pressures; its inverse is the model.
+    filter_time : float
+        Time constant of the estimate [s], positive: longer is more robust, shorter more accurate.
+    """
+
+    compensator: Block
+    filter_time: float = 0.3
+
+    def __post_init__(self) -> None:
+        require(self.filter_time > 0, "filter_time", self.filter_time, "a positive time [s]")
+        self._model = self.compensator.inverse()
+        self.forward_model = self._model
+        self.preview = self._model.dead_time
+
+    @property
+    def n_clipped(self) -> int:
+        """That of the compensator."""
+        return self.compensator.n_clipped(self._ahead.state)
+
+    def connect(self, offer: Offer) -> None:
+        block, model = self.compensator, self._model
+        references = block.inputs[: block.n_driven]
+        self._inputs, self._commands = offer.inputs(block), offer.commands(block)
+        given = (*offer.driven, *offer.scheduled)
+        self._measured = offer.selected(references, offer.measured, block.title, offer.plant)
+        self._taken = offer.selected(model.inputs, given, model.title, f"a loop on {offer.plant}")
+        self._modelled = offer.selected(references, model.outputs, block.title, model.title)
+
+    def reset(self, sample_time: float) -> None:
+        self._ahead = self.compensator.stream(sample_time)
+        self._model_stream = self._model.stream(sample_time)
+        self._share = 1.0 - np.exp(-sample_time / self.filter_time)
+        self._disturbance = np.zeros(self.compensator.n_driven)
+        self._expected: Array | None = None
+        self._scheduled = np.empty(0)
+
+    def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
+        """Return the compensator's commands for the reference without the disturbance."""
+        if self._expected is not None:
+            residual = self._measured(measured) - self._expected
+            self._disturbance += self._share * (residual - self._disturbance)
+        self._scheduled = scheduled
+        wanted = self._inputs(np.concatenate((*ahead, measured)))
+        wanted[: self._disturbance.size] -= self._disturbance
+        return self._commands(self._ahead.step(wanted))
+
+    def applied(self, pressures: Array) -> None:
+        """Advance the model by the applied commands."""
+        taken = self._taken(np.concatenate((pressures, self._scheduled)))
+        self._expected = self._modelled(self._model_stream.step(taken))
+
+
+@dataclass
+class EstimatedLoad(Controller):
+    """A controller whose scheduling input is estimated, for plants without a load sensor.
+
+    Parameters
+    ----------
+    controller : Controller
+        Controller scheduled by the load.
+    estimate : Block
+        From measurements, pressure and displacement, to the load.
+    filter_time : float
+        Time constant of the estimate [s], which avoids oscillation of the loop.
+    """
+
+    controller: Controller
+    estimate: Block
+    filter_time: float = 0.3
+
+    def __post_init__(self) -> None:
+        require(self.filter_time > 0, "filter_time", self.filter_time, "a positive time [s]")
+        inner = self.controller
+        self.preview, self.forward_model = inner.preview, inner.forward_model
+        self.samples_ahead = inner.samples_ahead
+
+    @property
+    def n_clipped(self) -> int:
+        """Number of samples clipped by the controller's compensator."""
+        return self.controller.n_clipped
+
+    def connect(self, offer: Offer) -> None:
+        title, loads = self.estimate.title, self.estimate.outputs
+        self._inputs = offer.selected(self.estimate.inputs, offer.measured, title, offer.plant)
+        self.controller.connect(replace(offer, scheduled=(*loads, *offer.scheduled)))
+
+    def reset(self, sample_time: float) -> None:
+        self.controller.reset(sample_time)
+        self._stream = self.estimate.stream(sample_time)
+        self._share = 1.0 - np.exp(-sample_time / self.filter_time)
+        self._load = np.zeros(len(self.estimate.outputs))
+
+    def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
+        """Return the controller's commands, with the current load estimate for the next step."""
+        found = self._stream.step(self._inputs(measured))
+        self._load = self._load + self._share * (found - self._load)
+        now, then = (np.concatenate((self._load, others)) for others in (scheduled, ahead[1]))
+        return self.controller.step(reference, measured, now, (ahead[0], then))
+
+    def applied(self, pressures: Array) -> None:
+        self.controller.applied(pressures)

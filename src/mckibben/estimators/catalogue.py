@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 from mckibben import registry
@@ -110,8 +110,8 @@ def summary(model: str) -> str:
 
 def defaults(model: str) -> dict[str, Any]:
     """Return the settings of a model's estimator with their defaults."""
-    known = fields(registry.load("estimators", model))
-    return {field.name: field.default for field in known if field.default is not MISSING}
+    settings: dict[str, Any] = registry.load("estimators", model)().get_params()
+    return settings
 
 
 def described() -> dict[str, Any]:

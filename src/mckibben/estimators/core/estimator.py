@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
-from typing import Annotated, Any, ClassVar, Literal, Self, get_type_hints
+from inspect import get_annotations
+from typing import Annotated, Any, ClassVar, Literal, Self, dataclass_transform, get_type_hints
 
 import numpy as np
 from annotated_types import Interval
@@ -121,11 +122,14 @@ class Diagnostics:
         return tuple(np.sqrt(np.diag(self.covariance)).tolist())
 
 
+@dataclass_transform(kw_only_default=True, eq_default=False)
 @dataclass(kw_only=True, repr=False, eq=False)
 class Estimator(ABC):
     """Base class of all estimators; one input and one output unless a class overrides that.
 
     Settings are the fields of the class, to be read, changed, cloned and searched over by scikit-learn.
+    Every subclass is a dataclass without a decorator. One that only assigns other defaults and
+    declarations is a preset: the same model under a name and title of its own.
 
     Parameters
     ----------
@@ -189,6 +193,14 @@ class Estimator(ABC):
     errors_known: ClassVar[bool] = True
     """Whether standard errors of the parameters are computed."""
 
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        own, known = get_annotations(cls), {setting.name for setting in fields(cls)}
+        if changed := known & vars(cls).keys() - own.keys():  # defaults, of the types of the bases
+            hints = get_type_hints(cls, include_extras=True)
+            cls.__annotations__ = own | {name: hints[name] for name in changed}
+        dataclass(kw_only=True, repr=False, eq=False)(cls)
+
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """Return the settings by name; ``deep`` has no effect."""
         return {name: getattr(self, name) for name in self._names()}
@@ -212,14 +224,18 @@ class Estimator(ABC):
         return self
 
     def __repr__(self) -> str:
-        values = [(each, repr(getattr(self, each.name))) for each in fields(self)]
-        changed = [f"{each.name}={text}" for each, text in values if text != repr(each.default)]
+        usual, given = (
+            {k: repr(v) for k, v in e.get_params().items()} for e in (type(self)(), self)
+        )
+        changed = [f"{name}={text}" for name, text in given.items() if text != usual[name]]
         return f"{type(self).__name__}({', '.join(changed)})"
 
     def __sklearn_tags__(self) -> Any:
         from sklearn.base import BaseEstimator  # scikit-learn alone asks, so it is there already
 
-        return BaseEstimator().__sklearn_tags__()
+        tags = BaseEstimator().__sklearn_tags__()
+        tags.input_tags.one_d_array = isinstance(self.input, str) and not self._further_inputs()
+        return tags
 
     @classmethod
     def _names(cls) -> list[str]:
@@ -359,7 +375,7 @@ class Estimator(ABC):
         ----------
         recordings : Recording, data frame, or sequence of these; or array, shape (n,) or (n, inputs)
             Training data; every recording starts with its own memory. With ``y``, an array of the
-            inputs, in the package's units.
+            inputs, in the package's units: of `input`, then what settings name besides.
         y : array, shape (n,) or (n, outputs), optional
             The outputs.
         sample_time : float, optional
@@ -388,22 +404,14 @@ class Estimator(ABC):
         vars(self).update(vars(fitted))
         return self
 
-    def _recording(self, u: Any, y: Any, sample_time: float | None) -> Recording:
-        """Return arrays as a recording with this estimator's channels; ``y`` may be None."""
-        channels: dict[str, Array] = {}
-        for given, names in ((u, self.input), (y, self.output)):
-            columns = np.asarray(() if given is None else given, dtype=float)
-            columns = columns[:, None] if columns.ndim == 1 else columns
-            if given is None:
-                continue
-            named = (names,) if isinstance(names, str) else names
-            if named is None or columns.ndim != 2 or columns.shape[1] != len(named):
-                raise DataError(
-                    f"arrays of shape {columns.shape} are not the channels {names}",
-                    remedy="name the columns: mckibben.Recording({'pressure_1': ...}, sample_time)",
-                )
-            channels |= dict(zip(named, columns.T, strict=True))
-        return Recording(channels, sample_time)
+    def _recording(self, u: Any, y: ArrayLike, sample_time: float | None) -> Recording:
+        """Return arrays as a recording, with the channels of the settings."""
+        scheduling = self.get_params().get("scheduling") or ()
+        inputs, outputs = ((a,) if isinstance(a, str) else a for a in (self.input, self.output))
+        if inputs is not None:
+            inputs = (*inputs, *self._further_inputs(), *scheduling)
+        given = by_channel(u, inputs, "pressure") | by_channel(y, outputs, "displacement")
+        return Recording(given, sample_time)
 
     def _fit(
         self,
@@ -459,16 +467,15 @@ class Estimator(ABC):
             Naming the setting, what it is, and what it may be.
         """
         hints = get_type_hints(type(self), include_extras=True)
-        for setting in fields(self):
-            given = getattr(self, setting.name)
+        for name, given in self.get_params().items():
             value = given.tolist() if isinstance(given, np.generic | np.ndarray) else given
             try:
-                TypeAdapter(hints[setting.name], config=STRICT_SETTINGS).validate_python(value)
+                TypeAdapter(hints[name], config=STRICT_SETTINGS).validate_python(value)
             except ValidationError as error:
                 wanted = error.errors()[0]["msg"]
                 raise ModelError(
                     f"it is {value!r}: {wanted[0].lower()}{wanted[1:]}",
-                    parameter=setting.name,
+                    parameter=name,
                     remedy="give another, or leave it out",
                 ) from None
 
@@ -493,20 +500,33 @@ class Estimator(ABC):
         array, shape (n,), or (n, m) of a model of m outputs
             Of one recording; a list of these of a sequence.
         """
+        block = self.fitted
         if isinstance(recordings, np.ndarray):
-            recordings = self._recording(recordings, None, sample_time)
+            columns = by_channel(recordings, [channel.name for channel in block.inputs], "")
+            recordings = Recording(columns, sample_time)
         if isinstance(recordings, Recording) or is_frame(recordings):
             return self.predict(listed(recordings))[0]
-        block = self.fitted
         given = [channel.name for channel in block.outputs]
         found = [block.simulate(recording).matrix(given) for recording in listed(recordings)]
         return [outputs[:, 0] for outputs in found] if len(given) == 1 else found
 
-    def score(self, recordings: Recording | Sequence[Recording], y: None = None) -> float:
-        """Return R² of `predict` over all recordings, averaged over outputs."""
-        every = listed(recordings)
+    def score(
+        self,
+        recordings: Recording | Sequence[Recording] | ArrayLike,
+        y: ArrayLike | None = None,
+        *,
+        sample_time: float | None = None,
+    ) -> float:
+        """Return R² of `predict` over all recordings, or arrays as of `fit`, averaged over outputs."""
+        inputs, given = (
+            [c.name for c in side] for side in (self.fitted.inputs, self.fitted.outputs)
+        )
+        if y is None:
+            every = listed(recordings)
+        else:
+            columns = by_channel(recordings, inputs, "") | by_channel(y, given, "")
+            every = [Recording(columns, sample_time)]
         predicted = np.concatenate(self.predict(every))
-        given = [channel.name for channel in self.fitted.outputs]
         measured = np.concatenate([recording.matrix(given) for recording in every])
         residual = measured - predicted.reshape(measured.shape)
         around = measured - measured.mean(axis=0)
@@ -627,7 +647,6 @@ class Estimator(ABC):
         return tuple(np.flatnonzero(vanishing(block.pack())).tolist())
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class SearchEstimator(Estimator):
     """An estimator of one input and one output with its own search.
 
@@ -673,6 +692,30 @@ def preceded(recordings: Sequence[Recording], runs: FreeRuns) -> tuple[list[Reco
         found.append(replace(recording, channels=channels, start_time=begun))
         counted.append(np.concatenate([np.zeros(len(past), dtype=bool), rows]))
     return found, counted
+
+
+def by_channel(given: Any, names: Sequence[str] | None, quantity: str) -> dict[str, Array]:
+    """Return an array, shape (n,) or (n, channels), by channel; without names those of a quantity.
+
+    Raises
+    ------
+    ValueError
+        On what `sklearn.utils.check_array` refuses, such as complex, sparse and infinite values.
+    DataError
+        If there are other than as many columns as channels.
+    """
+    from sklearn.utils import check_array
+
+    columns = check_array(given, dtype=float, ensure_2d=False)
+    columns = columns.reshape(len(columns), -1)
+    n = columns.shape[1]
+    usual = [f"{quantity}_{k + 1}" for k in range(n)] if n > 1 else [quantity]
+    if n != len(names or usual):
+        raise DataError(
+            f"arrays of shape {columns.shape} are not the channels {', '.join(names or usual)}",
+            remedy="name the columns: mckibben.Recording({'pressure_1': ...}, sample_time)",
+        )
+    return dict(zip(names or usual, columns.T, strict=True))
 
 
 def resting(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:

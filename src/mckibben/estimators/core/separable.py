@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import Annotated, ClassVar
 
@@ -43,7 +43,6 @@ WORST = 1e150
 """Cost of parameters whose output overflows; its square is finite."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class SeparableEstimator(Estimator):
     """Estimator of a block that is linear in its weights and offset.
 

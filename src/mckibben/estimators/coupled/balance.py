@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import compress, product
 from typing import Annotated, Any, ClassVar, Literal
@@ -113,7 +113,6 @@ PARTS = {"lags": "relaxation", "places": "obstacle", "pushes": "slack"}
 """Terms that are part of other terms."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class BalanceEstimator(CoupledEstimator):
     """Force balance of muscles in parallel, with friction, relaxation, loads and scheduling inputs.
 

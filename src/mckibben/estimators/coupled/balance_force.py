@@ -9,7 +9,7 @@ machine holds the muscle, without pressure. Solved for the pressure it is a comp
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, ClassVar
 
 from annotated_types import Interval
@@ -28,7 +28,6 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class BalanceForceEstimator(SearchEstimator):
     """Force by length or displacement and pressure, from a force balance.
 

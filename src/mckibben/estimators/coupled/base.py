@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,7 +25,6 @@ FEWEST_SAMPLES = 50
 """Smallest number of successive samples for several muscles."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class CoupledEstimator(Estimator):
     """Settings common to all estimators of several inputs and outputs.
 

@@ -16,6 +16,8 @@ from typing import Literal
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.fields import Channels, rows, vector
 from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -130,14 +132,6 @@ class Consequents:
 
 
 @dataclass(frozen=True)
-class Fitted:
-    """Antecedents and consequents, (rules * terms, outputs)."""
-
-    sets: Sets
-    consequents: Array
-
-
-@dataclass(frozen=True)
 class Problem:
     """Inputs x (n, inputs) and outputs y (n, outputs) for the antecedents."""
 
@@ -182,10 +176,16 @@ def fit_network(
     n_sets: int,
     solver: Consequents,
     search: Search,
+    channels: tuple[Channels, Channels, Channels],
     *,
+    beyond: float,
     tracker: Tracker,
-) -> Fitted:
-    """Fit a network to inputs x (n, inputs) and outputs y (n, outputs)."""
+) -> FuzzyNetwork:
+    """Return a network fitted to inputs x (n, inputs) and outputs y (n, outputs).
+
+    Channels are those driven, those that schedule, and the outputs; its inverse ends a share ``beyond``
+    of the range of each driven one away from the data.
+    """
     keep = np.linspace(0, len(x) - 1, min(len(x), search.samples)).round().astype(int)
     problem = Problem(x[keep], y[keep], solver)
     if search.method == "pso":
@@ -198,7 +198,20 @@ def fit_network(
         columns = Problem(x[part], y[part], solver).columns(sets)
         gram, right = gram + columns.T @ columns, right + columns.T @ y[part]
     n_terms = x.shape[1] + solver.constants
-    return Fitted(sets, solver.solve(gram, right, n_terms))
+    driven, scheduled, given = channels
+    consequents = solver.solve(gram, right, n_terms).reshape(-1, n_terms, len(given))
+    low, high = (end(x[:, : len(driven)], axis=0) for end in (np.min, np.max))
+    margin = beyond * (high - low)
+    return FuzzyNetwork(
+        rows(sets.centres),
+        rows(sets.widths),
+        vector(np.moveaxis(consequents, 2, 1).ravel()),
+        driven,
+        given,
+        scheduled,
+        solver.constants,
+        rows(np.column_stack([low - margin, high + margin])),
+    )
 
 
 def project(problem: Problem, n_sets: int, low: Array, high: Array, tracker: Tracker) -> Sets:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Gt, Interval
@@ -48,7 +48,6 @@ SEARCH_SAMPLES = 6000
 """Number of samples per run, from its start, on which the swarm compares free runs."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class MPINarmaxEstimator(CoupledEstimator):
     """Rate-dependent hysteresis and a recurrent fuzzy network scheduled by force.
 
@@ -77,9 +76,9 @@ class MPINarmaxEstimator(CoupledEstimator):
     can = "Hysteresis under a load that varies, by a recurrent fuzzy network behind a modified PI."
     cannot = "No inverse; the network is arbitrary under other loads."
     caution = "its network is arbitrary under loads and motions of another kind"
-    effort: ClassVar[float] = 6.0
+    effort = 6.0
 
-    most_inputs: ClassVar[float] = 1
+    most_inputs = 1
 
     n_sets: Annotated[int, Interval(ge=1, le=4)] = 3
     output_lags: Annotated[int, Interval(ge=1, le=3)] = 1

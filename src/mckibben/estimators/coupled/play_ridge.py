@@ -13,9 +13,8 @@ cross-validatory method for dependent data", Biometrika, 1994.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations_with_replacement
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Gt, Interval, Len
@@ -28,7 +27,6 @@ from mckibben.blocks.free_runs import FreeRuns
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.presets import preset
 
 PENALTIES = np.geomspace(1e-8, 10.0, 28)
 """Candidate penalties, relative to the size of the regressors."""
@@ -40,7 +38,6 @@ LEAST = 1e-12
 """Smallest penalty, on the same scale, which makes the equations solvable."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class PlayRidgeEstimator(CoupledEstimator):
     """Ridge regression on play operators, lags and products of all inputs; any number of outputs.
 
@@ -74,9 +71,9 @@ class PlayRidgeEstimator(CoupledEstimator):
         "that oscillate."
     )
     quick = True
-    alone: ClassVar[bool] = True
-    through: ClassVar[bool] = True
-    paired: ClassVar[bool] = False
+    alone = True
+    through = True
+    paired = False
 
     lags: Annotated[tuple[Annotated[float, Ge(0)], ...], Len(1)] = (0.0, 0.1, 0.6, 4.0)
     thresholds: tuple[Annotated[float, Gt(0)], ...] = (0.04, 0.11, 0.23)
@@ -127,6 +124,23 @@ class PlayRidgeEstimator(CoupledEstimator):
             readout = readout_of(total - out.T @ out, width, self.penalties_)
             found.append([table @ readout.T for table in tables])
         return found
+
+
+class CoupledMemoryEstimator(PlayRidgeEstimator):
+    """Lags and play operators of several muscles, with one fixed penalty."""
+
+    title = "Coupled lags and play operators"
+    can = (
+        "Any number of outputs from lags, play operators and products of all inputs; in "
+        "closed form."
+    )
+    cannot = "No inverse; products extrapolate badly beyond the recorded inputs."
+    makes = ("coupled-memory",)
+    alone = False
+    needs_time = True
+    crossed = False
+    lags = (0.3, 1.0, 8.0)
+    ridge = 1e-4
 
 
 def readout_of(sums: Array, width: int, penalties: Sequence[float]) -> Array:
@@ -208,21 +222,3 @@ def features(block: CoupledMemory, inputs: Array, sample_time: float | None) -> 
     if block.crossed:
         products += [first[:, [k]] * linear[:, 1 + n :] for k in range(n)]
     return np.column_stack([linear, *products])
-
-
-COUPLED_MEMORY = preset(
-    PlayRidgeEstimator,
-    "Lags and play operators of several muscles, with one fixed penalty.",
-    title="Coupled lags and play operators",
-    can=(
-        "Any number of outputs from lags, play operators and products of all inputs; in "
-        "closed form."
-    ),
-    cannot="No inverse; products extrapolate badly beyond the recorded inputs.",
-    makes=("coupled-memory",),
-    alone=False,
-    needs_time=True,
-    crossed=False,
-    lags=(0.3, 1.0, 8.0),
-    ridge=1e-4,
-)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import field, replace
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -27,10 +27,10 @@ from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.estimator import InverseKind
 from mckibben.estimators.coupled.base import CoupledEstimator, alone
 from mckibben.estimators.coupled.fuzzy import (
     Consequents,
-    Fitted,
     Method,
     Search,
     fit_network,
@@ -40,7 +40,6 @@ from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.metrics import rmse
-from mckibben.presets import preset
 from mckibben.recording import Recording
 
 BEYOND = 0.1
@@ -49,13 +48,10 @@ BEYOND = 0.1
 FRICTION = (0.002, 0.1)
 """Smallest and largest threshold of a muscle's friction, relative to its travel."""
 
-ARBITRARY = "its network is arbitrary where muscles move in other combinations"
-
 LEAST_SLOPE = 0.05
 """Smallest slope of a displacement alone, just after a reversal."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class SDCHMEstimator(CoupledEstimator):
     """Hysteresis of every muscle, coupling, a network scheduled by stiffness, and friction.
 
@@ -105,10 +101,10 @@ class SDCHMEstimator(CoupledEstimator):
         "Strong rate dependence; with little damping (ridge) its network is arbitrary away from"
         " the recorded runs."
     )
-    inverse_kind = "solved"
-    effort: ClassVar[float] = 20.0
-    each_alone: ClassVar[bool] = True
-    fewest_inputs: ClassVar[int] = 2
+    inverse_kind: ClassVar[InverseKind] = "solved"
+    effort = 20.0
+    each_alone = True
+    fewest_inputs = 2
 
     n_sets: Annotated[int, Interval(ge=0, le=6)] = 3
     memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] | None = "cpi"
@@ -200,19 +196,16 @@ class SDCHMEstimator(CoupledEstimator):
     ) -> FuzzyNetwork:
         """Return a network from driven and scheduling inputs to displacements."""
         swarm = printed_swarm(self.particles, self.iterations)
-        found = fit_network(
+        return fit_network(
             x,
             y,
             self.n_sets,
             Consequents(self.constants, self.ridge),
             Search(self.method, self.search_samples, swarm, self.seed),
+            (driven, data.scheduled, data.outputs),
+            beyond=BEYOND,
             tracker=tracker,
         )
-        n = len(driven)
-        low, high = x[:, :n].min(axis=0), x[:, :n].max(axis=0)
-        margin = BEYOND * (high - low)
-        limits = np.column_stack([low - margin, high + margin])
-        return as_block(found, driven, data.outputs, data.scheduled, limits, self.constants)
 
     def friction(self, given: list[Array], wanted: list[Array], channel: Channel) -> PI:
         """Return the friction memory of a muscle: play operators with positive partial sums."""
@@ -262,27 +255,50 @@ class SDCHMEstimator(CoupledEstimator):
         return block
 
 
-def as_block(
-    fitted: Fitted,
-    driven: tuple[Channel, ...],
-    given: tuple[Channel, ...],
-    scheduled: tuple[Channel, ...],
-    limits: Array,
-    constants: bool,
-) -> FuzzyNetwork:
-    """Return a fitted network as a block."""
-    n_terms = len(driven) + len(scheduled) + constants
-    consequents = fitted.consequents.reshape(-1, n_terms, len(given))
-    return FuzzyNetwork(
-        rows(fitted.sets.centres),
-        rows(fitted.sets.widths),
-        vector(np.moveaxis(consequents, 2, 1).ravel()),
-        driven,
-        given,
-        scheduled,
-        constants,
-        rows(limits),
+class CoupledPIEstimator(SDCHMEstimator):
+    """Hysteresis of every muscle and a coupling, whatever the stiffness: a baseline."""
+
+    title = "Coupled Prandtl–Ishlinskii model"
+    can = "Hysteresis of every muscle, and a constant coupling."
+    cannot = "The coupling does not change with stiffness."
+    inverse_kind = "exact"
+    quick = True
+    memory = "gpi"
+    n_sets = 0
+    n_friction = 0
+
+
+class PublishedSDCHMEstimator(SDCHMEstimator):
+    """SDCHM identified as in its paper: GPI, coupling, and a network trained by particle swarm."""
+
+    title = "SDCHM identified as in its paper"
+    can = "As sdchm, identified as in its paper."
+    cannot = "Combinations of pressures unlike those recorded: its network is arbitrary there."
+    caution = "its network is arbitrary where muscles move in other combinations"
+    effort = 25.0
+    constants = False
+    method = "pso"
+    ridge = 1e-9
+    memory = "gpi"
+    memory_settings: dict[str, Any] | None = field(
+        default_factory=lambda: {"threshold_rule": "paper", "initial": "virgin"}
     )
+    n_friction = 0
+
+
+class TSFNNEstimator(SDCHMEstimator):
+    """Fuzzy network on the raw pressures: the paper's baseline, without memory."""
+
+    title = "Takagi–Sugeno fuzzy network of raw pressures (TSFNN)"
+    can = "A network without memory, as a baseline."
+    cannot = "Hysteresis; combinations of pressures unlike those recorded."
+    caution = PublishedSDCHMEstimator.caution
+    effort = 5.0
+    paired = False
+    each_alone = False
+    memory = None
+    constants = False
+    n_friction = 0
 
 
 def network_inputs(front: Sequence[Block], runs: Sequence[Run]) -> Array:
@@ -402,62 +418,14 @@ def learned_inverse(
     with warnings.catch_warnings():  # noise at the ends is clipped
         warnings.simplefilter("ignore", ModelWarning)
         y = network_inputs(before, [replace(run, driven=run.outputs) for run in data.runs])
-    reached = y[:, : len(data.outputs)]
-    learned = fit_network(
+    swapped = fit_network(
         y,
         h,
         len(network.centres[0]),
         Consequents(network.constants, ridge),
         search or Search("pso", SDCHMEstimator.search_samples, printed_swarm(), 0),
+        (data.outputs, data.scheduled, network.driven),
+        beyond=0.0,
         tracker=tracker or Tracker(),
     )
-    limits = np.column_stack([reached.min(axis=0), reached.max(axis=0)])
-    swapped = as_block(
-        learned, data.outputs, network.driven, data.scheduled, limits, network.constants
-    )
     return Series((*before, swapped, coupling.inverse(), hysteresis.inverse()))
-
-
-COUPLED_PI = preset(
-    SDCHMEstimator,
-    "Hysteresis of every muscle and a coupling, whatever the stiffness: a baseline.",
-    title="Coupled Prandtl–Ishlinskii model",
-    can="Hysteresis of every muscle, and a constant coupling.",
-    cannot="The coupling does not change with stiffness.",
-    inverse_kind="exact",
-    quick=True,
-    memory="gpi",
-    n_sets=0,
-    n_friction=0,
-)
-
-SDCHM_PUBLISHED = preset(
-    SDCHMEstimator,
-    "SDCHM identified as in its paper: GPI, coupling, and a network trained by particle swarm.",
-    title="SDCHM identified as in its paper",
-    can="As sdchm, identified as in its paper.",
-    cannot="Combinations of pressures unlike those recorded: its network is arbitrary there.",
-    caution=ARBITRARY,
-    effort=25.0,
-    constants=False,
-    method="pso",
-    ridge=1e-9,
-    memory="gpi",
-    memory_settings={"threshold_rule": "paper", "initial": "virgin"},
-    n_friction=0,
-)
-
-TSFNN = preset(
-    SDCHMEstimator,
-    "Fuzzy network on the raw pressures: the paper's baseline, without memory.",
-    title="Takagi–Sugeno fuzzy network of raw pressures (TSFNN)",
-    can="A network without memory, as a baseline.",
-    cannot="Hysteresis; combinations of pressures unlike those recorded.",
-    caution=ARBITRARY,
-    effort=5.0,
-    paired=False,
-    each_alone=False,
-    memory=None,
-    constants=False,
-    n_friction=0,
-)

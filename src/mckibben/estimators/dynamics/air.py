@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, cast
+from dataclasses import replace
+from typing import Annotated, Any, cast
 
 import numpy as np
 from annotated_types import Ge
@@ -15,7 +15,6 @@ from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import LONGEST_DELAY
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.estimator import Start
 from mckibben.estimators.core.separable import SEARCH_SAMPLES, SeparableEstimator
 from mckibben.estimators.optimisers.multi_start import multi_start
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -34,7 +33,6 @@ NO_WORSE = 1e-6
 """Relative increase of the error up to which hysteresis is left out."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class AirEstimator(SeparableEstimator):
     """Valve or regulator with air: gain and offset solved for, lags and dead time searched.
 
@@ -64,21 +62,19 @@ class AirEstimator(SeparableEstimator):
         "a large step, fills at a different speed."
     )
     inverse_kind = "exact"
-    needs_time: ClassVar[bool] = True
+    needs_time = True
+    effort = 1.0
+    n_further = 1  # the dead time
+    rises = False
+    searches_condensed = False
 
-    effort: ClassVar[float] = 1.0
-
-    input: str = "voltage"
-    output: str = "pressure"
-    initial: Start = "first_sample"
-    n_starts: Annotated[int, Ge(1)] = 8
-    n_refined: Annotated[int, Ge(1)] = 2
+    input = "voltage"
+    output = "pressure"
+    n_starts = 8
+    n_refined = 2
     longest_dead_time: Annotated[float, Ge(0)] = 0.5
     ambient: float | None = None
     supply: float | None = None
-
-    rises: ClassVar[bool] = False
-    searches_condensed: ClassVar[bool] = False
 
     @classmethod
     def objection(
@@ -95,11 +91,6 @@ class AirEstimator(SeparableEstimator):
         if command in NO_COMMANDS or pressure != "pressure":
             return "it maps a command to a pressure"
         return None
-
-    @property
-    def n_further(self) -> int:
-        """The dead time."""
-        return 1
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         sample_time = data.timed()
@@ -227,12 +218,7 @@ class AirEstimator(SeparableEstimator):
     def unit(self, theta: Array, data: TrainingData) -> Air:
         """Return the block with unit gain, without offset, limits or dead time."""
         filling, venting = np.exp(theta[:2]).tolist()
-        rest: dict[str, Any] = {
-            "input_range": data.input_range,
-            "initial": self.starting_rule,
-            **self.channels(data),
-        }
-        return Air(1.0, 0.0, float(theta[2]), filling, venting, **rest)
+        return Air(1.0, 0.0, float(theta[2]), filling, venting, **self.common_fields(data))
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         unit = data.latest("unit", theta, lambda: self.unit(theta, data))

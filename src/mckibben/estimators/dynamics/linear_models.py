@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -30,14 +30,12 @@ from mckibben.estimators.dynamics.prediction_error import (
     with_noise,
 )
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.presets import preset
 from mckibben.recording import Recording, listed
 
 Order = Annotated[int, Interval(ge=0, le=20)]
 Lag = Annotated[int, Interval(ge=0, le=120)]
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class PredictionErrorEstimator(Estimator):
     """Estimator of a linear model by one-step prediction errors; the model runs free.
 
@@ -80,8 +78,9 @@ class PredictionErrorEstimator(Estimator):
         "n_poles": (1, 2, 3),
         "n_zeros": (1, 2, 3),
     }
-    needs_time: ClassVar[bool] = True
-    begins_measured: ClassVar[bool] = True
+    needs_time = True
+    begins_measured = True
+    effort = 0.02
 
     input: str | tuple[str, ...] = "pressure"
     output: str | tuple[str, ...] = "displacement"
@@ -95,8 +94,6 @@ class PredictionErrorEstimator(Estimator):
     delay: Annotated[int, Interval(ge=0, le=100)] = 0
     lags: Annotated[Sequence[Lag], Len(1)] | None = None
     n_starts: Annotated[int, Interval(ge=1, le=1000)] = 12
-
-    effort: ClassVar[float] = 0.02
 
     @property
     def orders(self) -> Orders:
@@ -270,48 +267,47 @@ class PredictionErrorEstimator(Estimator):
         return tuple(fixed)
 
 
-ARMAX = preset(
-    PredictionErrorEstimator,
-    "ARMAX model, A y = B u + C e.",
-    title="ARMAX model, linear",
-    can="Linear dynamics with a model of the noise; fast to fit.",
-    cannot="Has no hysteresis: rising and falling branches coincide at rest.",
-    param_grid={"n_poles": (1, 2, 3), "n_zeros": (1, 2, 3), "n_noise": (1, 2)},
-    n_noise=2,
-    effort=1.0,
-)
+class ARMAXEstimator(PredictionErrorEstimator):
+    """ARMAX model, A y = B u + C e."""
 
-ARX = preset(
-    PredictionErrorEstimator,
-    "ARX model, A y = B u + e, by linear least squares.",
-    title="ARX model, linear",
-    can="Linear dynamics, in closed form.",
-    cannot=(
+    title = "ARMAX model, linear"
+    can = "Linear dynamics with a model of the noise; fast to fit."
+    cannot = "Has no hysteresis: rising and falling branches coincide at rest."
+    param_grid: ClassVar[Grid] = {"n_poles": (1, 2, 3), "n_zeros": (1, 2, 3), "n_noise": (1, 2)}
+    effort = 1.0
+    n_noise = 2
+
+
+class ARXEstimator(PredictionErrorEstimator):
+    """ARX model, A y = B u + e, by linear least squares."""
+
+    title = "ARX model, linear"
+    can = "Linear dynamics, in closed form."
+    cannot = (
         "No hysteresis; biased by noise in the output, so its free run is worse than its one-"
         "step prediction."
-    ),
-    quick=True,
-    param_grid={"n_poles": (1, 2, 3, 4), "n_zeros": (1, 2, 3)},
-)
+    )
+    quick = True
+    param_grid: ClassVar[Grid] = {"n_poles": (1, 2, 3, 4), "n_zeros": (1, 2, 3)}
 
-BJ = preset(
-    PredictionErrorEstimator,
-    "Box-Jenkins model, y = B / F u + C / D e; second order each by default.",
-    title="Box–Jenkins model (BJ), linear",
-    can="Linear dynamics with a separate noise model.",
-    cannot="No hysteresis.",
-    shared_poles=False,
-    n_noise=2,
-    n_noise_poles=2,
-    effort=1.0,
-)
 
-OE = preset(
-    PredictionErrorEstimator,
-    "Output-error model, y = B / F u + e: the best free run of its orders.",
-    title="Output-error model (OE), linear",
-    can="Linear dynamics, identified on free runs.",
-    cannot="No hysteresis.",
-    shared_poles=False,
-    effort=0.8,
-)
+class BJEstimator(PredictionErrorEstimator):
+    """Box-Jenkins model, y = B / F u + C / D e; second order each by default."""
+
+    title = "Box–Jenkins model (BJ), linear"
+    can = "Linear dynamics with a separate noise model."
+    cannot = "No hysteresis."
+    effort = 1.0
+    shared_poles = False
+    n_noise = 2
+    n_noise_poles = 2
+
+
+class OEEstimator(PredictionErrorEstimator):
+    """Output-error model, y = B / F u + e: the best free run of its orders."""
+
+    title = "Output-error model (OE), linear"
+    can = "Linear dynamics, identified on free runs."
+    cannot = "No hysteresis."
+    effort = 0.8
+    shared_poles = False

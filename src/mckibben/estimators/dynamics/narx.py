@@ -42,7 +42,6 @@ from mckibben.estimators.core.estimator import Grid, SearchEstimator
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.presets import preset
 
 BOUND = 1.0
 """Largest distance of a stable model's output from the data's range, relative to the range."""
@@ -76,7 +75,6 @@ DEPENDENT = 1e-10
 """Share of a term that must remain after projection on the chosen ones."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class NarxEstimator(SearchEstimator):
     """NARX model: one-step least squares, then free-run refinement.
 
@@ -119,8 +117,8 @@ class NarxEstimator(SearchEstimator):
         "input_lags": (1, 2),
         "n_terms": (8, 16),
     }
-    needs_time: ClassVar[bool] = True
-    effort: ClassVar[float] = 0.6
+    needs_time = True
+    effort = 0.6
 
     mapping: Literal["polynomial", "network"] = "polynomial"
     output_lags: Annotated[int, Interval(ge=1, le=20)] = 2
@@ -257,32 +255,31 @@ class NarxEstimator(SearchEstimator):
         return [model.unpack(parameters) for parameters, _ in path]
 
 
-NARX_NETWORK = preset(
-    NarxEstimator,
-    "NARX model with one hidden layer: linear part first, units on top, then free-run refinement.",
-    title="NARX network",
-    can="Nonlinear dynamics by one hidden layer.",
-    cannot="Slow to fit; no inverse; arbitrary beyond the data.",
-    caution="a network without physics is arbitrary beyond them",
-    param_grid={"output_lags": (1, 2), "n_units": (3, 5)},
-    mapping="network",
-    effort=2.0,
-)
+class NarxNetworkEstimator(NarxEstimator):
+    """NARX model with one hidden layer: linear part first, units on top, then free-run refinement."""
 
-NARX_PLAY = preset(
-    NarxEstimator,
-    ("Polynomial NARX model with play operators among its regressors."),
-    title="Polynomial NARX model with play operators",
-    can=(
+    title = "NARX network"
+    can = "Nonlinear dynamics by one hidden layer."
+    cannot = "Slow to fit; no inverse; arbitrary beyond the data."
+    caution = "a network without physics is arbitrary beyond them"
+    param_grid: ClassVar[Grid] = {"output_lags": (1, 2), "n_units": (3, 5)}
+    effort = 2.0
+    mapping = "network"
+
+
+class NarxPlayEstimator(NarxEstimator):
+    """Polynomial NARX model with play operators among its regressors."""
+
+    title = "Polynomial NARX model with play operators"
+    can = (
         "Polynomial dynamics with play operators among the regressors: hysteresis and rate in one."
-    ),
-    cannot="No inverse.",
-    param_grid={"n_play": (3, 6), "n_terms": (8, 16)},
-    output_lags=1,
-    input_lags=1,
-    n_play=6,
-    effort=0.2,
-)
+    )
+    cannot = "No inverse."
+    param_grid: ClassVar[Grid] = {"n_play": (3, 6), "n_terms": (8, 16)}
+    effort = 0.2
+    output_lags = 1
+    input_lags = 1
+    n_play = 6
 
 
 def scaled(values: Array, scale: tuple[float, float]) -> Array:

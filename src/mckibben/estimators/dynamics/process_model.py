@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
-from annotated_types import Ge
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.presets import Preset, preset
 
 LEAST_DAMPING, MOST_DAMPING = 0.02, 100.0
 """Bounds of the damping, within those of the decay; see `damping_range`."""
@@ -24,7 +22,6 @@ LARGEST_GAIN = 3.0
 Structure = Literal["P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"]
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class ProcessModelEstimator(SeparableEstimator):
     """Process model by variable projection: gain and zero solved for, poles searched.
 
@@ -41,23 +38,17 @@ class ProcessModelEstimator(SeparableEstimator):
 
     purpose = "rate"
     cannot = "No hysteresis; no inverse."
-    needs_time: ClassVar[bool] = True
-    begins_measured: ClassVar[bool] = True
-
-    effort: ClassVar[float] = 0.3
+    needs_time = True
+    begins_measured = True
+    effort = 0.3
+    rises = False
+    searches_condensed = False
+    solves_offset = False  # it is one of the responses
+    fixed_fields = ("process-model.input_offset",)  # redundant with the output's
 
     structure: Structure = "P1"
-    nonnegative: bool = False
-    n_starts: Annotated[int, Ge(1)] = 16
-    n_refined: Annotated[int, Ge(1)] = 4
-
-    rises: ClassVar[bool] = False
-    searches_condensed: ClassVar[bool] = False
-
-    @property
-    def fixed_fields(self) -> tuple[str, ...]:
-        """The input's offset, which is redundant with the output's."""
-        return ("process-model.input_offset",)
+    nonnegative = False
+    n_starts = 16
 
     @property
     def n_times(self) -> int:
@@ -119,11 +110,6 @@ class ProcessModelEstimator(SeparableEstimator):
         known = responses - np.outer(left, responses[0])
         return np.column_stack([known, left * float(run.y[0])])
 
-    @property
-    def solves_offset(self) -> bool:
-        """False: the offset is one of the responses."""
-        return False
-
     def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
         """Return gain, zero and offset, and 1 for the share of the first output."""
         known, others = data.target - matrix[:, -1], matrix[:, 1:-1]
@@ -175,22 +161,51 @@ def damping_range(time: float, data: TrainingData) -> tuple[float, float]:
     return max(LEAST_DAMPING, 1.0 / slowest), min(MOST_DAMPING, most)
 
 
-def _structure(name: Structure, poles: str, **chosen: Any) -> Preset:
-    """Return the estimator of one structure."""
-    title = f"Process model: {poles} ({name})"
-    about = f"{poles.capitalize()}."
-    return preset(ProcessModelEstimator, about, title=title, structure=name, **chosen)
+class P1Estimator(ProcessModelEstimator):
+    """One lag."""
+
+    title = "Process model: one lag (P1)"
 
 
-P1 = _structure("P1", "one lag")
-P1Z = _structure("P1Z", "one lag and a zero")
-P2 = _structure("P2", "two lags")
-P2Z = _structure("P2Z", "two lags and a zero")
-P2U = _structure("P2U", "oscillating poles")
-P2UZ = _structure(
-    "P2UZ",
-    "oscillating poles and a zero",
-    can="Two poles that may oscillate, and a zero: best of the linear ones on coiled muscles.",
-    quick=True,
-)
-P3 = _structure("P3", "three lags")
+class P1ZEstimator(ProcessModelEstimator):
+    """One lag and a zero."""
+
+    title = "Process model: one lag and a zero (P1Z)"
+    structure = "P1Z"
+
+
+class P2Estimator(ProcessModelEstimator):
+    """Two lags."""
+
+    title = "Process model: two lags (P2)"
+    structure = "P2"
+
+
+class P2ZEstimator(ProcessModelEstimator):
+    """Two lags and a zero."""
+
+    title = "Process model: two lags and a zero (P2Z)"
+    structure = "P2Z"
+
+
+class P2UEstimator(ProcessModelEstimator):
+    """Oscillating poles."""
+
+    title = "Process model: oscillating poles (P2U)"
+    structure = "P2U"
+
+
+class P2UZEstimator(ProcessModelEstimator):
+    """Oscillating poles and a zero."""
+
+    title = "Process model: oscillating poles and a zero (P2UZ)"
+    can = "Two poles that may oscillate, and a zero: best of the linear ones on coiled muscles."
+    quick = True
+    structure = "P2UZ"
+
+
+class P3Estimator(ProcessModelEstimator):
+    """Three lags."""
+
+    title = "Process model: three lags (P3)"
+    structure = "P3"

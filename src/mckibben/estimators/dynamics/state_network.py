@@ -8,7 +8,7 @@ left to the descent, whose derivatives are exact.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Interval
@@ -143,7 +143,6 @@ def averaged(data: TrainingData) -> TrainingData:
     return replace(data, runs=(replace(first, outputs=mean),))
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class StateNetworkEstimator(SearchEstimator):
     """State-space network by Gauss-Newton on free runs, with a given number of states.
 
@@ -170,7 +169,7 @@ class StateNetworkEstimator(SearchEstimator):
     )
     cannot = "Slow to fit; no inverse; arbitrary beyond the data."
     caution = "a network without physics is arbitrary beyond them"
-    needs_time: ClassVar[bool] = True
+    needs_time = True
 
     input: str = "force"
     output: str = "displacement"
@@ -180,8 +179,8 @@ class StateNetworkEstimator(SearchEstimator):
     periodic: bool = False
     substeps: Annotated[int, Interval(ge=1, le=MOST_SUBSTEPS)] | None = None
 
-    made_for: ClassVar[tuple[str, str] | None] = ("force", "displacement")
-    effort: ClassVar[float] = 100.0
+    made_for = ("force", "displacement")
+    effort = 100.0
 
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
         step = data.timed()

@@ -8,8 +8,8 @@ the paper has a particle swarm.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar
+from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Interval
@@ -31,7 +31,6 @@ SMOOTHED = 3.0
 # -- with memory -----------------------------------------------------------------------------
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class ActivationMemoryEstimator(SeparableEstimator):
     """Activation pressure for any frequency.
 
@@ -62,14 +61,14 @@ class ActivationMemoryEstimator(SeparableEstimator):
         "beyond the recorded forces and contractions."
     )
     quick = True
-    effort: ClassVar[float] = 1.0
-    needs_time: ClassVar[bool] = True
-    made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
-    input_settings: ClassVar[tuple[str, ...]] = ("force",)
-    rises: ClassVar[bool] = False
+    effort = 1.0
+    needs_time = True
+    made_for = ("contraction", "pressure")
+    input_settings = ("force",)
+    rises = False
 
-    input: str = "contraction"
-    output: str = "pressure"
+    input = "contraction"
+    output = "pressure"
     force: str = "force"
     degree: Annotated[int, Interval(ge=1, le=9)] = 4
     force_degree: Annotated[int, Interval(ge=0, le=5)] = 3
@@ -77,7 +76,7 @@ class ActivationMemoryEstimator(SeparableEstimator):
     largest: Annotated[float, Interval(gt=0, le=0.5)] = 0.2
     time_constants: tuple[float, ...] = (0.1, 0.6, 4.0)
     rate_time_constant: Annotated[float, Ge(0)] | None = None
-    nonnegative: bool = False
+    nonnegative = False
 
     def unit(self, data: TrainingData) -> ActivationMemory:
         """Return the model with zero parameters."""
@@ -140,7 +139,6 @@ pressure, and no rate terms.
 """
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class ActivationPressureEstimator(SearchEstimator):
     """Activation pressure by characteristic points, and gamma and phi by least squares.
 
@@ -159,12 +157,12 @@ class ActivationPressureEstimator(SearchEstimator):
     purpose = "force"
     can = "Pressure for a contraction under a force, at one frequency of a sine; as in its paper."
     cannot = "No minor loops, one frequency: its hysteresis is a term in the rate."
-    needs_time: ClassVar[bool] = True
-    made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
-    input_settings: ClassVar[tuple[str, ...]] = ("force",)
+    needs_time = True
+    made_for = ("contraction", "pressure")
+    input_settings = ("force",)
 
-    input: str = "contraction"
-    output: str = "pressure"
+    input = "contraction"
+    output = "pressure"
     force: str = "force"
     rate_time_constant: Annotated[float, Ge(0)] | None = None
     frequency: Annotated[float, Ge(0)] | None = None

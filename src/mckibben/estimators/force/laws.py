@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Gt
@@ -20,7 +19,6 @@ from mckibben.blocks.force.laws import (
 )
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.presets import preset
 
 Law = Literal["bilinear", "petrovic", "minh", "schindele"]
 ORDERS: dict[Law, tuple[int, int]] = {
@@ -32,7 +30,6 @@ ORDERS: dict[Law, tuple[int, int]] = {
 """Orders in length of what multiplies pressure, and of what does not."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class PolynomialForceEstimator(SeparableEstimator):
     """Force linear in pressure and polynomial in length, by least squares.
 
@@ -50,14 +47,14 @@ class PolynomialForceEstimator(SeparableEstimator):
     purpose = "force"
     cannot = "No hysteresis."
     inverse_kind = "exact"
-    made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
-    rises: ClassVar[bool] = False
+    made_for = ("length", "force")
+    input_settings = ("pressure",)
+    rises = False
 
-    input: str = "length"
-    output: str = "force"
+    input = "length"
+    output = "force"
     pressure: str = "pressure"
-    nonnegative: bool = False
+    nonnegative = False
     law: Law = "bilinear"
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
@@ -96,7 +93,6 @@ def force_law(
     )
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class ChouHannafordEstimator(SeparableEstimator):
     """Chou and Hannaford's law: thread length, turns and a constant, by least squares.
 
@@ -112,12 +108,12 @@ class ChouHannafordEstimator(SeparableEstimator):
     cannot = "No end effects, no bladder, no hysteresis."
     inverse_kind = "exact"
     quick = True
-    made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
-    rises: ClassVar[bool] = False
+    made_for = ("length", "force")
+    input_settings = ("pressure",)
+    rises = False
 
-    input: str = "length"
-    output: str = "force"
+    input = "length"
+    output = "force"
     pressure: str = "pressure"
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
@@ -143,7 +139,6 @@ class ChouHannafordEstimator(SeparableEstimator):
         return ChouHannaford(thread, turns, offset, **self.channels(data))
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class TonduLopezEstimator(SeparableEstimator):
     """Tondu and Lopez's law with Kerscher's corrections: angle and kappa searched, mu solved for.
 
@@ -161,15 +156,15 @@ class TonduLopezEstimator(SeparableEstimator):
     purpose = "force"
     can = "Static force of a cylinder with end and pressure corrections."
     cannot = "No hysteresis; bends less than data often do."
-    made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
-    rises: ClassVar[bool] = False
-    searches_condensed: ClassVar[bool] = False
+    made_for = ("length", "force")
+    input_settings = ("pressure",)
+    rises = False
+    searches_condensed = False
 
-    input: str = "length"
-    output: str = "force"
+    input = "length"
+    output = "force"
     pressure: str = "pressure"
-    nonnegative: bool = False
+    nonnegative = False
     rest_length: Annotated[float, Gt(0)] | None = None
     diameter: Annotated[float, Gt(0)] = 10.0
 
@@ -201,32 +196,30 @@ class TonduLopezEstimator(SeparableEstimator):
         return self.law(theta, (float(linear[0]), float(linear[1])), offset, data)
 
 
-FORCE_BILINEAR = preset(
-    PolynomialForceEstimator,
-    "The bilinear-quadratic law.",
-    title="Bilinear force law",
-    can="Static force, linear in pressure, polynomial in length.",
-    law="bilinear",
-)
+class BilinearForceEstimator(PolynomialForceEstimator):
+    """The bilinear-quadratic law."""
 
-FORCE_MINH = preset(
-    PolynomialForceEstimator,
-    "Minh's law: cubic in length, with coefficients linear in pressure.",
-    title="Force law of Minh",
-    law="minh",
-)
+    title = "Bilinear force law"
+    can = "Static force, linear in pressure, polynomial in length."
 
-FORCE_PETROVIC = preset(
-    PolynomialForceEstimator,
-    "Petrovic's polynomial: quadratic in length with pressure, and without.",
-    title="Force law of Petrovic",
-    quick=True,
-    law="petrovic",
-)
 
-FORCE_SCHINDELE = preset(
-    PolynomialForceEstimator,
-    "Schindele and Aschemann's polynomials: cubic with pressure, of fourth order without.",
-    title="Force law of Schindele and Aschemann",
-    law="schindele",
-)
+class MinhForceEstimator(PolynomialForceEstimator):
+    """Minh's law: cubic in length, with coefficients linear in pressure."""
+
+    title = "Force law of Minh"
+    law = "minh"
+
+
+class PetrovicForceEstimator(PolynomialForceEstimator):
+    """Petrovic's polynomial: quadratic in length with pressure, and without."""
+
+    title = "Force law of Petrovic"
+    quick = True
+    law = "petrovic"
+
+
+class SchindeleForceEstimator(PolynomialForceEstimator):
+    """Schindele and Aschemann's polynomials: cubic with pressure, of fourth order without."""
+
+    title = "Force law of Schindele and Aschemann"
+    law = "schindele"

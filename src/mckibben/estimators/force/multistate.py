@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
-from typing import Annotated, ClassVar, Literal
+from typing import Literal
 
 import numpy as np
-from annotated_types import Ge, Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
@@ -25,7 +23,6 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.force.laws import ORDERS, Law, force_columns, force_law
 from mckibben.estimators.optimisers.multi_start import Choice
-from mckibben.presets import preset
 from mckibben.recording import Recording, listed
 
 Structure = Literal["eleven", "each-way", "eighteen"]
@@ -72,7 +69,6 @@ def extract_hysteresis(
     return extracted
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class MultistateEstimator(SeparableEstimator):
     """Multistate friction by bounded least squares from many starts, with exchange of elements.
 
@@ -94,25 +90,25 @@ class MultistateEstimator(SeparableEstimator):
 
     purpose = "force"
     inverse_kind = "exact"
-    needs_time: ClassVar[bool] = True
+    needs_time = True
+    made_for = ("length", "force")
+    input_settings = ("pressure",)
+    rises = False
+    searches_condensed = False
+    solves_nonnegative = True  # stiffnesses have lower bounds
+    # where elements begin to slip makes corners in the cost, which take many short steps
+    search_evaluations = 20
+    polish_evaluations = 20
 
-    input: str = "length"
-    output: str = "force"
-    initial: Literal["first_sample", "virgin"] = "virgin"
+    input = "length"
+    output = "force"
+    initial = "virgin"
     pressure: str = "pressure"
     static: Law | None = "bilinear"
     elements: Structure | tuple[Direction, ...] = "eleven"
-    nonnegative: bool = False
-    n_starts: Annotated[int, Ge(1)] = 64
-    n_refined: Annotated[int, Interval(ge=1)] = 8
-
-    made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
-    rises: ClassVar[bool] = False
-    searches_condensed: ClassVar[bool] = False
-    # where elements begin to slip makes corners in the cost, which take many short steps
-    search_evaluations: ClassVar[int] = 20
-    polish_evaluations: ClassVar[int] = 20
+    nonnegative = False
+    n_starts = 64
+    n_refined = 8
 
     @property
     def directions(self) -> tuple[Direction, ...]:
@@ -226,11 +222,6 @@ class MultistateEstimator(SeparableEstimator):
         return np.column_stack([forces, law])
 
     @property
-    def solves_nonnegative(self) -> bool:
-        """Whether linear parameters have lower bounds: the stiffnesses do."""
-        return True
-
-    @property
     def solves_offset(self) -> bool:
         """Whether there is a constant: that of the static law."""
         return self.static is not None
@@ -253,33 +244,31 @@ class MultistateEstimator(SeparableEstimator):
         return Parallel((law, friction))
 
 
-MULTISTATE = preset(
-    MultistateEstimator,
-    "Multistate friction with one shared element and one for each direction: eleven parameters.",
-    title="Multistate friction (three elements)",
-    can=(
+class EachWayMultistateEstimator(MultistateEstimator):
+    """Multistate friction with one shared element and one for each direction: eleven parameters."""
+
+    title = "Multistate friction (three elements)"
+    can = (
         "Friction force with elements for each direction of motion, rate included, integrated"
         " exactly."
-    ),
-    cannot="Needs a static force law; compensated by feedforward only.",
-    elements="each-way",
-    effort=3.0,
-)
+    )
+    cannot = "Needs a static force law; compensated by feedforward only."
+    effort = 3.0
+    elements = "each-way"
 
-MULTISTATE_11 = preset(
-    MultistateEstimator,
-    "Multistate friction by bounded least squares from many starts, and exchange of elements.",
-    title="Multistate friction with eleven parameters",
-    can="The paper's friction model of eleven parameters.",
-    cannot="Its structure is that of the paper's muscle; try multistate for others.",
-    elements="eleven",
-)
 
-MULTISTATE_18 = preset(
-    MultistateEstimator,
-    "Multistate friction with three elements in both directions: eighteen parameters.",
-    title="Multistate friction with eighteen parameters",
-    can="The paper's friction model of eighteen parameters.",
-    cannot="Its structure is that of the paper's muscle; many parameters are poorly determined.",
-    elements="eighteen",
-)
+class Multistate11Estimator(MultistateEstimator):
+    """Multistate friction by bounded least squares from many starts, and exchange of elements."""
+
+    title = "Multistate friction with eleven parameters"
+    can = "The paper's friction model of eleven parameters."
+    cannot = "Its structure is that of the paper's muscle; try multistate for others."
+
+
+class Multistate18Estimator(MultistateEstimator):
+    """Multistate friction with three elements in both directions: eighteen parameters."""
+
+    title = "Multistate friction with eighteen parameters"
+    can = "The paper's friction model of eighteen parameters."
+    cannot = "Its structure is that of the paper's muscle; many parameters are poorly determined."
+    elements = "eighteen"

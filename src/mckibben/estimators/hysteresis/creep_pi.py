@@ -8,11 +8,10 @@ while the input is held. Everything is identified jointly by variable projection
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
-from annotated_types import Ge, Interval
+from annotated_types import Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
@@ -40,7 +39,6 @@ MOST_CREEP = 0.3
 """Largest compliance of an element, relative to the immediate response."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class CreepPIEstimator(SeparableEstimator):
     """Prandtl-Ishlinskii memory on the logarithm of the input, an increasing map, and creep.
 
@@ -70,23 +68,18 @@ class CreepPIEstimator(SeparableEstimator):
     quick = True
     param_grid: ClassVar[Grid] = {"n_operators": (4, 6, 8), "n_creep": (1, 2, 3)}
     makes = ("logarithm pi polynomial creep",)
-    effort: ClassVar[float] = 1.0
-    needs_time: ClassVar[bool] = True
-    searches_condensed: ClassVar[bool] = False
+    effort = 1.0
+    needs_time = True
+    searches_condensed = False
+    search_evaluations = 30  # the valleys are flat
+    fixed_fields = ("pi.offset",)  # of the operators' sum, which starts at 0
 
     n_operators: Operators = 10
     n_creep: Annotated[int, Interval(ge=0, le=5)] = 2
     map_size: Annotated[int, Interval(ge=1, le=12)] = 6
     threshold_share: Annotated[float, Interval(gt=0, le=1)] = 1.0
-    n_starts: Annotated[int, Ge(1)] = 8
-    n_refined: Annotated[int, Ge(1)] = 3
-
-    search_evaluations: ClassVar[int] = 30  # the valleys are flat
-
-    @property
-    def fixed_fields(self) -> tuple[str, ...]:
-        """The offset of the operators' sum, which starts at 0."""
-        return ("pi.offset",)
+    n_starts = 8
+    n_refined = 3
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [weights, log addition, log time constants, compliances]."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, ClassVar, Literal
 
@@ -62,7 +61,6 @@ HEIGHTS = np.array([[-0.5], [0.0], [0.5]])
 """Initial heights of envelopes, relative to the largest expected."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class GPIEstimator(SeparableEstimator):
     """Generalized Prandtl-Ishlinskii model by variable projection from many starts.
 
@@ -96,7 +94,7 @@ class GPIEstimator(SeparableEstimator):
     quick = True
     param_grid: ClassVar[Grid] = {"n_operators": (5, 10, 15)}
     makes = ("gpi",)
-    effort: ClassVar[float] = 0.7
+    effort = 0.7
 
     n_operators: Annotated[int, Interval(ge=0, le=1000)] = 10
     envelope: Literal["tanh", "piecewise-linear"] = "tanh"

@@ -1,15 +1,15 @@
-"""Identification of loops on an increasing reversible polynomial: Bouc-Wen and Maxwell-slip.
+"""Identification of Bouc-Wen and Maxwell-slip loops on a reversible polynomial, and of Duhem's model.
 
-y = offset + sum_k a_k B_k(x) + sum_j w_j (s_j x - z_j) + sum_j v_j z_j, all of a, w and v at least
-0, where x runs from 0 to 1 over the input's range, the B_k are integrals of Bernstein polynomials,
-the z_j are what the loops are made of, and s_j bounds the slope of z_j by x. Whatever the data,
-such a sum rises with its input, so it has an inverse; and loops may lag (w) or lead (v).
+For the first two, y = offset + sum_k a_k B_k(x) + sum_j w_j (s_j x - z_j) + sum_j v_j z_j, all of a, w
+and v at least 0, where x runs from 0 to 1 over the input's range, the B_k are integrals of Bernstein
+polynomials, the z_j are what the loops are made of, and s_j bounds the slope of z_j by x. Whatever the
+data, such a sum rises with its input, so it has an inverse; and loops may lag (w) or lead (v).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Interval
@@ -17,15 +17,14 @@ from annotated_types import Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.differential import BoucWen, GeneralizedBoucWen
+from mckibben.blocks.hysteresis.differential import BoucWen, Duhem, GeneralizedBoucWen
 from mckibben.blocks.hysteresis.maxwell_slip import MaxwellSlip, slip_matrix
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.hysteresis.output_maps import PolynomialMap
+from mckibben.estimators.hysteresis.output_maps import PolynomialMap, centred
 from mckibben.estimators.hysteresis.pi import spread
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.presets import preset
 
 LEAST_SLOPE = 1e-4
 """Smallest share of the output's range for each piece of the polynomial."""
@@ -97,7 +96,6 @@ def relative(run: Run, data: TrainingData) -> Array:
     return (run.u - low) / (high - low)
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class BoucWenEstimator(SeparableEstimator):
     """Bouc-Wen model by variable projection: rate and shape searched, the rest solved for.
 
@@ -118,7 +116,7 @@ class BoucWenEstimator(SeparableEstimator):
     cannot = "Minor loops need not close; loops are symmetric but for the polynomial."
     quick = True
     makes = ("bouc-wen",)
-    effort: ClassVar[float] = 0.6
+    effort = 0.6
 
     degree: Degree = 5
     exponent: Literal[1, 2] | None = None
@@ -177,25 +175,22 @@ class BoucWenEstimator(SeparableEstimator):
         slopes = self.steepest(theta, unit)
         polynomial, weights = self.linear.weights(linear, offset, slopes)
         if self.asymmetric:  # whose polynomial is of -1 to 1 over the range, not of 0 to 1
-            turned = np.polynomial.Polynomial(polynomial)(np.polynomial.Polynomial([0.5, 0.5])).coef
-            polynomial = np.pad(turned, (0, polynomial.size - turned.size))
+            polynomial = centred(polynomial)
         return replace(unit, polynomial=vector(polynomial), weight=float(weights[0]))
 
 
-GBW = preset(
-    BoucWenEstimator,
-    "Generalized Bouc-Wen model: rate and shape are searched, the rest is solved for.",
-    title="Generalized Bouc–Wen model (GBW)",
-    can="Asymmetric saturating loops, with five shape parameters.",
-    cannot="Minor loops need not close; many starts are needed to identify it.",
-    quick=False,
-    makes=("generalized-bouc-wen",),
-    effort=1.3,
-    asymmetric=True,
-)
+class GBWEstimator(BoucWenEstimator):
+    """Generalized Bouc-Wen model: rate and shape are searched, the rest is solved for."""
+
+    title = "Generalized Bouc–Wen model (GBW)"
+    can = "Asymmetric saturating loops, with five shape parameters."
+    cannot = "Minor loops need not close; many starts are needed to identify it."
+    quick = False
+    makes = ("generalized-bouc-wen",)
+    effort = 1.3
+    asymmetric = True
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class MaxwellSlipEstimator(SeparableEstimator):
     """Maxwell-slip model by least squares; ratios of its directions, if any, are searched.
 
@@ -209,9 +204,13 @@ class MaxwellSlipEstimator(SeparableEstimator):
         Whether rising and falling differ in stiffness and in slip, by ratios that are searched.
     """
 
+    title = "Maxwell-slip model"
     purpose = "memory"
     inverse_kind = "solved"
-    effort: ClassVar[float] = 0.02
+    can = "Slipping springs in parallel with a reversible curve; symmetric loops."
+    cannot = "Asymmetry only by the curve."
+    quick = True
+    effort = 0.02
 
     degree: Degree = 5
     n_operators: Operators = 8
@@ -276,22 +275,70 @@ class MaxwellSlipEstimator(SeparableEstimator):
         return replace(springs, weights=vector(weights), polynomial=vector(polynomial))
 
 
-MAXWELL_SLIP = preset(
-    MaxwellSlipEstimator,
-    "Maxwell-slip model by least squares.",
-    title="Maxwell-slip model",
-    can="Slipping springs in parallel with a reversible curve; symmetric loops.",
-    cannot="Asymmetry only by the curve.",
-    quick=True,
-    asymmetric=False,
-)
+class MMSEstimator(MaxwellSlipEstimator):
+    """Modified Maxwell-slip model: the two ratios of its directions are searched."""
 
-MMS = preset(
-    MaxwellSlipEstimator,
-    "Modified Maxwell-slip model: the two ratios of its directions are searched.",
-    title="Modified Maxwell-slip model (MMS)",
-    can="Springs that slip, with different stiffness and limit for rising and falling input.",
-    cannot="One asymmetry for all springs.",
-    asymmetric=True,
-    effort=0.5,
-)
+    title = "Modified Maxwell-slip model (MMS)"
+    can = "Springs that slip, with different stiffness and limit for rising and falling input."
+    cannot = "One asymmetry for all springs."
+    quick = False
+    effort = 0.5
+    asymmetric = True
+
+
+class DuhemEstimator(SeparableEstimator):
+    """Duhem model by variable projection: its output is linear in both polynomials.
+
+    Parameters
+    ----------
+    degree : int
+        Of the curve that the output tends to.
+    slope_degree : int
+        Of the slope right after a reversal.
+    """
+
+    title = "Duhem model"
+    purpose = "memory"
+    can = "Loops that tend to a curve, with polynomial slopes; in closed form."
+    cannot = (
+        "Minor loops are not congruent and need not close; the inverse exists only where the "
+        "slopes stay positive."
+    )
+    makes = ("duhem",)
+    effort = 1.1
+
+    nonnegative = False
+    degree: Annotated[int, Interval(ge=1, le=9)] = 4
+    slope_degree: Annotated[int, Interval(ge=0, le=9)] = 3
+
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return bounds of [log alpha], alpha by half the input range."""
+        return np.array([np.log(0.1)]), np.array([np.log(100.0)])
+
+    def guesses(self, data: TrainingData) -> list[Array]:
+        """Return a few rates."""
+        return [np.array([np.log(alpha)]) for alpha in (0.5, 1.5, 4.0, 12.0)]
+
+    def unit(self, theta: Array, data: TrainingData) -> Duhem:
+        """Return the model with zero polynomials."""
+        low, high = data.input_range
+        half = 0.5 * (high - low)
+        return Duhem(
+            (0.0,) * (self.degree + 1),
+            (0.0,) * (self.slope_degree + 1),
+            float(np.exp(theta[0])),
+            low + half,
+            half,
+            **self.common_fields(data),
+        )
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the output per coefficient, without the constant, over the run."""
+        unit = self.unit(theta, data)
+        n = unit.n_parameters - 1
+        alone = np.column_stack([np.eye(n)[1:], np.full(n - 1, unit.alpha)])
+        return np.column_stack([unit.unpack(row).simulate(run.u) for row in alone])
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
+        target = (offset, *linear[: self.degree].tolist())
+        return replace(self.unit(theta, data), target=target, slope=vector(linear[self.degree :]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -14,13 +13,12 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.estimator import Operators
+from mckibben.estimators.core.estimator import InverseKind, Operators, Purpose
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import MAPS, PolynomialMap
 from mckibben.estimators.hysteresis.pi import play_operators, spread
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.presets import preset
 
 LEAST_PIECE = 1e-6
 """Smallest share of the output's range for a piece of an increasing map."""
@@ -45,7 +43,6 @@ input.
 """
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
 class MPIEstimator(SeparableEstimator):
     """Modified Prandtl-Ishlinskii model: operators and a memoryless map, by variable projection.
 
@@ -78,7 +75,7 @@ class MPIEstimator(SeparableEstimator):
     """
 
     title = "Modified Prandtl–Ishlinskii model (MPI)"
-    purpose = "memory"
+    purpose: ClassVar[Purpose] = "memory"
     can = (
         "Prandtl-Ishlinskii memory behind an increasing map: asymmetric by saturation; small "
         "and quick."
@@ -87,10 +84,14 @@ class MPIEstimator(SeparableEstimator):
         "Loops that are narrow at one end and wide at the other for other reasons than the "
         "map; no rate, no creep."
     )
-    inverse_kind = "exact"
+    inverse_kind: ClassVar[InverseKind] = "exact"
     quick = True
     makes = ("pi polynomial",)
-    effort: ClassVar[float] = 0.2
+    effort = 0.2
+    # operators are computed once a fit, so there is nothing to gain from fewer inputs
+    searches_condensed = False
+    # of the operators' sum, which starts at the output's lowest value
+    fixed_fields = ("pi.offset", "rate-dependent-pi.offset")
 
     n_operators: Operators = 10
     thresholds: Literal["spread", "identified"] = "spread"
@@ -98,16 +99,8 @@ class MPIEstimator(SeparableEstimator):
     map_size: Annotated[int, Interval(ge=1, le=50)] = 5
     rate_dependent: bool = False
     rate_time_constant: Annotated[float, Ge(0)] | None = None
-    n_starts: Annotated[int, Ge(1)] = 8
-    n_refined: Annotated[int, Ge(1)] = 3
-
-    # Operators are computed once a fit, so there is nothing to gain from fewer inputs.
-    searches_condensed: ClassVar[bool] = False
-
-    @property
-    def fixed_fields(self) -> tuple[str, ...]:
-        """The offset of the operators' sum, which starts at the output's lowest value."""
-        return ("pi.offset", "rate-dependent-pi.offset")
+    n_starts = 8
+    n_refined = 3
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         if not self.rate_dependent:
@@ -307,21 +300,20 @@ class MPIEstimator(SeparableEstimator):
         return RateDependentPI(thresholds, by_rate, static, offset, tau, **fields)
 
 
-RDPI = preset(
-    MPIEstimator,
-    "Rate-dependent modified Prandtl-Ishlinskii model by variable projection.",
-    title="Rate-dependent Prandtl–Ishlinskii model (RDPI)",
-    purpose="rate",
-    can="Prandtl-Ishlinskii memory with weights that follow the rate.",
-    cannot=(
+class RDPIEstimator(MPIEstimator):
+    """Rate-dependent modified Prandtl-Ishlinskii model by variable projection."""
+
+    title = "Rate-dependent Prandtl–Ishlinskii model (RDPI)"
+    purpose = "rate"
+    can = "Prandtl-Ishlinskii memory with weights that follow the rate."
+    cannot = (
         "Extrapolates badly beyond the recorded rates; its inverse oscillates where weights by rate "
         "are strongly negative."
-    ),
-    caution="weights that follow the rate are arbitrary at other rates",
-    inverse_kind="solved",
-    quick=False,
-    makes=("rate-dependent-pi polynomial",),
-    needs_time=True,
-    effort=0.9,
-    rate_dependent=True,
-)
+    )
+    caution = "weights that follow the rate are arbitrary at other rates"
+    inverse_kind = "solved"
+    quick = False
+    makes = ("rate-dependent-pi polynomial",)
+    needs_time = True
+    effort = 0.9
+    rate_dependent = True

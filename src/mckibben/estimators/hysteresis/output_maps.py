@@ -38,9 +38,7 @@ class PolynomialMap:
 
     def centred(self, weights: Array) -> Array:
         """Return the weighted sum of the pieces in powers of an argument from -1 to 1."""
-        polynomial = np.polynomial.Polynomial(self.powers(weights))
-        found = polynomial(np.polynomial.Polynomial([0.5, 0.5])).coef
-        return np.pad(found, (0, self.size + 1 - found.size))
+        return centred(self.powers(weights))
 
     def build(
         self, weights: Array, offset: float, low: float, high: float, channel: Channel
@@ -64,6 +62,12 @@ class FreePolynomialMap(PolynomialMap):
 
     def centred(self, weights: Array) -> Array:
         return np.append(0.0, weights)
+
+
+def centred(powers: Array) -> Array:
+    """Return a polynomial of an argument from 0 to 1 in powers of one from -1 to 1."""
+    found = np.polynomial.Polynomial(powers)(np.polynomial.Polynomial([0.5, 0.5])).coef
+    return np.pad(found, (0, powers.size - found.size))
 
 
 @lru_cache

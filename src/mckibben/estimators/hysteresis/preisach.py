@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -13,17 +12,15 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.preisach import KrasnoselskiiPokrovskii, Preisach
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.estimator import Grid
+from mckibben.estimators.core.estimator import Grid, InverseKind
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.presets import preset
 
 LEAST_REVERSIBLE = 1e-4
 """Smallest share of the output's range for each operator on the diagonal."""
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
-class GridEstimator(SeparableEstimator):
-    """An estimator of weights on a triangular grid of thresholds, by (non-negative) least squares.
+class PreisachEstimator(SeparableEstimator):
+    """Preisach model by (non-negative) least squares on its cells, a triangular grid of thresholds.
 
     Parameters
     ----------
@@ -34,13 +31,16 @@ class GridEstimator(SeparableEstimator):
         Intervals that the input range is cut into.
     """
 
+    title = "Preisach model"
     purpose = "memory"
-    param_grid: ClassVar[Grid] = {"n_levels": (6, 10, 15)}
+    can = "Loops of any shape whose minor loops are congruent."
     cannot = (
         "Weights that no reversal has excited are not determined; constant beyond the largest "
         "recorded input."
     )
-    effort: ClassVar[float] = 0.15
+    inverse_kind: ClassVar[InverseKind] = "exact"
+    param_grid: ClassVar[Grid] = {"n_levels": (6, 10, 15)}
+    effort = 0.15
 
     relays: Literal["sudden", "gradual"] = "sudden"
     n_levels: Annotated[int, Interval(ge=1, le=60)] = 10
@@ -74,21 +74,11 @@ class GridEstimator(SeparableEstimator):
         return self.grid(data).unpack([*linear, offset])
 
 
-KP = preset(
-    GridEstimator,
-    "Krasnosel'skii-Pokrovskii model by (non-negative) least squares on its operators.",
-    title="Krasnosel'skii–Pokrovskii model (KP)",
-    can="Loops of any shape whose minor loops are congruent, with ridges of finite slope.",
-    inverse_kind="solved",
-    quick=True,
-    relays="gradual",
-)
+class KPEstimator(PreisachEstimator):
+    """Krasnosel'skii-Pokrovskii model by (non-negative) least squares on its operators."""
 
-PREISACH = preset(
-    GridEstimator,
-    "Preisach model by (non-negative) least squares on its cells.",
-    title="Preisach model",
-    can="Loops of any shape whose minor loops are congruent.",
-    inverse_kind="exact",
-    relays="sudden",
-)
+    title = "Krasnosel'skii–Pokrovskii model (KP)"
+    can = "Loops of any shape whose minor loops are congruent, with ridges of finite slope."
+    inverse_kind = "solved"
+    quick = True
+    relays = "gradual"

@@ -33,7 +33,6 @@ import pandas as pd
 
 from mckibben import compare
 from mckibben.blocks.free_run import run_free
-from mckibben.channels import Channels
 from mckibben.errors import MckibbenError
 from mckibben.measured.scoring import START, Part, entries, parts_of
 from mckibben.measured.sets import Set, chosen_in
@@ -91,7 +90,7 @@ class Result:
 def data_of(part: Part) -> Data:
     """Return recordings as peers are given them, scaled as they are on the training side."""
     train, channels = part.split.train, part.channels
-    names = inputs_of([*train, *part.split.test], channels)
+    names = [*channels.given([*train, *part.split.test])]
     inputs = np.vstack([one.matrix(names) for one in train])
     outputs = np.vstack([one.matrix(channels.outputs) for one in train])
     middle, spread = inputs.mean(axis=0), inputs.std(axis=0)
@@ -108,14 +107,6 @@ def data_of(part: Part) -> Data:
     runs = [scaled(one) for one in train]
     fitted, held = held_back(runs)
     return Data(runs, fitted, held, [trial(one) for one in part.split.test], offset, scale)
-
-
-def inputs_of(recordings: Sequence[Recording], channels: Channels) -> list[str]:
-    """Return what peers are given: what any of our models is, which of a force is the pressure too."""
-    given = [*channels.inputs, *channels.scheduled(recordings)]
-    if "force" in channels.outputs and all("pressure" in one for one in recordings):
-        given.append("pressure")
-    return list(dict.fromkeys(given))
 
 
 def held_back(runs: Sequence[Run]) -> tuple[list[Run], list[Trial]]:

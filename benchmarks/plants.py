@@ -69,7 +69,7 @@ class Found:
 def arranged(name: str, plant: Plant) -> Channels | None:
     """Return the channels on which a model has a place, those first that tell it most."""
     given, loads, moved = plant.bench.pressures, plant.bench.loads, plant.bench.outputs
-    told = (given, moved, loads or None), (given + loads, moved, None), (given, moved, None)
+    told = (given, moved, loads), (given + loads, moved), (given, moved, (), loads)
     ways = (Channels(*one) for one in told)
     return next(
         (way for way in ways if not objections({name: Candidate(name)}, plant.train, way)), None
@@ -79,8 +79,7 @@ def arranged(name: str, plant: Plant) -> Channels | None:
 def begun(name: str, channels: Channels, seed: int) -> Estimator:
     """Return a model's estimator on channels."""
     found = registry.load("estimators", name)
-    told = (channels.inputs, channels.outputs, channels.scheduling)
-    return found(**found.channel_settings(*told), seed=seed)
+    return found(**found.channel_settings(channels), seed=seed)
 
 
 def tried(name: str, channels: Channels, plant: Plant, seed: int) -> Found:

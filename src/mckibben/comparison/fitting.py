@@ -121,7 +121,7 @@ class Candidate:
 
     def estimator(self, channels: Channels) -> Estimator:
         """Return the estimator of the channels of a comparison."""
-        named = self.made.channel_settings(channels.inputs, channels.outputs, channels.scheduling)
+        named = self.made.channel_settings(channels)
         own = {} if isinstance(self.model, str) else self.model.get_params()
         return self.made(**own | named | dict(self.settings))
 
@@ -215,7 +215,7 @@ def _fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:
         outputs=outputs,
         seconds=seconds,
         step_ns=_step_cost(block, split.train[0]),
-        memory=memory_test(block, split.test, outputs[len(split.train) :], channels.pairs()),
+        memory=memory_test(block, split.test, outputs[len(split.train) :], channels.pairs),
         diagnostics=diagnostics,
         caution=estimator.caution,
     )

@@ -258,8 +258,10 @@ class Leaderboard(DrawsItself):
         Where recordings to fit to and to test on are the same data, which the user insisted on.
     loads : tuple of str
         Further input channels of models, which are never commanded.
-    ignored : tuple of str
-        Loads that vary in the recordings and that no model is given.
+    offered : tuple of str
+        Further input channels of the models that can take them.
+    unused : tuple of str
+        Channels that vary in the recordings and that no model is given.
     outside : mapping of str to float
         Channel to the share of the samples tested on that are outside of its range in training.
     parts : tuple of tuple of Span
@@ -284,7 +286,8 @@ class Leaderboard(DrawsItself):
     constant: Row | None = None
     shared: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
-    ignored: tuple[str, ...] = ()
+    offered: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
     outside: Mapping[str, float] = field(default_factory=dict)
     parts: tuple[tuple[Span, ...], ...] = ()
 
@@ -378,7 +381,8 @@ class Leaderboard(DrawsItself):
             "pending": list(self.pending),
             "notes": list(self.notes),
             "shared": list(self.shared),
-            "ignored": list(self.ignored),
+            "offered": list(self.offered),
+            "unused": list(self.unused),
             "outside": dict(self.outside),
             "rows": [row.to_dict() for row in self.ranking],
         }

@@ -60,7 +60,7 @@ def spans_of(part: Part, recordings: Sequence[Recording]) -> tuple[Span, ...]:
 
 def _by_level(recordings: Sequence[Recording], channels: Channels) -> list[int]:
     """Return the indices of recordings, in the order of the channels that each of them holds."""
-    names = [name for name in channels.known(recordings) if all(name in r for r in recordings)]
-    held = [name for name in names if len(recordings) > 1 and held_at_levels(recordings, name)]
+    names = channels.given(recordings) if len(recordings) > 1 else ()
+    held = [name for name in names if held_at_levels(recordings, name)]
     levels = [tuple(float(f"{r[name].mean():.3g}") for name in held) for r in recordings]
     return sorted(range(len(recordings)), key=lambda place: levels[place])

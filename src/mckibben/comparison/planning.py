@@ -67,7 +67,7 @@ class Plan:
 
 def plan_of(
     train: Recording | Sequence[Recording],
-    test: Recording | Sequence[Recording],
+    test: Recording | Sequence[Recording] = (),
     *,
     inputs: Names = None,
     outputs: Names = None,
@@ -93,7 +93,7 @@ def plan_of(
     notes: tuple[str, ...] = ()
     shared = check_shared(
         {"fit": recordings, "validate": checks, "test": tests},
-        [*channels.inputs, *channels.scheduled(recordings)],
+        [*channels.inputs, *channels.scheduling],
         channels.outputs,
         allow=allow_shared,
     )
@@ -118,7 +118,7 @@ def plan_of(
     made |= {name: declared(name) for name in left_out}
     given = settings_of_all(made, settings) if settings else {}
     # that a model is not given the load is no reason against it
-    unloaded = replace(channels, scheduling=None)
+    unloaded = replace(channels, scheduling=(), offered=channels.further)
     refused = objections(items, split.train, channels)
     refused = objections({name: items[name] for name in refused}, split.train, unloaded)
     items = {
@@ -138,9 +138,10 @@ def plan_of(
         left_out=left_out,
         notes=(*notes, *reading_notes(every)),
         shared=shared,
-        loads=channels.scheduled(every),
-        ignored=channels.ignored(every),
-        outside=_outside(split, channels.known(every)),
+        loads=channels.scheduling,
+        offered=channels.offered,
+        unused=channels.unused,
+        outside=_outside(split, (*channels.inputs, *channels.further)),
         parts=tuple(spans_of(part, checks or split.train) for part in parts),
     )
     return Plan(Data(split, parts, channels, tuple(checks)), items, empty, refused)
@@ -221,11 +222,10 @@ def objections(
     items: Mapping[str, Candidate], recordings: Sequence[Recording], channels: Channels
 ) -> dict[str, str]:
     """Return which models do not apply to recordings, and why."""
-    asked = recordings, channels.inputs, channels.outputs, channels.scheduling
     found: dict[str, str] = {}
     for name, item in items.items():
         try:
-            reason = item.made.objection(*asked) or _timeless(item.made, recordings)
+            reason = item.made.objection(recordings, channels) or _timeless(item.made, recordings)
         except ModelError as error:  # a plug-in that is broken is not the end of all others
             reason = str(error)
         if reason is not None:

@@ -81,7 +81,7 @@ def held_out(recordings: Sequence[Recording], channels: Channels) -> Split:
         if len(groups) > 1:
             tested = [place in groups[-1] for place in range(len(recordings))]
             return _parted(recordings, tested, f"the last run at each {channels.inputs[0]}")
-    given = channels.inputs[:1] if channels.single else channels.scheduled(recordings)
+    given = channels.inputs[:1] if channels.single else channels.scheduling
     for name in given if len(recordings) > 1 else ():
         means = [float(f"{recording[name].mean():.3g}") for recording in recordings]
         unseen = sorted(set(means))[1:-1][::EVERY]

@@ -82,7 +82,8 @@ def refitted(
     whole = [log.select(names) for log in logs]
     older_runs = [one.select(names) for one in older if all(name in one for name in names)]
     driving = [name for name in inputs if name not in old.scheduling]
-    settings = {"seed": seed} | estimator.channel_settings(driving, outputs, old.scheduling)
+    channels = Channels(tuple(driving), tuple(outputs), tuple(old.scheduling))
+    settings = {"seed": seed} | estimator.channel_settings(channels)
     for part in old.parts if isinstance(old, Series) else (old,):
         thresholds = getattr(part, "thresholds", None)
         if thresholds is not None and "n_operators" in {one.name for one in fields(estimator)}:
@@ -91,7 +92,7 @@ def refitted(
     def missed(block: Block, log: Recording) -> Array:
         return np.asarray(run_free(block, log, outputs) - log.matrix(outputs))
 
-    parts = parts_of(whole, Channels(tuple(driving), tuple(outputs), tuple(old.scheduling) or None))
+    parts = parts_of(whole, channels)
     if not parts:
         return "The log is too short to leave parts of it out."
     kept = tuple(np.zeros(len(one), dtype=bool) for one in older_runs)

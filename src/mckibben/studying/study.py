@@ -183,8 +183,8 @@ def study(
         )
     looped, loop = channels.inputs, None
     if len(channels.inputs) == len(channels.outputs) == 1:
-        looped = (moved_by([*recordings, *tests], looped[0], list(recordings[0].channels)),)
-        others = {*channels.inputs, *(channels.scheduling or ())} - set(looped)
+        looped = (moved_by([*recordings, *tests], looped[0]),)
+        others = {*channels.inputs, *channels.scheduling} - set(looped)
         with suppress(DataError):  # of a load that follows the input, which is a data gap
             loop = characterize(
                 [*recordings, *tests], looped[0], channels.outputs[0], scheduling=sorted(others)
@@ -196,7 +196,7 @@ def study(
         leaderboard=plan.board(),
         predictions={},
         inverse=None,
-        load=next(iter(channels.scheduling or ()), None),
+        load=choices.get("load"),
         notes=plan.empty.notes,
         data_gaps=data_gaps(recordings, looped, channels.outputs, tests=tests),
         review=reviewed,

@@ -33,8 +33,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.free_run import run_free
 from mckibben.channels import Channels
-from mckibben.comparison.fitting import Candidate
-from mckibben.comparison.planning import objections
+from mckibben.comparison.planning import Candidate, objections
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.numerals import numeral
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -104,7 +105,7 @@ def test_what_is_held_at_levels_schedules_whatever_its_name(
     runs = [
         run(*names).with_channels(**{held: level + noise}) for level in (10.0, 11.0, 12.0, 13.0)
     ]
-    assert channels_of(runs) == Channels((drive,), (pull,), (held,))
+    assert channels_of(runs) == Channels((drive,), (pull,), (held,), held=(held,))
 
 
 def test_numbered_commands_drive_together() -> None:
@@ -170,9 +171,12 @@ def test_what_is_held_in_every_recording_schedules_and_pressure_drives(
     for level in (10.0, 14.0, 20.0):
         one = run("pressure", place, "force")
         runs.append(one.with_channels(**{place: level + 0.01 * rng.standard_normal(len(one))}))
-    assert channels_of(runs, inputs, outputs) == Channels(("pressure",), ("force",), (place,))
+    assert channels_of(runs, inputs, outputs) == Channels(
+        ("pressure",), ("force",), (place,), held=(place,)
+    )
     law = Channels((place,), ("force",), (), ("pressure",))
-    assert channels_of(runs, place, "force") == law
+    at_levels = replace(law, held=(place,))
+    assert channels_of(runs, place, "force") == at_levels
     moving = [run("pressure", place, "force")]
     assert channels_of(moving, None, "force") == law
 

@@ -79,6 +79,8 @@ class Channels:
         Further inputs for the models that can take them: loads, and the pressure of force laws.
     unused : tuple of str
         Channels that vary, and that no model is given.
+    held : tuple of str
+        Inputs of any kind that differ between recordings, but are nearly constant in each.
     """
 
     inputs: tuple[str, ...]
@@ -86,6 +88,7 @@ class Channels:
     scheduling: tuple[str, ...] = ()
     offered: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
 
     @property
     def single(self) -> bool:
@@ -96,6 +99,11 @@ class Channels:
     def further(self) -> tuple[str, ...]:
         """All inputs that do not drive."""
         return (*self.scheduling, *self.offered)
+
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """Inputs, and outputs."""
+        return (*self.inputs, *self.outputs)
 
     def given(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
         """Return the inputs of any model that all recordings have."""
@@ -188,9 +196,14 @@ def channels_of(
         scheduled, found = (*scheduled, *found), ()
     _check(recordings, (*given, *wanted, *scheduled), asked)
     used = {*given, *wanted, *scheduled, *found}
-    unused = (name for name in _names(recordings) if name not in used)
+    unused = [name for name in _names(recordings) if name not in used]
     return Channels(
-        given, wanted, scheduled, found, tuple(n for n in unused if _differs(recordings, n))
+        given,
+        wanted,
+        scheduled,
+        found,
+        tuple(name for name in unused if _differs(recordings, name)),
+        tuple(n for n in (*given, *scheduled, *found) if held_at_levels(recordings, n)),
     )
 
 

@@ -70,13 +70,13 @@ def hung(load: float, seed: int = 0) -> Recording:
 
 def test_a_force_beside_other_inputs_is_given_and_never_commanded() -> None:
     runs = [hung(10.0), hung(20.0, 1)]
-    told = Channels(("pressure",), ("displacement",), ("force",))
+    told = Channels(("pressure",), ("displacement",), ("force",), held=("force",))
     assert channels_of(runs, ["pressure", "force"], None, None) == told
     found = channels_of(runs, "force")
     assert (found.inputs, found.outputs, found.unused) == (("force",), told.outputs, told.inputs)
     both = ["pressure", "force"]
     plan = plan_of(runs, [], inputs=both, models=["balance"], settings=None, seed=0)
-    assert plan.board().inputs == ("pressure",)
+    assert plan.empty.inputs == ("pressure",)
     with pytest.raises(DataError, match="force"):
         plan_of([*runs, hung(5.0).select(["pressure", "displacement"])], inputs=both)
 
@@ -112,11 +112,12 @@ def test_of_runs_that_each_hold_the_input_the_last_at_each_level_are_held_out() 
         channels = {"length": np.full(50, length), "force": np.linspace(0, length, 50)}
         return Recording(channels, 0.05, {"length": "mm", "force": "N"})
 
-    channels = Channels(("length",), ("force",))
-    twice = held_out([held(length) for length in (100.0, 90.0, 80.0, 100.0, 80.0, 90.0)], channels)
+    runs = [held(length) for length in (100.0, 90.0, 80.0, 100.0, 80.0, 90.0)]
+    channels = channels_of(runs, "length", "force")
+    twice = held_out(runs, channels)
     assert [run["length"][0] for run in twice.train] == [100.0, 90.0, 80.0]
     assert [run["length"][0] for run in twice.test] == [100.0, 80.0, 90.0]
-    once = held_out([held(length) for length in (100.0, 90.0, 80.0)], channels)
+    once = held_out(runs[:3], channels)
     assert [run["length"][0] for run in once.test] == [90.0]
 
 

@@ -14,8 +14,7 @@ from mckibben.app.jobs import Tell
 from mckibben.app.workspace import Workspace
 from mckibben.channels import Channels, channels_of
 from mckibben.comparison.choosing import recommended
-from mckibben.comparison.fitting import Candidate
-from mckibben.comparison.planning import objections, plan_of
+from mckibben.comparison.planning import Candidate, objections, plan_of
 from mckibben.comparison.ranking import ranked
 from mckibben.comparison.splits import split_of, tested_from
 from mckibben.errors import DataError, ModelError
@@ -161,9 +160,7 @@ def fit(
         inputs=inputs, outputs=outputs, load=load or None, models=[model],
         seed=seed, allow_shared=allow_shared,
     )  # fmt: skip
-    *_, last = ranked(
-        plan, jobs=1, kept=plan.kept(None), watch=lambda _, share, cost: tell(share, cost)
-    )
+    *_, last = ranked(plan, jobs=1, watch=lambda _, share, cost: tell(share, cost))
     board, (row,) = last.board, last.board.rows
     if row.reason is not None or row.block is None:
         raise ModelError((row.reason or "it gave no model: try other settings").rstrip("."))

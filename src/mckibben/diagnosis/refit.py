@@ -15,8 +15,8 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.free_run import run_free
 from mckibben.blocks.inverse import Inverse
-from mckibben.channels import Channels
-from mckibben.comparison.parts import parts_of
+from mckibben.channels import channels_of
+from mckibben.comparison.splits import parts_of
 from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.estimators.catalogue import declared
 from mckibben.estimators.core.leaving_out import held_out
@@ -82,7 +82,7 @@ def refitted(
     whole = [log.select(names) for log in logs]
     older_runs = [one.select(names) for one in older if all(name in one for name in names)]
     driving = [name for name in inputs if name not in old.scheduling]
-    channels = Channels(tuple(driving), tuple(outputs), tuple(old.scheduling))
+    channels = channels_of(whole, driving, outputs, old.scheduling)
     settings = {"seed": seed} | estimator.channel_settings(channels)
     for part in old.parts if isinstance(old, Series) else (old,):
         thresholds = getattr(part, "thresholds", None)

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from mckibben.arrays import Array
     from mckibben.blocks.fields import Channel
     from mckibben.comparison.choosing import Against
-    from mckibben.comparison.doubts import Span
     from mckibben.comparison.leaderboard import Leaderboard
+    from mckibben.comparison.splits import Span
     from mckibben.control import Learned
     from mckibben.diagnosis.bands import Calibration
     from mckibben.diagnosis.causes import Cause

@@ -26,8 +26,9 @@ from tests.plants import PLANTS
 
 import mckibben
 from mckibben import Recording
-from mckibben.comparison.fitting import FitResult, Task, fit, row_of
+from mckibben.comparison.fitting import FitResult, Task, fit
 from mckibben.comparison.planning import Plan, plan_of
+from mckibben.comparison.ranking import constant_of, held, row_of, test_errors
 from mckibben.diagnosis.bands import SHARES, TestedBand, tested_band
 from mckibben.errors import MckibbenError
 from regret import RIGS, on_rig
@@ -89,9 +90,12 @@ def tested(plan: Plan, found: FitResult, rows: Sequence[int]) -> tuple[TestedBan
     )
     outputs = [*found.outputs[:n], *(found.outputs[n + k] for k in rows)]
     assert found.block is not None
-    held, data = plan.data.held(found.predictions, found.block), replace(plan.data, split=some)
-    banded = tested_band(found.block, held, outputs, some)
-    errors = data.test_errors(outputs)
+    predictions, data = (
+        held(plan.data, found.predictions, found.block),
+        replace(plan.data, split=some),
+    )
+    banded = tested_band(found.block, predictions, outputs, some)
+    errors = test_errors(data, outputs)
     return banded and (banded[1], float(np.sqrt((errors**2).mean())))
 
 
@@ -109,9 +113,9 @@ def of_task(
         if label not in plan.refused
     }
     sound = {label: found for label, found in fits.items() if found.reason is None}
+    constant = constant_of(plan.data).squares
     orders = {
-        label: row_of(plan.data, label, found, plan.constant.squares, 0).order
-        for label, found in sound.items()
+        label: row_of(plan.data, label, found, constant, 0).order for label, found in sound.items()
     }
     ranked = sorted(orders, key=orders.__getitem__)
     result = []

@@ -30,10 +30,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from mckibben.blocks.free_run import run_free
 
 from mckibben import compare
-from mckibben.channels import Channels
 from mckibben.errors import MckibbenError
 from mckibben.measured.scoring import START, Part, entries, parts_of
 from mckibben.measured.sets import Set, chosen_in
@@ -91,7 +89,7 @@ class Result:
 def data_of(part: Part) -> Data:
     """Return recordings as peers are given them, scaled as they are on the training side."""
     train, channels = part.split.train, part.channels
-    names = inputs_of([*train, *part.split.test], channels)
+    names = [*channels.given([*train, *part.split.test])]
     inputs = np.vstack([one.matrix(names) for one in train])
     outputs = np.vstack([one.matrix(channels.outputs) for one in train])
     middle, spread = inputs.mean(axis=0), inputs.std(axis=0)
@@ -108,14 +106,6 @@ def data_of(part: Part) -> Data:
     runs = [scaled(one) for one in train]
     fitted, held = held_back(runs)
     return Data(runs, fitted, held, [trial(one) for one in part.split.test], offset, scale)
-
-
-def inputs_of(recordings: Sequence[Recording], channels: Channels) -> list[str]:
-    """Return what peers are given: what any of our models is, which of a force is the pressure too."""
-    given = [*channels.inputs, *channels.scheduled(recordings)]
-    if "force" in channels.outputs and all("pressure" in one for one in recordings):
-        given.append("pressure")
-    return list(dict.fromkeys(given))
 
 
 def held_back(runs: Sequence[Run]) -> tuple[list[Run], list[Trial]]:
@@ -263,7 +253,7 @@ def own_results(part: Part, models: Sequence[str]) -> Iterator[Result]:
             yield replace(row, reason=board.rows[0].reason or "")
             continue
         outputs = part.channels.outputs
-        yield replace(row, found=[run_free(block, run, outputs) for run in split.test])
+        yield replace(row, found=[block.simulate(run).matrix(outputs) for run in split.test])
 
 
 def frame_of(one: Set, part: Part, result: Result) -> pd.DataFrame:

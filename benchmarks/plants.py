@@ -26,15 +26,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from mckibben.blocks.free_run import run_free
 from tests.plants import DEVELOP, PLANTS, SEALED, Plant, motions
 
 from mckibben import Recording, registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.channels import Channels
-from mckibben.comparison.fitting import Candidate
-from mckibben.comparison.planning import objections
+from mckibben.comparison.planning import Candidate, objections
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.numerals import numeral
 
@@ -69,7 +67,7 @@ class Found:
 def arranged(name: str, plant: Plant) -> Channels | None:
     """Return the channels on which a model has a place, those first that tell it most."""
     given, loads, moved = plant.bench.pressures, plant.bench.loads, plant.bench.outputs
-    told = (given, moved, loads or None), (given + loads, moved, None), (given, moved, None)
+    told = (given, moved, loads), (given + loads, moved), (given, moved, (), loads)
     ways = (Channels(*one) for one in told)
     return next(
         (way for way in ways if not objections({name: Candidate(name)}, plant.train, way)), None
@@ -79,8 +77,7 @@ def arranged(name: str, plant: Plant) -> Channels | None:
 def begun(name: str, channels: Channels, seed: int) -> Estimator:
     """Return a model's estimator on channels."""
     found = registry.load("estimators", name)
-    told = (channels.inputs, channels.outputs, channels.scheduling)
-    return found(**found.channel_settings(*told), seed=seed)
+    return found(**found.channel_settings(channels), seed=seed)
 
 
 def tried(name: str, channels: Channels, plant: Plant, seed: int) -> Found:
@@ -101,7 +98,9 @@ def tried(name: str, channels: Channels, plant: Plant, seed: int) -> Found:
 def tested(block: Block, plant: Plant, runs: Sequence[Recording]) -> float:
     """Return the error of free runs."""
     names = plant.bench.outputs
-    return missed(np.vstack([run_free(block, run, names) - run.matrix(names) for run in runs]))
+    return missed(
+        np.vstack([block.simulate(run).matrix(names) - run.matrix(names) for run in runs])
+    )
 
 
 def missed(errors: Array) -> float:

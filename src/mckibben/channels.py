@@ -1,10 +1,13 @@
-"""Selection of inputs, outputs and further inputs among the channels of recordings."""
+"""The channels of models: what drives, what is modelled, what schedules, and what is not used.
+
+They are resolved once, by `channels_of`, and handed down to what fits, compares, characterizes, draws.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -37,7 +40,7 @@ DESIRED = ("reference_", "command_")
 """Prefixes of references of a loop, which are not measurements."""
 
 SCHEDULES = ("pressure_extensor", "force", "torque")
-"""Default scheduling channels."""
+"""Channels, also numbered, that schedule models unless others are named."""
 
 PULLS = ("force", "torque")
 """Outputs of muscles that are held."""
@@ -49,11 +52,10 @@ FORCE, PRESSURE, OF_FORCE = "force", "pressure", ("length", "displacement")
 """Channels of force laws: the first of these that is present, with the pressure."""
 
 HELD = 0.01
-"""Smallest variation of a length, relative to its largest value, for which a force law is fitted.
-"""
+"""Smallest variation of a channel, relative to its largest value, that is more than holding it."""
 
 STEADY = 0.05
-"""Largest variation of a load within a run, relative to that over all runs, for which it counts as
+"""Largest variation of a channel within a run, relative to that over all runs, for which it counts as
 constant in the run.
 """
 
@@ -63,51 +65,69 @@ Sides = tuple[tuple[str, ...], tuple[str, ...]]
 
 @dataclass(frozen=True)
 class Channels:
-    """Inputs, outputs and scheduling channels of a comparison.
+    """Channels of models, resolved; see `channels_of`.
 
     Parameters
     ----------
-    inputs, outputs : tuple of str
-        Of every model.
-    scheduling : tuple of str or None
-        Loads, for models that can take them; None for what these find by name.
+    inputs : tuple of str
+        What drives every model.
+    outputs : tuple of str
+        What every model gives.
+    scheduling : tuple of str
+        Further inputs, which every model has to take.
+    offered : tuple of str
+        Further inputs for the models that can take them: loads, and the pressure of force laws.
+    unused : tuple of str
+        Channels that vary, and that no model is given.
+    held : tuple of str
+        Inputs of any kind that differ between recordings, but are nearly constant in each.
     """
 
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    scheduling: tuple[str, ...] | None = None
+    scheduling: tuple[str, ...] = ()
+    offered: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
 
     @property
     def single(self) -> bool:
-        """Whether this is one muscle without a load input."""
-        return len(self.inputs) == len(self.outputs) == 1 and self.scheduling is None
+        """Whether these are one input and one output, which nothing has to schedule."""
+        return len(self.inputs) == len(self.outputs) == 1 and not self.scheduling
 
-    def scheduled(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
-        """Return the scheduling channels for models of recordings."""
-        if self.scheduling is not None:
-            return self.scheduling
-        return () if self.single else schedules(recordings, (*self.inputs, *self.outputs))
+    @property
+    def further(self) -> tuple[str, ...]:
+        """All inputs that do not drive."""
+        return (*self.scheduling, *self.offered)
 
-    def known(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
-        """Return all input channels of the models; force laws also use the pressure."""
-        names = (*self.inputs, *self.scheduled(recordings))
-        by_length = self.outputs == (FORCE,) and any(name in OF_FORCE for name in names)
-        finds = by_length and PRESSURE not in names and all(PRESSURE in one for one in recordings)
-        return (*names, PRESSURE) if finds else names
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """Inputs, and outputs."""
+        return (*self.inputs, *self.outputs)
 
-    def ignored(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
-        """Return varying loads and lengths that are no input of any model."""
-        lengths = OF_FORCE if self.outputs == (FORCE,) else ()
-        others = {*self.known(recordings), *self.outputs}
-        some = dict.fromkeys([*schedules(recordings), *lengths])
-        return tuple(
-            name
-            for name in some
-            if name not in others and varies([one[name] for one in recordings if name in one])
-        )
+    def given(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
+        """Return the inputs of any model that all recordings have."""
+        return tuple(n for n in (*self.inputs, *self.further) if _shared(recordings, n))
 
+    @property
+    def pair(self) -> tuple[str, str]:
+        """The one input and the one output.
+
+        Raises
+        ------
+        DataError
+            If there are several.
+        """
+        if len(self.inputs) > 1 or len(self.outputs) > 1:
+            raise DataError(
+                f"there are several: {', '.join((*self.inputs, *self.outputs))}",
+                remedy="name one with `input=NAME` and one with `output=NAME`; balance models all",
+            )
+        return self.inputs[0], self.outputs[0]
+
+    @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Return every output with the input of the same number, or of the same position."""
+        """Every output with the input of the same number, or of the same position."""
 
         def own(place: int, output: str) -> str:
             number = re.search(r"\d*$", output)
@@ -123,94 +143,101 @@ def channels_of(
     recordings: Sequence[Recording],
     inputs: Names = None,
     outputs: Names = None,
-    load: str | None = None,
+    scheduling: Names = None,
 ) -> Channels:
-    """Return the channels of a comparison: as named, otherwise by names and units.
+    """Return the channels of models of recordings: as named, otherwise by names, units and motion.
 
-    A force is a load if there are other inputs. Force is modelled over length or displacement, where
-    that varies and nothing else is moved; models of it find the pressure themselves. A length that is
-    constant in every recording schedules instead, and the pressure drives.
+    1. The pressures drive; without any, the voltages, commands, ``input``, ``u`` or ``p``; else what is
+       in bar or V. Several are told apart by numbers (``pressure``, ``pressure_2``) or places
+       (``pressure_left``).
+    2. The output is what moves: displacement, length, contraction, position, angle, ``output``,
+       coordinates ``x``, ``y``, ``z``; else what is in mm or rad; else the force.
+    3. What every recording holds, at one value or at a level of its own, is no output where a force or
+       torque varies freely and the inputs do: that is the output. So it is beside pressure and length
+       alone, where both vary.
+    4. A force is driven by the length, or displacement, if that varies within recordings; models of it
+       take the pressure too. One that is held schedules, if recordings differ in it, and the pressure
+       drives.
+    5. Forces among several inputs are loads, and schedule.
+    6. An extensor's pressure, forces and torques schedule models of several muscles. Of one muscle,
+       the models that can take them do.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    inputs, outputs, scheduling : str, sequence of str, optional
+        Channels; a name that none has, such as ``pressure``, is all that are called so, such as
+        ``pressure_1``. With ``scheduling``, which may be empty, no others schedule or are offered.
 
     Raises
     ------
     DataError
-        If a recording lacks the load, or a channel is named twice.
+        If a channel is named twice, or no recording has one that is named to schedule.
     """
-    asked = [(names,) if isinstance(names, str) else names for names in (inputs, outputs)]
-    over = None if load else _force_over(recordings, *asked)
-    if over is not None:
-        if _only_schedules(recordings, over) and asked[0] != (over,):
-            return Channels((PRESSURE,), (FORCE,), (over,))
-        return Channels((over,), (FORCE,))
-    every = list(dict.fromkeys(name for recording in recordings for name in recording.channels))
-    found = _by_name(every, _units(recordings, every))
-    usual = FORCE if lacks_displacement(recordings) else OF_FORCE[-1]
-    sides = found[0] or (PRESSURE,), found[1] or (usual,)
-    if usual == FORCE:
-        sides = sides[0], (FORCE,)
-    elif inputs is None and outputs is None and load is None:
-        if pull := _pulls_held(recordings, sides):
-            return Channels(sides[0], pull, sides[1])
-        sides = _over_held(recordings, sides)
-    given = _named(recordings, inputs, sides[0])
-    wanted = _named(recordings, outputs, sides[1])
-    channels = with_loads_scheduled(recordings, Channels(given, wanted, (load,) if load else None))
-    further = channels.scheduling or ()
-    named = (*channels.inputs, *channels.outputs, *further)
-    if twice := [name for name in named if named.count(name) > 1]:
-        raise DataError(
-            "the channel is named twice among inputs, outputs and load",
-            channel=twice[0],
-            remedy="an output cannot also be an input: name each channel once",
-        )
-    for name in further:
-        for recording in recordings:
-            if name not in recording:
-                raise DataError(
-                    "there is no such channel to give the load",
-                    file=recording.source,
-                    channel=name,
-                    remedy="name it with `columns[CHANNEL]=COLUMN`, or leave `load` out",
-                )
-    return channels
+    asked = (scheduling,) if isinstance(scheduling, str) else tuple(scheduling or ())
+    finds = scheduling is None
+    given = _named(recordings, inputs, by_name(recordings, asked)[0] or (PRESSURE,))
+    loads = _loads_among(recordings, given)
+    given = tuple(name for name in given if name not in loads)
+    moved = by_name(recordings, (*given, *loads, *asked))[1] or (OF_FORCE[-1],)
+    pull = _pulled(recordings, given, moved) if finds and not loads else ()
+    wanted = _named(recordings, outputs, pull or moved)
+    held = over = tuple[str, ...]()
+    if finds and len(wanted) == 1 and wanted[0] in PULLS:
+        held = _held_beside(recordings, given, wanted[0])
+        given = tuple(name for name in given if name not in held)
+        over = () if held else _driving_force(recordings, wanted[0])
+        if over and (inputs is None or {*over} <= {*given} <= {*over, PRESSURE}):
+            given = over
+    scheduled = (*asked, *loads, *held)
+    found = (*((PRESSURE,) if over and given == over else ()), *_schedules(recordings))
+    found = tuple(name for name in found if finds and name not in (*given, *wanted, *scheduled))
+    if len(given) > 1 or len(wanted) > 1:
+        scheduled, found = (*scheduled, *found), ()
+    _check(recordings, (*given, *wanted, *scheduled), asked)
+    used = {*given, *wanted, *scheduled, *found}
+    unused = [name for name in _names(recordings) if name not in used]
+    return Channels(
+        given,
+        wanted,
+        scheduled,
+        found,
+        tuple(name for name in unused if _differs(recordings, name)),
+        tuple(n for n in (*given, *scheduled, *found) if held_at_levels(recordings, n)),
+    )
 
 
-def recognised(recordings: Sequence[Recording], channels: Sequence[str]) -> Sides:
-    """Return inputs and outputs among the channels common to all recordings; of several, all.
+def by_name(recordings: Sequence[Recording], excepted: Sequence[str] = ()) -> Sides:
+    """Return inputs and outputs by name, else by unit; empty if neither is recognised.
 
-    Where none is recognised, the first drives the second.
+    Outputs are the first quantity, or where those are fewer than inputs, the most of a kind. Kinds are
+    not mixed: errors in mm and in rad have no mean.
     """
-    if not channels:
-        return (), ()
-    inputs, outputs = _by_name(channels, _units(recordings, channels))
-    inputs = inputs or tuple(channels[:1])
-    rest = [name for name in channels if name not in inputs] or list(channels)
-    return _over_held(recordings, (inputs, outputs or tuple(rest[:1])))
+    names = [name for name in _names(recordings) if name not in excepted]
+    units = {name: next(one.units[name] for one in recordings if name in one) for name in names}
+    inputs = _called(names, DRIVING) or _in_units(names, units, UNITS_DRIVING)
+    rest = [name for name in names if name not in inputs]
+    outputs = _called(rest, MOVED) or _in_units(rest, units, UNITS_MOVED)
+    if len(outputs) < len(inputs):
+        along = _called(rest, (*ALONG, COORDINATES)) or _in_units(rest, units, ("mm",))
+        turned = _called(rest, TURNED) or _in_units(rest, units, ("rad",))
+        outputs = max(outputs, along, turned, key=len)
+    return inputs, outputs or tuple(name for name in PULLS if name in rest)[:1]
 
 
-def with_loads_scheduled(recordings: Sequence[Recording], channels: Channels) -> Channels:
-    """Return channels with forces as scheduling loads, if there are other inputs."""
-    loads = loads_among(recordings, channels.inputs)
-    if channels.scheduling is not None or not loads:
-        return channels
-    driven = tuple(name for name in channels.inputs if name not in loads)
-    return replace(channels, inputs=driven, scheduling=loads)
+def quantity(name: str) -> str:
+    """Return the name of a channel without its number.
 
-
-def with_dead_loads_scheduled(recordings: Sequence[Recording], channels: Channels) -> Channels:
-    """Return channels of one muscle with the loads that are constant in every recording."""
-    if not (channels.single and recordings):
-        return channels
-    held = [
-        name
-        for name in schedules(recordings, (*channels.inputs, *channels.outputs))
-        if all(name in one for one in recordings) and held_at_levels(recordings, name)
-    ]
-    return replace(channels, scheduling=tuple(held)) if held else channels
+    >>> quantity("pressure_2"), quantity("pressure_extensor")
+    ('pressure', 'pressure_extensor')
+    """
+    return re.sub(r"_?\d+$", "", name)
 
 
 def held_at_levels(recordings: Sequence[Recording], name: str) -> bool:
     """Return whether a channel differs between recordings but is nearly constant in each."""
+    if not _shared(recordings, name):
+        return False
     span = float(np.ptp(np.concatenate([one[name] for one in recordings])))
     return span > 0 and all(float(np.ptp(one[name])) <= STEADY * span for one in recordings)
 
@@ -225,15 +252,61 @@ def any_moves(recordings: Sequence[Recording], channels: Sequence[str]) -> bool:
     )
 
 
-def varies(lengths: Sequence[Array]) -> bool:
-    """Return whether lengths are held at several values over all recordings, ignoring approaches."""
-    samples = np.concatenate([*lengths, np.zeros(0)])
-    if not samples.size:
+def varies(samples: Sequence[Array]) -> bool:
+    """Return whether a channel takes several values over all recordings, ignoring approaches."""
+    every = np.concatenate([*samples, np.zeros(0)])
+    if not every.size:
         return False
-    return bool(np.ptp(np.percentile(samples, (1.0, 99.0))) > HELD * np.abs(samples).max())
+    return bool(np.ptp(np.percentile(every, (1.0, 99.0))) > HELD * np.abs(every).max())
 
 
-def lacks_displacement(recordings: Sequence[Recording]) -> bool:
+def loop_of(
+    recordings: Sequence[Recording],
+    input: Names = None,  # noqa: A002
+    output: Names = None,
+) -> tuple[str, str]:
+    """Return the channels of a loop: those of a model of one input, and the input that moves.
+
+    Raises
+    ------
+    DataError
+        If there are several inputs or outputs.
+    """
+    given, wanted = channels_of(recordings, input, output).pair
+    return moved_by(recordings, given) if input is None else given, wanted
+
+
+def moved_by(recordings: Sequence[Recording], given: str) -> str:
+    """Return the abscissa of an output's loop: its input, or what drives if that is constant."""
+    if any_moves(recordings, (given,)):
+        return given
+    driving = by_name(recordings)[0]
+    return driving[0] if driving and any_moves(recordings, driving[:1]) else given
+
+
+def _free(recordings: Sequence[Recording], name: str) -> bool:
+    """Return whether a channel varies within recordings, instead of being held at levels."""
+    return (
+        _shared(recordings, name)
+        and not held_at_levels(recordings, name)
+        and varies([one[name] for one in recordings])
+        and any_moves(recordings, (name,))
+    )
+
+
+def _pulled(
+    recordings: Sequence[Recording], given: Sequence[str], moved: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the force or torque that is the output instead of what is moved; or none."""
+    pull = [name for name in PULLS if name not in given and _free(recordings, name)][:1]
+    there = all(_shared(recordings, name) for name in (*given, *moved))
+    held = not any(_free(recordings, name) for name in moved)
+    driven = any(_differs(recordings, name) for name in given)
+    otherwise = there and (driven if held else not driven)
+    return tuple(pull) if otherwise or _lacks_displacement(recordings) else ()
+
+
+def _lacks_displacement(recordings: Sequence[Recording]) -> bool:
     """Return whether the only model possible is force by length and pressure."""
     others = (*ALONG, *TURNED)
     return all(
@@ -243,90 +316,58 @@ def lacks_displacement(recordings: Sequence[Recording]) -> bool:
     ) and any_moves(recordings, (FORCE,))
 
 
-def moved_by(recordings: Sequence[Recording], given: str, channels: Sequence[str]) -> str:
-    """Return the abscissa of an output's loop: its input, or the driving channel if that is constant."""
-    if any_moves(recordings, (given,)):
-        return given
-    driving = _called(channels, DRIVING)
-    return driving[0] if driving and any_moves(recordings, driving[:1]) else given
+def _held_beside(
+    recordings: Sequence[Recording], given: Sequence[str], pull: str
+) -> tuple[str, ...]:
+    """Return what is held at levels while inputs drive a force or torque."""
+    along = [name for name in OF_FORCE if pull == FORCE and _shared(recordings, name)][:1]
+    names = tuple(along) or by_name(recordings, (*given, pull))[1]
+    driven = any(_free(recordings, name) for name in given if name not in names)
+    return names if driven and all(held_at_levels(recordings, n) for n in names) else ()
 
 
-def _force_over(
-    recordings: Sequence[Recording], inputs: Sequence[str] | None, outputs: Sequence[str] | None
-) -> str | None:
-    """Return the length or displacement of a force law with pressure, or None.
-
-    Where it is constant in every recording and the force is not, it is no output.
-    """
-    meant = lacks_displacement(recordings) if outputs is None else tuple(outputs) == (FORCE,)
-    free = all(FORCE in one for one in recordings) and not held_at_levels(recordings, FORCE)
-    for name in OF_FORCE:
-        if not meant and not (outputs is None and free and _only_schedules(recordings, name)):
-            continue
-        asked = inputs is None or set(inputs) in ({name}, {name, PRESSURE})
-        asked = asked or (set(inputs or ()) == {PRESSURE} and _only_schedules(recordings, name))
-        there = all({name, PRESSURE, FORCE} <= {*one.channels} for one in recordings)
-        if asked and there and varies([one[name] for one in recordings]):
-            return name
-    return None
-
-
-def _only_schedules(recordings: Sequence[Recording], name: str) -> bool:
-    """Return whether a channel is constant in every recording, where the pressure is not."""
-    there = all(name in one and PRESSURE in one for one in recordings)
-    return (
-        there
-        and held_at_levels(recordings, name)
-        and not held_at_levels(recordings, PRESSURE)
-        and any_moves(recordings, (PRESSURE,))
-    )
-
-
-def _pulls_held(recordings: Sequence[Recording], sides: Sides) -> tuple[str, ...]:
-    """Return the force or torque that the inputs drive, where the output is held at levels; or none."""
-    inputs, outputs = sides
-    free = [
+def _driving_force(recordings: Sequence[Recording], pull: str) -> tuple[str, ...]:
+    """Return the length or displacement of a law of force with pressure, if it varies."""
+    there = pull == FORCE and _shared(recordings, PRESSURE) and _shared(recordings, FORCE)
+    return tuple(
         name
-        for name in PULLS
-        if all(name in one for one in recordings)
-        and any_moves(recordings, (name,))
-        and not held_at_levels(recordings, name)
-    ]
-    there = all(name in one for one in recordings for name in (*inputs, *outputs))
-    held = there and all(held_at_levels(recordings, name) for name in outputs)
-    driven = held and any_moves(recordings, inputs)
-    return tuple(free[:1]) if driven else ()
+        for name in OF_FORCE
+        if there and _shared(recordings, name) and varies([one[name] for one in recordings])
+    )[:1]
 
 
-def _over_held(recordings: Sequence[Recording], sides: Sides) -> Sides:
-    """Return force instead of the output, if that is held in all recordings and the force is not."""
-    outputs = sides[1]
-    held = len(outputs) == 1 and not any_moves(recordings, outputs)
-    forced = all(FORCE in one for one in recordings) and any_moves(recordings, (FORCE,))
-    return (outputs, (FORCE,)) if held and forced and outputs != (FORCE,) else sides
+def _check(
+    recordings: Sequence[Recording], names: Sequence[str], scheduling: Sequence[str]
+) -> None:
+    """Raise an error for a channel that is named twice, or named to schedule that is nowhere."""
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise DataError(
+            "the channel is named twice among inputs, outputs and load",
+            channel=twice[0],
+            remedy="an output cannot also be an input: name each channel once",
+        )
+    if absent := [name for name in scheduling if name not in _names(recordings)]:
+        raise DataError(
+            "there is no such channel to give the load",
+            file=recordings[0].source if recordings else None,
+            channel=absent[0],
+            remedy="name it with `columns[CHANNEL]=COLUMN`, or leave `load` out",
+        )
 
 
-def _units(recordings: Sequence[Recording], channels: Sequence[str]) -> dict[str, str]:
-    return {
-        name: next((one.units.get(name, "") for one in recordings if name in one), "")
-        for name in channels
-    }
+def _names(recordings: Sequence[Recording]) -> list[str]:
+    """Return the channels that any recording has, in order."""
+    return list(dict.fromkeys(name for one in recordings for name in one.channels))
 
 
-def _by_name(channels: Sequence[str], units: Mapping[str, str]) -> Sides:
-    """Return inputs and outputs by name, else by unit; empty if neither is recognised.
+def _shared(recordings: Sequence[Recording], name: str) -> bool:
+    return bool(recordings) and all(name in one for one in recordings)
 
-    Outputs are the first quantity, or where those are fewer than inputs, the most of a kind. Kinds are
-    not mixed: errors in mm and in rad have no mean.
-    """
-    inputs = _called(channels, DRIVING) or _in_units(channels, units, UNITS_DRIVING)
-    rest = [name for name in channels if name not in inputs]
-    outputs = _called(rest, MOVED) or _in_units(rest, units, UNITS_MOVED)
-    if len(outputs) < len(inputs):
-        along = _called(rest, (*ALONG, COORDINATES)) or _in_units(rest, units, ("mm",))
-        turned = _called(rest, TURNED) or _in_units(rest, units, ("rad",))
-        outputs = max(outputs, along, turned, key=len)
-    return inputs, outputs or ((FORCE,) if FORCE in rest else ())
+
+def _differs(recordings: Sequence[Recording], name: str) -> bool:
+    """Return whether a channel varies within or between recordings by more than rounding."""
+    samples = np.concatenate([one[name] for one in recordings if name in one])
+    return bool(samples.size and np.ptp(samples) > 1e-6 * (1.0 + np.abs(samples).max()))
 
 
 def _called(channels: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
@@ -357,39 +398,37 @@ def _in_units(
 ) -> tuple[str, ...]:
     measured = [name for name in channels if not name.startswith(DESIRED)]
     for unit in wanted:
-        found = tuple(name for name in measured if units.get(name) == unit)
+        found = tuple(name for name in measured if units[name] == unit)
         if found:
             return found
     return ()
 
 
 def _named(
-    recordings: Sequence[Recording], given: Names, by_name: tuple[str, ...]
+    recordings: Sequence[Recording], given: Names, by_default: tuple[str, ...]
 ) -> tuple[str, ...]:
     if given is None:
-        return by_name
-    if isinstance(given, str):  # of several muscles, all that are called so
-        if any(given in recording for recording in recordings):
-            return (given,)
-        return tuple(name for name in by_name if name.startswith(f"{given}_")) or (given,)
-    return tuple(given)
+        return by_default
+    names = (given,) if isinstance(given, str) else tuple(given)
+    if len(names) == 1 and not any(names[0] in one for one in recordings):
+        # of several muscles, all that are called so
+        return tuple(name for name in by_default if name.startswith(f"{names[0]}_")) or names
+    return names
 
 
-def schedules(recordings: Sequence[Recording], others: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the default scheduling channels of any recording, with exceptions.
-
-    Of forces and torques there may be several, with numbers.
-    """
-    found = dict.fromkeys(
-        name
-        for quantity in SCHEDULES
-        for recording in recordings
-        for name in (*one(recording, quantity), *numbered(recording, quantity))
+def _schedules(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Return the default scheduling channels of any recording."""
+    names = _names(recordings)
+    found = (
+        (quantity, int(match[1] or 0), name)
+        for quantity in range(len(SCHEDULES))
+        for name in names
+        if (match := re.fullmatch(rf"{SCHEDULES[quantity]}(?:_(\d+))?", name))
     )
-    return tuple(name for name in found if name not in others)
+    return tuple(name for _, _, name in sorted(found))
 
 
-def loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tuple[str, ...]:
+def _loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tuple[str, ...]:
     """Return forces that are loads: given, and not commanded."""
     found = tuple(
         name
@@ -397,18 +436,3 @@ def loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tuple
         if any(name in one and one.units[name] in LOADS for one in recordings)
     )
     return found if len(found) < len(inputs) else ()
-
-
-def one(recording: Recording, *names: str) -> tuple[str, ...]:
-    """Return the first of some channels that a recording has, if any."""
-    return tuple(name for name in names if name in recording)[:1]
-
-
-def numbered(recording: Recording, quantity: str) -> tuple[str, ...]:
-    """Return the channels ``quantity_1``, ``quantity_2`` ... of a recording, in order."""
-    found = {
-        int(match.group(1)): name
-        for name in recording.channels
-        if (match := re.fullmatch(rf"{quantity}_(\d+)", name))
-    }
-    return tuple(found[number] for number in sorted(found))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ from mckibben.recording import Recording, is_frame
 from mckibben.recording import listed as recordings_of
 
 if TYPE_CHECKING:
+    from mckibben.channels import Channels, Names
     from mckibben.diagnosis.data_gaps import Gap
     from mckibben.files.choosing import Seen
 
@@ -25,7 +26,7 @@ Data = Recording | str | Path | Sequence[Recording | str | Path]
 
 def prepared(recordings: list[Recording], reading: ReadOptions) -> list[Recording]:
     """Return recordings cut, resampled and zeroed."""
-    from mckibben.channels import recognised
+    from mckibben.channels import by_name
     from mckibben.signals import cut, resample, zeroed
 
     if reading.between is not None:
@@ -33,7 +34,7 @@ def prepared(recordings: list[Recording], reading: ReadOptions) -> list[Recordin
     if reading.resample is not None:
         recordings = [resample(one, reading.resample) for one in recordings]
     if reading.zero:
-        drives = [recognised([one], list(one.channels))[0][0] for one in recordings]
+        drives = [(*by_name([one])[0], "pressure")[0] for one in recordings]
         pairs = zip(recordings, drives, strict=True)
         recordings = [zeroed(one, list(reading.zero), over) for one, over in pairs]
     return recordings
@@ -96,83 +97,63 @@ def read_files(
 
 def read_sides(
     data: Sequence[Data],
-    inputs: Sequence[str] | None = None,
-    outputs: Sequence[str] | None = None,
-    load: str | None = None,
+    resolve: Callable[[Sequence[Recording]], Channels],
+    words: Sequence[Names] = (),
     reading: ReadOptions | None = None,
-) -> list[list[Recording]]:
-    """Return the recordings of several lists of files, with the channels for models.
+) -> tuple[list[list[Recording]], Channels]:
+    """Return the recordings of several lists of files, and the channels of models of them.
 
-    Channels that are not named are recognised, as `compare` does. What is wrong with a column that no
-    model needs is a note.
+    What is wrong with a column that no model needs is a note.
+
+    Parameters
+    ----------
+    resolve : callable
+        Of recordings, such as `mckibben.channels.channels_of`.
+    words : sequence of str, sequence of str, or None
+        Channels that have to be there, as the user named them.
 
     Raises
     ------
     DataError
         As `mckibben.read`, of the channels that are needed.
     """
-    from mckibben.channels import channels_of
-
     reading = reading or ReadOptions()
-    named = [*(inputs or ()), *(outputs or ()), *([load] if load else ())]
+    named = [n for names in words for n in ([names] if isinstance(names, str) else names or ())]
     with warnings.catch_warnings(record=True) as caught:
         found = [read_files(some, named, reading) for some in data]
     if reading.rest_length is not None and not named:
         found = [[one.with_derived(["displacement"]) for one in some] for some in found]
-    sides = channels_of([one for some in found for one in some], inputs, outputs, load)
-    needed = [*sides.inputs, *sides.outputs]
+    channels = resolve([one for some in found for one in some])
+    needed = [*channels.inputs, *channels.outputs]
     if any(name not in one for runs in found for one in runs for name in needed):
-        return [read_files(some, needed, reading) for some in data]  # raises the error
-    _warn_again(caught)
-    return found
-
-
-def _warn_again(caught: Iterable[warnings.WarningMessage]) -> None:
-    """Issue warnings that were deferred until it was clear that files are not read again."""
+        return [
+            read_files(some, [*needed, *named], reading) for some in data
+        ], channels  # or raises
     for one in caught:
         warnings.warn(one.message, one.category, stacklevel=2)
+    return found, channels
 
 
-def read_pair(
+def read_loop(
     data: Data,
     input: str | None = None,  # noqa: A002
     output: str | None = None,
     reading: ReadOptions | None = None,
     others: Sequence[str] = (),
 ) -> tuple[list[Recording], str, str]:
-    """Return recordings of one muscle, its input and its output: as named, default, or recognised.
+    """Return recordings, and the input and output of their loop; see `mckibben.channels.loop_of`.
 
     Raises
     ------
     DataError
         If a channel is missing, or is that of several muscles.
     """
-    from mckibben.channels import channels_of
+    from mckibben.channels import channels_of, loop_of
 
-    named = [name for name in (input, output, *others) if name]
-    with warnings.catch_warnings(record=True) as caught:
-        recordings = read_files(data, named, reading)
-    moving = (
-        name
-        for name in ("displacement", "force")
-        if all(name in one for one in recordings) and any(np.ptp(one[name]) for one in recordings)
+    (recordings,), _ = read_sides(
+        [data], lambda runs: channels_of(runs, input, output), (input, output, others), reading
     )
-    usual = input or "pressure", output or next(moving, "displacement")
-    if not all(name in one for one in recordings for name in usual):
-        found = channels_of(recordings, input, output, None)
-        usual = found.inputs[0], found.outputs[0]
-        present = all(name in one for one in recordings for name in usual)
-        if present and (len(found.inputs) > 1 or len(found.outputs) > 1):
-            raise DataError(
-                f"there are several: {', '.join((*found.inputs, *found.outputs))}",
-                file=recordings[0].source,
-                remedy="name one with `input=NAME` and one with `output=NAME`; balance models all",
-            )
-    if not all(name in one for one in recordings for name in usual):
-        recordings = read_files(data, [*usual, *others], reading)  # raises the error
-    else:
-        _warn_again(caught)
-    return recordings, *usual
+    return recordings, *loop_of(recordings, input, output)
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_type_hints
 
 from mckibben import registry
+from mckibben.channels import channels_of
 from mckibben.errors import DataError, ModelError
 from mckibben.options import (
     CompareOptions,
@@ -52,7 +53,6 @@ from mckibben.reading import (
     files_of,
     loaded,
     read_files,
-    read_pair,
     read_sides,
 )
 from mckibben.recording import Recording, sample_time_of
@@ -94,9 +94,6 @@ def fit(
     settings = settings_of(model, chosen.settings)
     prior = chosen.prior or settings.get("prior")
     file = _claim(out, _paths(data, chosen.residual_of, prior), force)
-    for side in ("input", "output"):
-        if names := getattr(chosen, side):
-            settings.setdefault(side, names[0] if len(names) == 1 else tuple(names))
     kind = registry.load("estimators", model)
     if chosen.target is not None and chosen.target not in kind.targets:
         problem = f"{model!r} cannot be fitted for {chosen.target}"
@@ -106,21 +103,18 @@ def fit(
             raise ModelError(f"{model!r} has none", parameter="prior", remedy="leave it out")
         settings["prior"] = chosen.prior
     settings = {"seed": chosen.seed} | settings
+    sides = [settings.pop(side, getattr(chosen, side)) for side in ("input", "output")]
+    names = [*sides, settings.get("scheduling")]
+    (runs,), channels = read_sides([data], lambda some: kind.resolved(some, *names), sides, reading)
+    settings = kind.channel_settings(channels) | settings
     estimator = kind(**{**kind.targets.get(chosen.target, {}), **settings})
-    sides = [estimator.input, estimator.output]
-    if sides == ["pressure", "displacement"]:
-        asked = settings.get("input"), settings.get("output")
-        runs, estimator.input, estimator.output = read_pair(data, *asked, reading)
-    else:  # of several, each may hold an input, as isometric runs hold the length
-        needed = [n for some in sides for n in ((some,) if isinstance(some, str) else some or ())]
-        runs = read_files(data, needed or None, reading)
-    base, whole = saved(chosen.residual_of), runs
+    base = saved(chosen.residual_of)
     if base is not None:
         runs = _residuals(base, estimator, runs)
     used = estimator.data(runs)
     check_shared({"fit": runs}, *([one.name for one in of] for of in (used.inputs, used.outputs)))
-    channels = [one.name for one in (*used.inputs, *used.outputs, *used.scheduled)]
-    if chosen.target is not None and not any(name.startswith("force") for name in channels):
+    taken = [one.name for one in (*used.inputs, *used.outputs, *used.scheduled)]
+    if chosen.target is not None and not any(name.startswith("force") for name in taken):
         problem = f"a model for {chosen.target} is fitted to a measured force"
         raise DataError(problem, channel="force", remedy="give recordings with one")
     with telling(progress, f"fitting {model}") as tell:
@@ -137,12 +131,9 @@ def fit(
     found: Block = estimator.model_ if base is None else Parallel((base, estimator.model_))
     if file is not None:
         found.save(file)
-    driven = [channel.name for channel in found.inputs]
     notes = list(estimator.diagnostics_.notes)
-    if not chosen.input and "pressure" in driven and "voltage" in {*whole[0].channels} - {*driven}:
-        notes.append(
-            "voltage was recorded too; for a model of the valve's command: `input=voltage`"
-        )
+    if unused := [name for name in (*channels.further, *channels.unused) if name not in taken]:
+        notes.append(f"not used: {', '.join(unused)}; name what drives with `input`")
     return Fit(model, found, estimator, tuple(notes), file, price)
 
 
@@ -303,8 +294,9 @@ def _compared(
     read = _paths(train, *sides, logs)
     kind = "study" if isinstance(chosen, StudyOptions) else "compare"
     with results_in(out, written(names), inputs=read, force=force, kind=kind) as results:
-        fitted, checks, tests = read_sides(
-            sides, chosen.inputs, chosen.outputs, chosen.load, reading
+        words = chosen.inputs, chosen.outputs, chosen.load
+        (fitted, checks, tests), _ = read_sides(
+            sides, lambda some: channels_of(some, *words), words, reading
         )
         arguments |= {"train": fitted, "validation": [*validation, *checks], "test": tests}
         yield arguments | {"folder": out, "clear": False}, results

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,11 +9,10 @@ import pytest
 
 from mckibben import GPI, Recording, compare
 from mckibben.arrays import Array
-from mckibben.channels import Channels
+from mckibben.channels import Channels, channels_of
 from mckibben.comparison.choosing import CAUTION
-from mckibben.comparison.doubts import Span, doubts_of
-from mckibben.comparison.leaderboard import Row
-from mckibben.comparison.parts import N_PARTS, parts_of, spans_of
+from mckibben.comparison.leaderboard import Row, doubts_of
+from mckibben.comparison.splits import N_PARTS, Span, parts_of, spans_of
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.leaving_out import MOST_FREE
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -55,7 +53,7 @@ def test_levels_and_repeats_are_spread_over_the_parts() -> None:
     wave = triangle(TIME, 4.0, 5.0)
     loads = [100.0, 200.0, 300.0, 400.0] * 4
     runs = [recorded(wave, k, force=np.full(wave.size, x)) for k, x in enumerate(loads)]
-    parts = parts_of(runs, replace(CHANNELS, scheduling=("force",)))
+    parts = parts_of(runs, channels_of(runs))
     assert len(parts) == N_PARTS
     for part in parts:
         inside = [load for load, rows in zip(loads, part, strict=True) if rows.all()]

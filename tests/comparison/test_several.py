@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, DataError, Recording, compare
-from mckibben.channels import Channels, channels_of, with_dead_loads_scheduled
+from mckibben.channels import Channels, channels_of, held_at_levels
 from mckibben.comparison.planning import plan_of
 from mckibben.comparison.splits import held_out
 from mckibben.signals import triangle
@@ -55,7 +55,9 @@ def test_the_order_of_recordings_does_not_decide_the_channels() -> None:
 @pytest.mark.parametrize("load", [*INPUTS, *OUTPUTS])
 def test_no_model_is_told_what_it_is_to_give(load: str) -> None:
     with pytest.raises(DataError, match=load):
-        compare([run(3.0)], run(4.0), load=load, models=["coupled-memory"], jobs=1)
+        channels_of([run(3.0)], INPUTS, OUTPUTS, load)
+    found = channels_of([run(3.0)], scheduling=load)
+    assert load not in (*found.inputs, *found.outputs)
 
 
 def hung(load: float, seed: int = 0) -> Recording:
@@ -68,25 +70,25 @@ def hung(load: float, seed: int = 0) -> Recording:
 
 def test_a_force_beside_other_inputs_is_given_and_never_commanded() -> None:
     runs = [hung(10.0), hung(20.0, 1)]
-    told = Channels(("pressure",), ("displacement",), ("force",))
+    told = Channels(("pressure",), ("displacement",), ("force",), held=("force",))
     assert channels_of(runs, ["pressure", "force"], None, None) == told
-    assert channels_of(runs, "force", None, None) == Channels(("force",), ("displacement",))
+    found = channels_of(runs, "force")
+    assert (found.inputs, found.outputs, found.unused) == (("force",), told.outputs, told.inputs)
     both = ["pressure", "force"]
     plan = plan_of(runs, [], inputs=both, models=["balance"], settings=None, seed=0)
-    assert plan.board().inputs == ("pressure",)
+    assert plan.empty.inputs == ("pressure",)
     with pytest.raises(DataError, match="force"):
-        channels_of([*runs, hung(5.0).select(["pressure", "displacement"])], both, None, None)
+        plan_of([*runs, hung(5.0).select(["pressure", "displacement"])], inputs=both)
 
 
-def test_only_what_is_held_at_a_level_of_each_recording_is_a_dead_load() -> None:
-    one = Channels(("pressure",), ("displacement",))
+def test_only_what_is_held_at_a_level_of_each_recording_is_held_at_levels() -> None:
     shaken = 0.3 * np.random.default_rng(0).random(TIME.size)
     noisy = [run.with_channels(force=run["force"] + shaken) for run in (hung(10.0), hung(20.0, 1))]
-    assert with_dead_loads_scheduled([hung(10.0), hung(20.0)], one).scheduling == ("force",)
-    assert with_dead_loads_scheduled(noisy, one).scheduling == ("force",)
-    assert with_dead_loads_scheduled([hung(10.0), hung(10.0)], one) == one
+    assert held_at_levels([hung(10.0), hung(20.0)], "force")
+    assert held_at_levels(noisy, "force")
+    assert not held_at_levels([hung(10.0), hung(10.0)], "force")
     varied = hung(10.0).with_channels(force=TIME.astype(float))
-    assert with_dead_loads_scheduled([varied, hung(20.0)], one) == one
+    assert not held_at_levels([varied, hung(20.0)], "force")
 
 
 def test_levels_of_what_schedules_are_held_out() -> None:
@@ -96,7 +98,7 @@ def test_levels_of_what_schedules_are_held_out() -> None:
         for level in levels
         for seed in (1, 2)
     ]
-    split = held_out(runs, CHANNELS)
+    split = held_out(runs, channels_of(runs))
     assert [one["pressure_extensor"][0] for one in split.test] == [0.5, 0.5]
     assert "pressure_extensor" in split.described
     many = [run(3.0, seed) for seed in range(6)]
@@ -110,11 +112,12 @@ def test_of_runs_that_each_hold_the_input_the_last_at_each_level_are_held_out() 
         channels = {"length": np.full(50, length), "force": np.linspace(0, length, 50)}
         return Recording(channels, 0.05, {"length": "mm", "force": "N"})
 
-    channels = Channels(("length",), ("force",))
-    twice = held_out([held(length) for length in (100.0, 90.0, 80.0, 100.0, 80.0, 90.0)], channels)
+    runs = [held(length) for length in (100.0, 90.0, 80.0, 100.0, 80.0, 90.0)]
+    channels = channels_of(runs, "length", "force")
+    twice = held_out(runs, channels)
     assert [run["length"][0] for run in twice.train] == [100.0, 90.0, 80.0]
     assert [run["length"][0] for run in twice.test] == [100.0, 80.0, 90.0]
-    once = held_out([held(length) for length in (100.0, 90.0, 80.0)], channels)
+    once = held_out(runs[:3], channels)
     assert [run["length"][0] for run in once.test] == [90.0]
 
 

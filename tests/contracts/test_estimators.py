@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from sklearn.exceptions import NotFittedError
 from mckibben import DataError, ModelError, Recording, registry
 from mckibben import load as load_model
 from mckibben.blocks.free_runs import FreeRuns
-from tests.estimators.examples import CASES, KINDS, quick, recorded
+from tests.estimators.examples import CASES, KINDS, quick, recorded, resolved
 from tests.estimators.examples import few_steps as few_steps  # a fixture
 
 pytestmark = [
@@ -48,11 +49,11 @@ def counts(kind: str) -> list[np.ndarray]:
 
 
 def test_it_says_what_it_learns_from(name: str, kind: str) -> None:
-    made = KINDS[kind]
+    channels = resolved(kind)
     estimator_class = registry.load("estimators", name)
-    settings = estimator_class.channel_settings(made.inputs, made.outputs)
+    settings = estimator_class.channel_settings(channels)
     assert estimator_class(**settings).get_params().items() >= settings.items()
-    assert estimator_class.objection(recorded(kind), (), made.outputs)
+    assert estimator_class.objection(recorded(kind), replace(channels, inputs=()))
 
 
 def test_fit_repeats_and_leaves_settings_and_data_alone(name: str, kind: str) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from mckibben import Recording
+from mckibben.channels import Channels, channels_of
 from mckibben.registry import load, names
 from tests.golden.plants import runs
 
@@ -73,6 +74,11 @@ KINDS = {
 }
 
 
+def resolved(kind: str) -> Channels:
+    """Return the channels of models of a kind."""
+    return channels_of(recorded(kind), KINDS[kind].inputs, KINDS[kind].outputs)
+
+
 def recorded(kind: str) -> tuple[Recording, ...]:
     """Return the runs of a kind."""
     return runs(KINDS[kind].plant)
@@ -86,9 +92,7 @@ def kinds_for(name: str) -> tuple[str, ...]:
     """
     estimator_class = load("estimators", name)
     fits = tuple(
-        kind
-        for kind, made in KINDS.items()
-        if estimator_class.objection(recorded(kind), made.inputs, made.outputs) is None
+        kind for kind in KINDS if estimator_class.objection(recorded(kind), resolved(kind)) is None
     )
     several = tuple(kind for kind in fits if len(KINDS[kind].inputs) > 1)
     return ("muscle", *several) if "muscle" in fits else fits
@@ -103,12 +107,11 @@ def quick(name: str, kind: str | None = None, **settings: Any) -> Any:
     """Return an estimator of its example's channels with settings that make it quick."""
     estimator_class = load("estimators", name)
     known = estimator_class().get_params()
-    made = KINDS[kind or kinds_for(name)[0]]
     cheap = {key: value for key, value in QUICK.items() if key in known}
     cheap |= {key: min(known[key], 1) for key in ORDERS if key in known}
     if known.get("method") == "pso":
         cheap["method"] = "ls"
-    channels = estimator_class.channel_settings(made.inputs, made.outputs)
+    channels = estimator_class.channel_settings(resolved(kind or kinds_for(name)[0]))
     return estimator_class(**cheap | channels | settings)
 
 

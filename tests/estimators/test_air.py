@@ -9,6 +9,7 @@ import pytest
 
 from mckibben import DataError, ModelError, Recording
 from mckibben.blocks.dynamics.air import Air
+from mckibben.channels import Channels
 from mckibben.estimators.dynamics.air import AirEstimator
 
 STEP, NOISE = 0.01, 0.005
@@ -65,9 +66,9 @@ def test_limits_are_found_where_they_show_and_kept_where_they_are_given() -> Non
 def test_what_is_no_command_is_refused() -> None:
     run = recorded(REGULATOR)
     objects = AirEstimator.objection
-    assert objects([run], ("voltage",), ("pressure",)) is None
-    assert objects([run], ("displacement",), ("pressure",))
-    assert objects([run], ("pressure",), ("displacement",))
+    assert objects([run], Channels(("voltage",), ("pressure",))) is None
+    assert objects([run], Channels(("displacement",), ("pressure",)))
+    assert objects([run], Channels(("pressure",), ("displacement",)))
     falling = run.with_channels(pressure=5.0 - run["pressure"])
     with pytest.raises(DataError, match="pressure"):
         AirEstimator(longest_dead_time=0.0).fit(falling)

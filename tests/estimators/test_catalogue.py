@@ -15,9 +15,8 @@ import mckibben
 from mckibben import ModelError, Recording, registry
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.channels import Channels
-from mckibben.comparison.fitting import Candidate
 from mckibben.comparison.leaderboard import inverse_of
-from mckibben.comparison.planning import objections
+from mckibben.comparison.planning import Candidate, objections
 from mckibben.errors import MckibbenError
 from mckibben.estimators.catalogue import (
     declared,

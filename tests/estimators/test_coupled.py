@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import DataError, ModelError, registry
+from mckibben.channels import channels_of
 from mckibben.estimators.coupled.fuzzy import (
     Consequents,
     Problem,
@@ -42,11 +43,10 @@ def test_projected_derivatives_agree_with_differences() -> None:
 def test_muscles_that_never_move_alone_and_those_that_are_lost_are_refused() -> None:
     runs = recorded("two muscles")
     both, whole = runs[2::3], runs[0]
-    names = ["pressure_1", "pressure_2"], ["displacement_1", "displacement_2"]
     for model in ("sdchm", "sdchm-published", "coupled-pi"):
         objection = registry.load("estimators", model).objection
-        assert "pressure_1" in str(objection(both, *names))
-        assert objection(runs, *names) is None
+        assert "pressure_1" in str(objection(both, channels_of(both)))
+        assert objection(runs, channels_of(runs)) is None
         with pytest.raises(DataError, match="pressure_1"):
             registry.load("estimators", model)().fit(both)
     for lost in ("pressure_2", "displacement_2", "pressure_extensor"):

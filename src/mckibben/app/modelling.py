@@ -12,10 +12,9 @@ from typing import Any
 from mckibben import registry, workflow
 from mckibben.app.jobs import Tell
 from mckibben.app.workspace import Workspace
-from mckibben.channels import Channels, with_dead_loads_scheduled, with_loads_scheduled
+from mckibben.channels import Channels, channels_of
 from mckibben.comparison.choosing import recommended
-from mckibben.comparison.fitting import Candidate
-from mckibben.comparison.planning import objections, plan_of
+from mckibben.comparison.planning import Candidate, objections, plan_of
 from mckibben.comparison.ranking import ranked
 from mckibben.comparison.splits import split_of, tested_from
 from mckibben.errors import DataError, ModelError
@@ -42,17 +41,16 @@ Json = dict[str, Any]
 def sides_of(
     workspace: Workspace, inputs: Sequence[str], outputs: Sequence[str], load: str = ""
 ) -> Channels:
-    """Return what is modelled: a load is the one named, else what schedules by its name."""
-    if load or not (inputs and outputs):
-        return Channels(tuple(inputs), tuple(outputs), (load,) if load else None)
+    """Return what is modelled, as `compare` of these channels does."""
+    if not (inputs and outputs):
+        return Channels(tuple(inputs), tuple(outputs))
     recordings = workspace.with_role("train") or list(workspace.used().values())
-    found = with_loads_scheduled(recordings, Channels(tuple(inputs), tuple(outputs)))
-    return with_dead_loads_scheduled(recordings, found)
+    return channels_of(recordings, inputs, outputs, load or None)
 
 
 def comparable(workspace: Workspace, sides: Channels) -> list[Json]:
     """Return the results of models of these channels, best first: other errors do not compare."""
-    named = ", ".join(sides.inputs), ", ".join(sides.outputs), (sides.scheduling or ("",))[0]
+    named = tuple(map(", ".join, (sides.inputs, sides.outputs, sides.scheduling)))
     told = ("input", "output", "load")
     return [r for r in workspace.results() if tuple(r.get(key, "") for key in told) == named]
 
@@ -162,13 +160,12 @@ def fit(
         inputs=inputs, outputs=outputs, load=load or None, models=[model],
         seed=seed, allow_shared=allow_shared,
     )  # fmt: skip
-    *_, last = ranked(
-        plan, jobs=1, kept=plan.kept(None), watch=lambda _, share, cost: tell(share, cost)
-    )
+    *_, last = ranked(plan, jobs=1, watch=lambda _, share, cost: tell(share, cost))
     board, (row,) = last.board, last.board.rows
     if row.reason is not None or row.block is None:
         raise ModelError((row.reason or "it gave no model: try other settings").rstrip("."))
-    about: Json = {"model": model, "input": board.input, "output": board.output, "load": load}
+    about: Json = {"model": model, "input": board.input, "output": board.output}
+    about["load"] = ", ".join(board.loads)
     olds = {name: workspace.read("results", name) or {} for name in workspace.names("results")}
     same = (n for n, old in olds.items() if all(old.get(key) == about[key] for key in about))
     name = next(same, None) or workspace.new_name("models", model)

@@ -5,11 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal, Protocol, TypeVar
 
-import numpy as np
-
-from mckibben.arrays import Array
-from mckibben.statistics import RESAMPLES
-
 CONSTANT = "constant"
 """Name of the row that predicts the mean of the training output, whatever the input: never chosen."""
 
@@ -110,24 +105,3 @@ def _beats(row: Ranked, constant: Ranked) -> bool:
 def useful(error: float, constant: float) -> bool:
     """Return whether an error is clearly smaller than that of the constant on the same samples."""
     return error < USEFUL * constant
-
-
-def skill_of(squares: Array, constant: Array, seed: int) -> tuple[float, float]:
-    """Return the share of a constant's squared error that a model explains, and its lower bound.
-
-    The bound is exceeded by 99 % of resamples of blocks, the same for both.
-
-    Parameters
-    ----------
-    squares, constant : array, shape (pieces,)
-        Sums of squared errors of the model and of the constant on the same blocks.
-    seed : int
-        Of the resampling.
-    """
-    both = np.array([squares, constant])
-    if not np.isfinite(both).all() or both[1].sum() == 0:
-        return float("-inf"), float("-inf")
-    drawn = np.random.default_rng(seed).integers(0, both.shape[1], (RESAMPLES, both.shape[1]))
-    model, mean = both[:, drawn].sum(axis=2)
-    left = model / np.maximum(mean, np.finfo(float).tiny)
-    return float(1 - both[0].sum() / both[1].sum()), float(1 - np.quantile(left, 0.99))

@@ -6,23 +6,17 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.runs import FreeRun, run_of
-from mckibben.channels import Channels
-from mckibben.comparison.choosing import CONSTANT, skill_of
-from mckibben.comparison.leaderboard import Row, Validated
-from mckibben.comparison.parts import Part
-from mckibben.comparison.splits import Split
+from mckibben.comparison.leaderboard import Validated
+from mckibben.comparison.planning import Candidate, Data
 from mckibben.diagnosis.branch_gaps import Memory, memory_test
 from mckibben.errors import MckibbenError, unforeseen
 from mckibben.estimators.core.estimator import Estimator
-from mckibben.metrics import Scores, mean_scores, score
 from mckibben.recording import Recording
 from mckibben.system import workers
 from mckibben.system.threads import cores
@@ -33,89 +27,6 @@ TIMED_SAMPLES = 20_000
 
 WORTH_A_PROCESS = 2.0
 """Seconds of work below which starting processes costs more time than it saves."""
-
-PIECES = 4
-"""Number of consecutive pieces of a part whose squared errors are summed, for resampling."""
-
-LEAST_SHARE = 0.1
-"""Smallest error of a part that counts, relative to that of all parts together: a rest does not decide.
-"""
-
-
-@dataclass(frozen=True)
-class Data:
-    """Data common to all models: training and test data, what is left out in turn, channels.
-
-    Parameters
-    ----------
-    checks : tuple of Recording
-        Recordings to choose on, to which nothing is fitted; none to leave out parts of
-        the training data.
-    parts : tuple of Part
-        Of these, or else of the training recordings.
-    """
-
-    split: Split
-    parts: tuple[Part, ...]
-    channels: Channels
-    checks: tuple[Recording, ...] = ()
-
-    @property
-    def recordings(self) -> tuple[Recording, ...]:
-        """Every training recording, then every test recording."""
-        return (*self.split.train, *self.split.test)
-
-    @property
-    def held_out(self) -> tuple[Recording, ...]:
-        """Recordings of the parts."""
-        return self.checks or self.split.train
-
-    def test_errors(self, outputs: Sequence[Array]) -> Array:
-        """Return the errors of outputs on all recordings at the samples scored, shape (n, k)."""
-        split, names = self.split, self.channels.outputs
-        runs = zip(outputs[len(split.train) :], split.test, split.test_rows, strict=True)
-        return np.concatenate([(found - run.matrix(names))[rows] for found, run, rows in runs])
-
-    def part_errors(self, predictions: Sequence[Array]) -> list[Array]:
-        """Return the errors of held-out predictions on every part, shape (n, k) each."""
-        names = self.channels.outputs
-        pairs = zip(predictions, self.held_out, strict=True)
-        errors = [found - run.matrix(names) for found, run in pairs]
-        return [
-            np.concatenate([error[rows] for error, rows in zip(errors, part, strict=True)])
-            for part in self.parts
-        ]
-
-    def held(self, predictions: Sequence[Array], block: Block) -> list[FreeRun]:
-        """Return the held-out predictions of every recording of the parts, as runs."""
-        inputs, outputs = [channel.name for channel in block.inputs], self.channels.outputs
-        each = zip(self.held_out, predictions, zip(*self.parts, strict=True), strict=True)
-        return [
-            FreeRun.of(run_of(one, inputs, outputs, counts=np.any(rows, axis=0)), found)
-            for one, found, rows in each
-        ]
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A model to fit, by its short name or as an estimator, and its settings."""
-
-    model: str | Estimator
-    settings: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def made(self) -> type[Estimator]:
-        """Class of the estimator."""
-        if isinstance(self.model, str):
-            found: type[Estimator] = registry.load("estimators", self.model)
-            return found
-        return type(self.model)
-
-    def estimator(self, channels: Channels) -> Estimator:
-        """Return the estimator of the channels of a comparison."""
-        named = self.made.channel_settings(channels.inputs, channels.outputs, channels.scheduling)
-        own = {} if isinstance(self.model, str) else self.model.get_params()
-        return self.made(**own | named | dict(self.settings))
 
 
 @dataclass(frozen=True)
@@ -207,7 +118,7 @@ def _fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:
         outputs=outputs,
         seconds=seconds,
         step_ns=_step_cost(block, split.train[0]),
-        memory=memory_test(block, split.test, outputs[len(split.train) :], channels.pairs()),
+        memory=memory_test(block, split.test, outputs[len(split.train) :], channels.pairs),
         diagnostics=diagnostics,
         caution=estimator.caution,
     )
@@ -245,89 +156,3 @@ def _step_cost(block: Block, recording: Recording) -> float:
         block.simulate(inputs, sample_time=recording.sample_time)
         times.append(time.perf_counter() - started)
     return min(times) / TIMED_SAMPLES * 1e9
-
-
-def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed: int) -> Row:
-    """Return the row of a model: all scores, and its skill over the constant.
-
-    Parameters
-    ----------
-    found : FitResult
-    constant : array, shape (pieces, k), or None
-        Squared errors of the mean of the training output; see `squares_of`.
-    """
-    if found.reason is not None:
-        return Row(name, reason=found.reason)
-    names, block, n_train = data.channels.outputs, found.block, len(data.split.train)
-    rows = [*(~run.bridged for run in data.split.train), *data.split.test_rows]
-    measured = [run.matrix(names)[kept] for run, kept in zip(data.recordings, rows, strict=True)]
-    modelled = [given[kept] for given, kept in zip(found.outputs, rows, strict=True)]
-
-    def scores(part: slice) -> dict[str, Scores]:
-        columns = (np.concatenate(some[part]).T for some in (measured, modelled))
-        return {name: score(*pair) for name, *pair in zip(names, *columns, strict=True)}
-
-    on_train, on_test = scores(slice(n_train)), scores(slice(n_train, None))
-    errors = data.part_errors(found.predictions)
-    invalid, by_output, parts, skill, least = None, {}, (), None, None
-    if not all(np.isfinite(error).all() for error in errors):
-        invalid = "its outputs diverged without a part of the data"
-    elif errors:
-        by_part = np.sqrt([(error**2).mean(axis=0) for error in errors])
-        pooled = np.sqrt((np.concatenate(errors) ** 2).mean(axis=0))
-        least_error = np.maximum(LEAST_SHARE * pooled, np.finfo(float).tiny)
-        means = np.exp(np.log(np.maximum(by_part, least_error)).mean(axis=0))
-        by_output = dict(zip(names, means.tolist(), strict=True))
-        parts = tuple(by_part.mean(axis=1).tolist())
-        if constant is not None:
-            skill, least = skill_of(squares_of(errors).sum(axis=1), constant.sum(axis=1), seed)
-    return Row(
-        model=name,
-        n_parameters=found.diagnostics.get("n_free", len(names)),
-        fit_seconds=found.seconds,
-        step_ns=found.step_ns,
-        train=mean_scores(list(on_train.values())),
-        test=mean_scores(list(on_test.values())),
-        outputs=on_test,
-        validation_rmse=float(np.mean(list(by_output.values()))) if by_output else None,
-        validation_by_output=by_output,
-        validation_by_part=parts,
-        validation_failed=invalid,
-        validated=found.validated,
-        caution=found.caution,
-        skill=skill,
-        skill_least=least,
-        memory=found.memory,
-        block=block,
-        diagnostics=found.diagnostics,
-    )
-
-
-def squares_of(errors: Sequence[Array]) -> Array:
-    """Return summed squared errors of consecutive pieces of every part, shape (pieces, k)."""
-    pieces = [piece for error in errors for piece in np.array_split(error, PIECES)]
-    return np.array([(piece**2).sum(axis=0) for piece in pieces])
-
-
-class Constant(NamedTuple):
-    """The mean of the training output as a model, for any input."""
-
-    row: Row
-    outputs: tuple[Array, ...]
-    squares: Array | None
-
-
-def constant_of(data: Data) -> Constant:
-    """Return the row of the mean of the training output, its outputs, and its squared errors."""
-    train, names = data.split.train, data.channels.outputs
-    tables = [recording.matrix(names) for recording in train]
-    mean = np.concatenate(tables).mean(axis=0)
-    outputs = tuple(np.tile(mean, (len(recording), 1)) for recording in data.recordings)
-    predictions = tuple(np.tile(mean, (len(recording), 1)) for recording in data.held_out)
-    for part in () if data.checks else data.parts:
-        rest = [table[~rows] for table, rows in zip(tables, part, strict=True)]
-        for table, rows in zip(predictions, part, strict=True):
-            table[rows] = np.concatenate(rest).mean(axis=0)
-    squares = squares_of(data.part_errors(predictions)) if data.parts else None
-    found = FitResult(predictions, outputs=outputs)
-    return Constant(row_of(data, CONSTANT, found, None, 0), outputs, squares)

@@ -1,19 +1,20 @@
-"""Results of a comparison: one row per model, in the order of the choice."""
+"""Results of a comparison: one row per model, in the order of the choice, and doubts about it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.inverse import Inverse
-from mckibben.comparison.choosing import CONSTANT, Against, order, recommended
-from mckibben.comparison.doubts import Doubt, Span, doubts_of
+from mckibben.comparison.choosing import CAUTION, CONSTANT, Against, order, recommended
+from mckibben.comparison.splits import Span
 from mckibben.diagnosis.bands import TestedBand
 from mckibben.diagnosis.branch_gaps import Memory
 from mckibben.errors import MckibbenError
@@ -23,6 +24,15 @@ from mckibben.system.showing import DrawsItself
 if TYPE_CHECKING:
     import pandas as pd
 
+
+BAD_PART = 3.0
+"""Error on a part, relative to the cross-validated error, above which it is bad."""
+
+FEWEST_PARTS = 3
+"""Smallest number of parts on which two models are compared."""
+
+LEVEL = 0.95
+"""Confidence level of the interval of two models' ratio of errors."""
 
 Validated = Literal["step", "given", "fit"]
 """How the error on a part was found; see `Row`."""
@@ -223,6 +233,38 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and np.isfinite(value) else None
 
 
+@dataclass(frozen=True)
+class Doubt:
+    """What is doubtful, and the data that would decide.
+
+    Parameters
+    ----------
+    kind : {"test", "part", "level"}
+        Another model is better on the test, beyond its interval; the chosen model is bad on one part; or
+        another one is level with it in the cross-validation.
+    model : str
+        That model: another one, or of a bad part the chosen one.
+    ratio : float
+        Error of the chosen model over the other's on the test; of a bad part, over its cross-validated
+        error; of a level model, its error over the chosen one's in the cross-validation, as they count
+        in the choice.
+    interval : (float, float) or None
+        95 % interval of the last.
+    spans : tuple of Span
+        The bad part, or that on which two level models differ most; empty where the test is meant.
+    """
+
+    kind: Literal["test", "part", "level"]
+    model: str
+    ratio: float
+    interval: tuple[float, float] | None = None
+    spans: tuple[Span, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return asdict(self)
+
+
 @dataclass(frozen=True, repr=False)
 class Leaderboard(DrawsItself):
     """Models chosen on training data, and their errors on independent test data.
@@ -258,8 +300,10 @@ class Leaderboard(DrawsItself):
         Where recordings to fit to and to test on are the same data, which the user insisted on.
     loads : tuple of str
         Further input channels of models, which are never commanded.
-    ignored : tuple of str
-        Loads that vary in the recordings and that no model is given.
+    offered : tuple of str
+        Further input channels of the models that can take them.
+    unused : tuple of str
+        Channels that vary in the recordings and that no model is given.
     outside : mapping of str to float
         Channel to the share of the samples tested on that are outside of its range in training.
     parts : tuple of tuple of Span
@@ -273,9 +317,9 @@ class Leaderboard(DrawsItself):
     unit: str
     rows: tuple[Row, ...]
     split: str
-    seed: int
     n_train: int
     n_test: int
+    seed: int = 0
     chosen_by: str = "cross-validation"
     left_out: Mapping[str, str] = field(default_factory=dict)
     pending: tuple[str, ...] = ()
@@ -284,7 +328,8 @@ class Leaderboard(DrawsItself):
     constant: Row | None = None
     shared: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
-    ignored: tuple[str, ...] = ()
+    offered: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
     outside: Mapping[str, float] = field(default_factory=dict)
     parts: tuple[tuple[Span, ...], ...] = ()
 
@@ -378,7 +423,8 @@ class Leaderboard(DrawsItself):
             "pending": list(self.pending),
             "notes": list(self.notes),
             "shared": list(self.shared),
-            "ignored": list(self.ignored),
+            "offered": list(self.offered),
+            "unused": list(self.unused),
             "outside": dict(self.outside),
             "rows": [row.to_dict() for row in self.ranking],
         }
@@ -395,3 +441,58 @@ class Leaderboard(DrawsItself):
             [{key: row[key] for key in row if key != "validation_by_part"} for row in rows]
         )
         return table.assign(shared=" ".join(self.shared)) if self.shared else table
+
+
+def doubts_of(
+    best: Row, others: Sequence[Row], parts: Sequence[tuple[Span, ...]]
+) -> tuple[Doubt, ...]:
+    """Return what is doubtful about a choice, most important first.
+
+    Parameters
+    ----------
+    best : Row
+        Of the chosen model.
+    others : sequence of Row
+        Of the others, in the order of the choice.
+    parts : sequence of tuple of Span
+        Of the cross-validation.
+    """
+    sound = [row for row in others if row.sound]
+    found = []
+    beyond = [
+        r for r in sound if r.difference_interval is not None and r.difference_interval[1] < 0
+    ]
+    if beyond:
+        better = min(beyond, key=lambda row: row.test_error)
+        found.append(Doubt("test", better.model, best.test_error / better.test_error))
+    errors = np.array(best.validation_by_part)
+    if best.validation_rmse and errors.size:
+        worst = int(np.argmax(errors))
+        ratio = float(errors[worst] / best.validation_rmse)
+        if ratio > BAD_PART:
+            found.append(Doubt("part", best.model, ratio, None, tuple(parts[worst])))
+    second = next((row for row in sound if row.validation_rmse is not None), None)
+    if second is not None and best.validation_rmse is not None and errors.size >= FEWEST_PARTS:
+        ratios = np.log(_counted(second)) - np.log(_counted(best))
+        low, high = _interval(ratios)
+        if low <= 0:
+            places = int(np.argmax(np.abs(ratios)))
+            ends = float(np.exp(low)), float(np.exp(high))
+            ratio = float(np.exp(ratios.mean()))
+            found.append(Doubt("level", second.model, ratio, ends, tuple(parts[places])))
+    return tuple(found)
+
+
+def _counted(row: Row) -> Array:
+    """Return the errors on all parts as they count in the choice."""
+    least = np.finfo(float).tiny
+    return np.asarray(np.maximum(row.validation_by_part, least) * (CAUTION if row.doubted else 1.0))
+
+
+def _interval(values: Array) -> tuple[float, float]:
+    """Return the interval of the mean of independent values, by Student's t."""
+    from scipy.special import stdtrit
+
+    mean, n = float(values.mean()), values.size
+    half = stdtrit(n - 1, 0.5 + LEVEL / 2) * float(values.std(ddof=1)) / np.sqrt(n)
+    return mean - half, mean + half

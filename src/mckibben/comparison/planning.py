@@ -1,23 +1,18 @@
-"""Set-up of a comparison: applicable models, channels, split and parts."""
+"""Set-up of a comparison: channels, data, split and parts, and the models that apply."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from mckibben import registry
 from mckibben.channels import Channels, Names, channels_of
-from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.choosing import CONSTANT
-from mckibben.comparison.fitting import Candidate, Constant, Data, constant_of
-from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.comparison.parts import parts_of, spans_of
-from mckibben.comparison.splits import Split, split_of
+from mckibben.comparison.leaderboard import Leaderboard
+from mckibben.comparison.splits import Part, Split, parts_of, spans_of, split_of
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.catalogue import declared, settings_of_all
 from mckibben.estimators.core.estimator import Estimator
@@ -28,6 +23,57 @@ from mckibben.signals.shared_rows import check_shared
 
 Models = str | Sequence[str] | Mapping[str, str | Estimator]
 """Models of a comparison: "all", "quick", short names, or labels with short names or estimators."""
+
+
+@dataclass(frozen=True)
+class Data:
+    """Data common to all models: training and test data, what is left out in turn, channels.
+
+    Parameters
+    ----------
+    checks : tuple of Recording
+        Recordings to choose on, to which nothing is fitted; none to leave out parts of
+        the training data.
+    parts : tuple of Part
+        Of these, or else of the training recordings.
+    """
+
+    split: Split
+    parts: tuple[Part, ...]
+    channels: Channels
+    checks: tuple[Recording, ...] = ()
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        """Every training recording, then every test recording."""
+        return (*self.split.train, *self.split.test)
+
+    @property
+    def held_out(self) -> tuple[Recording, ...]:
+        """Recordings of the parts."""
+        return self.checks or self.split.train
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model to fit, by its short name or as an estimator, and its settings."""
+
+    model: str | Estimator
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def made(self) -> type[Estimator]:
+        """Class of the estimator."""
+        if isinstance(self.model, str):
+            found: type[Estimator] = registry.load("estimators", self.model)
+            return found
+        return type(self.model)
+
+    def estimator(self, channels: Channels) -> Estimator:
+        """Return the estimator of the channels of a comparison."""
+        named = self.made.channel_settings(channels)
+        own = {} if isinstance(self.model, str) else self.model.get_params()
+        return self.made(**own | named | dict(self.settings))
 
 
 @dataclass(frozen=True)
@@ -49,116 +95,112 @@ class Plan:
     empty: Leaderboard
     refused: Mapping[str, str]
 
-    @cached_property
-    def constant(self) -> Constant:
-        """The mean of the training output as a model."""
-        return constant_of(self.data)
-
-    def kept(self, folder: str | Path | None) -> Checkpoints:
-        """Return where finished models are stored."""
-        return Checkpoints(folder, self.data)
-
-    def board(self, rows: Sequence[Row] = ()) -> Leaderboard:
-        """Return the leaderboard of the finished models."""
-        done = {row.model for row in rows}
-        pending = tuple(name for name in self.items if name not in done)
-        return replace(self.empty, rows=tuple(rows), pending=pending, constant=self.constant.row)
-
 
 def plan_of(
     train: Recording | Sequence[Recording],
-    test: Recording | Sequence[Recording],
+    test: Recording | Sequence[Recording] = (),
+    *,
+    models: Models = "all",
+    settings: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    **choices: Any,
+) -> Plan:
+    """Return the set-up of a comparison; see `compare`."""
+    data, empty = data_of(train, test, **choices)
+    items, left_out = _chosen(models, [*data.recordings, *data.checks], data.channels, seed)
+    made = {name: item.made for name, item in items.items()}
+    made |= {name: declared(name) for name in left_out}
+    given = settings_of_all(made, settings) if settings else {}
+    # that a model is not given the load is no reason against it
+    unloaded = replace(data.channels, scheduling=(), offered=data.channels.further)
+    refused = objections(items, data.split.train, data.channels)
+    refused = objections({name: items[name] for name in refused}, data.split.train, unloaded)
+    items = {
+        name: replace(items[name], settings={**items[name].settings, **given.get(name, {})})
+        for name in sorted(items, key=lambda name: items[name].made.effort)
+    }
+    return Plan(
+        data,
+        items,
+        replace(empty, seed=seed, left_out=left_out, pending=tuple(items)),
+        refused,
+    )
+
+
+def data_of(
+    train: Recording | Sequence[Recording],
+    test: Recording | Sequence[Recording] = (),
     *,
     inputs: Names = None,
     outputs: Names = None,
     load: str | None = None,
     validation: Sequence[Recording] = (),
-    models: Models = "all",
-    settings: Mapping[str, Any] | None = None,
-    seed: int = 0,
     most_samples: int | None = None,
     allow_shared: bool = False,
-) -> Plan:
-    """Return the set-up of a comparison; see `compare`."""
-    recordings, tests, checks = listed(train), listed(test), listed(validation)
-    if not recordings:
+) -> tuple[Data, Leaderboard]:
+    """Return the data of a comparison, and what a leaderboard states of them; see `compare`."""
+    sides = [listed(train), listed(validation), listed(test)]
+    every = [one for side in sides for one in side]
+    notes = reading_notes(every)
+    if not sides[0]:
         raise DataError("there are no recordings to fit", remedy="give at least one")
-    channels = channels_of([*recordings, *tests, *checks], inputs, outputs, load)
-    names = (*channels.inputs, *channels.outputs)
-    recordings, tests, checks = (
-        [one.with_derived(names) for one in side] for side in (recordings, tests, checks)
-    )
-    every = [*recordings, *tests, *checks]
-    unit = _checked([recordings, every], channels)
-    notes: tuple[str, ...] = ()
+    channels = channels_of(every, inputs, outputs, load)
+    unit = _unit_of(sides, channels)
+    sides = [[one.with_derived(channels.sides) for one in side] for side in sides]
     shared = check_shared(
-        {"fit": recordings, "validate": checks, "test": tests},
-        [*channels.inputs, *channels.scheduled(recordings)],
+        dict(zip(("fit", "validate", "test"), sides, strict=True)),
+        [*channels.inputs, *channels.scheduling],
         channels.outputs,
         allow=allow_shared,
     )
     if channels.single:
-        (recordings, checks, tests), thinned = made_manageable(
-            [recordings, checks, tests], channels.inputs[0], most_samples
-        )
+        sides, thinned = made_manageable(sides, channels.inputs[0], most_samples)
         notes = (*thinned, *notes)
     elif most_samples is not None:
         raise DataError(
             "recordings of several muscles, or under loads, are not thinned",
             remedy="leave `most_samples` out, or resample them to a longer sample time",
         )
+    recordings, checks, tests = sides
     split = split_of(recordings, tests, channels)
     parts = parts_of(checks or split.train, channels)
+    data = Data(split, parts, channels, tuple(checks))
     chosen_by = ("given" if checks else "cross-validation") if parts else "fit"
     described = split.described
     if chosen_by == "cross-validation":
         described += f", cross-validated on {counted(len(parts), 'part')}"
-    items, left_out = _chosen(models, every, channels, seed)
-    made = {name: item.made for name, item in items.items()}
-    made |= {name: declared(name) for name in left_out}
-    given = settings_of_all(made, settings) if settings else {}
-    # that a model is not given the load is no reason against it
-    unloaded = replace(channels, scheduling=None)
-    refused = objections(items, split.train, channels)
-    refused = objections({name: items[name] for name in refused}, split.train, unloaded)
-    items = {
-        name: replace(items[name], settings={**items[name].settings, **given.get(name, {})})
-        for name in sorted(items, key=lambda name: items[name].made.effort)
-    }
-    empty = Leaderboard(
+    return data, Leaderboard(
         inputs=channels.inputs,
         outputs=channels.outputs,
         unit=unit,
         rows=(),
         split=described,
-        seed=seed,
         n_train=sum(map(len, split.train)),
         n_test=sum(int(rows.sum()) for rows in split.test_rows),
         chosen_by=chosen_by,
-        left_out=left_out,
-        notes=(*notes, *reading_notes(every)),
+        notes=notes,
         shared=shared,
-        loads=channels.scheduled(every),
-        ignored=channels.ignored(every),
-        outside=_outside(split, channels.known(every)),
-        parts=tuple(spans_of(part, checks or split.train) for part in parts),
+        loads=channels.scheduling,
+        offered=channels.offered,
+        unused=channels.unused,
+        outside=_outside(split, (*channels.inputs, *channels.further)),
+        parts=tuple(spans_of(part, data.held_out) for part in parts),
     )
-    return Plan(Data(split, parts, channels, tuple(checks)), items, empty, refused)
 
 
-def _checked(some: Sequence[Sequence[Recording]], channels: Channels) -> str:
-    """Raise an error for recordings that no model can use; return the outputs' unit."""
+def _unit_of(sides: Sequence[Sequence[Recording]], channels: Channels) -> str:
+    """Return the outputs' unit; raise an error for recordings that no model can use."""
     from mckibben.estimators.core.data import training_data
 
-    for recordings in some:
-        training_data(recordings, channels.inputs, channels.outputs, one_rate=channels.single)
-    units = {name: some[0][0].units[name] for name in channels.outputs}
+    for some in (sides[0], [one for side in sides for one in side]):
+        data = training_data(some, channels.inputs, channels.outputs, one_rate=channels.single)
+    units = {channel.name: channel.unit for channel in data.outputs}
     if len(set(units.values())) > 1:
         raise DataError(
             f"the outputs have different units: {units}, so that their errors have no mean",
             remedy="compare models of each separately, with `output`",
         )
-    return next(iter(units.values()))
+    return data.outputs[0].unit
 
 
 def _outside(split: Split, names: Sequence[str]) -> dict[str, float]:
@@ -221,11 +263,10 @@ def objections(
     items: Mapping[str, Candidate], recordings: Sequence[Recording], channels: Channels
 ) -> dict[str, str]:
     """Return which models do not apply to recordings, and why."""
-    asked = recordings, channels.inputs, channels.outputs, channels.scheduling
     found: dict[str, str] = {}
     for name, item in items.items():
         try:
-            reason = item.made.objection(*asked) or _timeless(item.made, recordings)
+            reason = item.made.objection(recordings, channels) or _timeless(item.made, recordings)
         except ModelError as error:  # a plug-in that is broken is not the end of all others
             reason = str(error)
         if reason is not None:

@@ -8,11 +8,13 @@ from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.runs import FreeRun, run_of
 from mckibben.channels import Names
 from mckibben.checkpoints import Checkpoints, source
 from mckibben.comparison.choosing import CONSTANT
@@ -23,15 +25,16 @@ from mckibben.comparison.fitting import (
     outputs_of,
     processes_for,
     results,
-    row_of,
 )
 from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.comparison.planning import Models, Plan, plan_of
+from mckibben.comparison.planning import Data, Models, Plan, plan_of
 from mckibben.diagnosis.bands import tested_band
 from mckibben.errors import MckibbenError
+from mckibben.metrics import Scores, mean_scores, score
 from mckibben.numerals import duration
 from mckibben.recording import Recording
 from mckibben.statistics import (
+    RESAMPLES,
     BlockBootstrap,
     block_length,
     correlation_length,
@@ -42,6 +45,13 @@ from mckibben.system.progress import telling
 from mckibben.system.workers import checked
 
 Watch = Callable[[str, float, float], None]
+
+PIECES = 4
+"""Number of consecutive pieces of a part whose squared errors are summed, for resampling."""
+
+LEAST_SHARE = 0.1
+"""Smallest error of a part that counts, relative to that of all parts together: a rest does not decide.
+"""
 
 SURE = 0.1
 """Share of the work after which the remaining time is extrapolated from the progress so far."""
@@ -180,12 +190,14 @@ def compare(
         most_samples=most_samples,
         allow_shared=allow_shared,
     )
-    kept, board = plan.kept(folder), plan.board()
+    board = plan.empty
     try:
         with (
             telling(progress, "comparing", lines=True) as tell,
             closing(
-                ranked(plan, jobs=jobs, executor=executor, kept=kept, progress=tell, watch=watch)
+                ranked(
+                    plan, jobs=jobs, executor=executor, folder=folder, progress=tell, watch=watch
+                )
             ) as rankings,
         ):
             for ranking in rankings:
@@ -197,7 +209,7 @@ def compare(
             raise
         return replace(board, stopped=True)
     if clear:
-        kept.clear()
+        Checkpoints(folder).clear()
     return board
 
 
@@ -213,8 +225,8 @@ def ranked(
     plan: Plan,
     *,
     jobs: int | None,
-    kept: Checkpoints,
     executor: Executor | None = None,
+    folder: str | Path | None = None,
     progress: Callable[[Standing], None] | None = None,
     watch: Watch | None = None,
 ) -> Generator[Ranking]:
@@ -223,7 +235,7 @@ def ranked(
     In one process fast models are first, in several the slow ones, so that none is left for the end.
     """
     checked(jobs)
-    data, table = plan.data, _Table(plan)
+    data, table, kept = plan.data, _Table(plan), Checkpoints(folder, plan.data)
     keys = {name: (item, source(item.made)) for name, item in plan.items.items()}
     for name, reason in plan.refused.items():
         table.add(Row(name, reason=reason), ())
@@ -243,7 +255,7 @@ def ranked(
         if progress is not None:
             waiting = [name for name in remaining if name not in table.rows]
             working = tuple(name for name in begun if name in waiting)
-            best = plan.board(table.sorted()).best
+            best = table.board(table.sorted()).best
             rest = sum(efforts[name] for name in waiting)
             done = sum(efforts.values()) - rest
             spent = time.monotonic() - started
@@ -276,18 +288,18 @@ def ranked(
 
 def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
     """Return the row of a model, with its band if it is the best so far."""
+    data = plan.data
     try:
-        row = row_of(plan.data, name, found, plan.constant.squares, plan.empty.seed)
+        row = row_of(data, name, found, table.constant.squares, plan.empty.seed)
     except MckibbenError as error:  # its outputs overflow
         return Row(name, reason=str(error))
     better = any(other.sound and other.order < row.order for other in table.rows.values())
     if better or not row.sound or row.block is None or row.validation_rmse is None:
         return row
-    data, given = plan.data, tuple(channel.name for channel in row.block.outputs)
-    if given != data.channels.outputs:
+    if tuple(channel.name for channel in row.block.outputs) != data.channels.outputs:
         return row
-    held = data.held(found.predictions, row.block)
-    tested = tested_band(row.block, held, found.outputs, data.split)
+    predictions = held(data, found.predictions, row.block)
+    tested = tested_band(row.block, predictions, found.outputs, data.split)
     if tested is None:
         return row
     banded, band = tested
@@ -299,10 +311,11 @@ class _Table:
 
     def __init__(self, plan: Plan) -> None:
         self.rows: dict[str, Row] = {}
+        self.constant = constant_of(plan.data)
         self._plan = plan
         self._outputs: dict[str, tuple[Array, ...]] = {}
         self._lengths = [int(rows.sum()) for rows in plan.data.split.test_rows if rows.any()]
-        self._errors = {CONSTANT: plan.data.test_errors(plan.constant.outputs)}
+        self._errors = {CONSTANT: test_errors(plan.data, self.constant.outputs)}
         self._correlation: dict[str, float] = {}
         self._resamples: dict[tuple[str, tuple[int, ...]], Array] = {}
 
@@ -310,7 +323,7 @@ class _Table:
         """Add the row of a finished model, and its outputs on all recordings."""
         self.rows[row.model] = row
         if row.test is not None:
-            errors = self._errors[row.model] = self._plan.data.test_errors(outputs)
+            errors = self._errors[row.model] = test_errors(self._plan.data, outputs)
             self._outputs[row.model] = outputs
             squares = errors**2 / np.maximum((errors**2).mean(axis=0), np.finfo(float).tiny)
             ends = np.cumsum(self._lengths)[:-1]
@@ -321,17 +334,23 @@ class _Table:
         tested = [row for row in self.rows.values() if row.test is not None]
         return sorted(tested, key=lambda row: row.order)
 
+    def board(self, rows: Sequence[Row]) -> Leaderboard:
+        """Return the leaderboard of some rows."""
+        pending = tuple(name for name in self._plan.items if name not in self.rows)
+        constant = self.constant.row
+        return replace(self._plan.empty, rows=tuple(rows), pending=pending, constant=constant)
+
     def ranking(self) -> Ranking:
         """Return the leaderboard of all rows."""
-        plan, rows = self._plan, self.sorted()
+        rows = self.sorted()
         failed = [row for row in self.rows.values() if row.test is None]
         failed.sort(key=lambda row: row.model)
         if not rows:
-            return Ranking(plan.board(failed), {})
-        every = [*rows, plan.constant.row]
+            return Ranking(self.board(failed), {})
+        every = [*rows, self.constant.row]
         errors = np.array([row.test_error for row in every])
         samples = np.array(self._resampled([row.model for row in every]))
-        best = plan.board(rows).best or rows[0]
+        best = self.board(rows).best or rows[0]
         by_test = sorted(errors[:-1])
         ends = differences(samples, errors, rows.index(best))
         placed = [
@@ -346,7 +365,7 @@ class _Table:
             )
             for row, own, between in zip(every, samples, ends, strict=True)
         ]
-        board = plan.board([*placed[:-1], *failed])
+        board = self.board([*placed[:-1], *failed])
         outputs = {row.model: self._outputs[row.model] for row in rows}
         return Ranking(replace(board, constant=placed[-1]), outputs)
 
@@ -360,3 +379,138 @@ class _Table:
             for model in missing:
                 self._resamples[model, blocks] = bootstrap.rmse(self._errors[model])
         return [self._resamples[model, blocks] for model in models]
+
+
+def test_errors(data: Data, outputs: Sequence[Array]) -> Array:
+    """Return the errors of outputs on all recordings at the samples scored, shape (n, k)."""
+    split, names = data.split, data.channels.outputs
+    runs = zip(outputs[len(split.train) :], split.test, split.test_rows, strict=True)
+    return np.concatenate([(found - run.matrix(names))[rows] for found, run, rows in runs])
+
+
+def part_errors(data: Data, predictions: Sequence[Array]) -> list[Array]:
+    """Return the errors of held-out predictions on every part, shape (n, k) each."""
+    names = data.channels.outputs
+    pairs = zip(predictions, data.held_out, strict=True)
+    errors = [found - run.matrix(names) for found, run in pairs]
+    return [
+        np.concatenate([error[rows] for error, rows in zip(errors, part, strict=True)])
+        for part in data.parts
+    ]
+
+
+def held(data: Data, predictions: Sequence[Array], block: Block) -> list[FreeRun]:
+    """Return the held-out predictions of every recording of the parts, as runs."""
+    inputs, outputs = [channel.name for channel in block.inputs], data.channels.outputs
+    each = zip(data.held_out, predictions, zip(*data.parts, strict=True), strict=True)
+    return [
+        FreeRun.of(run_of(one, inputs, outputs, counts=np.any(rows, axis=0)), found)
+        for one, found, rows in each
+    ]
+
+
+def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed: int) -> Row:
+    """Return the row of a model: all scores, and its skill over the constant.
+
+    Parameters
+    ----------
+    found : FitResult
+    constant : array, shape (pieces, k), or None
+        Squared errors of the mean of the training output; see `squares_of`.
+    """
+    if found.reason is not None:
+        return Row(name, reason=found.reason)
+    names, block, n_train = data.channels.outputs, found.block, len(data.split.train)
+    rows = [*(~run.bridged for run in data.split.train), *data.split.test_rows]
+    measured = [run.matrix(names)[kept] for run, kept in zip(data.recordings, rows, strict=True)]
+    modelled = [given[kept] for given, kept in zip(found.outputs, rows, strict=True)]
+
+    def scores(part: slice) -> dict[str, Scores]:
+        columns = (np.concatenate(some[part]).T for some in (measured, modelled))
+        return {name: score(*pair) for name, *pair in zip(names, *columns, strict=True)}
+
+    on_train, on_test = scores(slice(n_train)), scores(slice(n_train, None))
+    errors = part_errors(data, found.predictions)
+    invalid, by_output, parts, skill, least = None, {}, (), None, None
+    if not all(np.isfinite(error).all() for error in errors):
+        invalid = "its outputs diverged without a part of the data"
+    elif errors:
+        by_part = np.sqrt([(error**2).mean(axis=0) for error in errors])
+        pooled = np.sqrt((np.concatenate(errors) ** 2).mean(axis=0))
+        least_error = np.maximum(LEAST_SHARE * pooled, np.finfo(float).tiny)
+        means = np.exp(np.log(np.maximum(by_part, least_error)).mean(axis=0))
+        by_output = dict(zip(names, means.tolist(), strict=True))
+        parts = tuple(by_part.mean(axis=1).tolist())
+        if constant is not None:
+            skill, least = skill_of(squares_of(errors).sum(axis=1), constant.sum(axis=1), seed)
+    return Row(
+        model=name,
+        n_parameters=found.diagnostics.get("n_free", len(names)),
+        fit_seconds=found.seconds,
+        step_ns=found.step_ns,
+        train=mean_scores(list(on_train.values())),
+        test=mean_scores(list(on_test.values())),
+        outputs=on_test,
+        validation_rmse=float(np.mean(list(by_output.values()))) if by_output else None,
+        validation_by_output=by_output,
+        validation_by_part=parts,
+        validation_failed=invalid,
+        validated=found.validated,
+        caution=found.caution,
+        skill=skill,
+        skill_least=least,
+        memory=found.memory,
+        block=block,
+        diagnostics=found.diagnostics,
+    )
+
+
+def squares_of(errors: Sequence[Array]) -> Array:
+    """Return summed squared errors of consecutive pieces of every part, shape (pieces, k)."""
+    pieces = [piece for error in errors for piece in np.array_split(error, PIECES)]
+    return np.array([(piece**2).sum(axis=0) for piece in pieces])
+
+
+class Constant(NamedTuple):
+    """The mean of the training output as a model, for any input."""
+
+    row: Row
+    outputs: tuple[Array, ...]
+    squares: Array | None
+
+
+def constant_of(data: Data) -> Constant:
+    """Return the row of the mean of the training output, its outputs, and its squared errors."""
+    train, names = data.split.train, data.channels.outputs
+    tables = [recording.matrix(names) for recording in train]
+    mean = np.concatenate(tables).mean(axis=0)
+    outputs = tuple(np.tile(mean, (len(recording), 1)) for recording in data.recordings)
+    predictions = tuple(np.tile(mean, (len(recording), 1)) for recording in data.held_out)
+    for part in () if data.checks else data.parts:
+        rest = [table[~rows] for table, rows in zip(tables, part, strict=True)]
+        for table, rows in zip(predictions, part, strict=True):
+            table[rows] = np.concatenate(rest).mean(axis=0)
+    squares = squares_of(part_errors(data, predictions)) if data.parts else None
+    found = FitResult(predictions, outputs=outputs)
+    return Constant(row_of(data, CONSTANT, found, None, 0), outputs, squares)
+
+
+def skill_of(squares: Array, constant: Array, seed: int) -> tuple[float, float]:
+    """Return the share of a constant's squared error that a model explains, and its lower bound.
+
+    The bound is exceeded by 99 % of resamples of blocks, the same for both.
+
+    Parameters
+    ----------
+    squares, constant : array, shape (pieces,)
+        Sums of squared errors of the model and of the constant on the same blocks.
+    seed : int
+        Of the resampling.
+    """
+    both = np.array([squares, constant])
+    if not np.isfinite(both).all() or both[1].sum() == 0:
+        return float("-inf"), float("-inf")
+    drawn = np.random.default_rng(seed).integers(0, both.shape[1], (RESAMPLES, both.shape[1]))
+    model, mean = both[:, drawn].sum(axis=2)
+    left = model / np.maximum(mean, np.finfo(float).tiny)
+    return float(1 - both[0].sum() / both[1].sum()), float(1 - np.quantile(left, 0.99))

@@ -1,4 +1,4 @@
-"""Splits of data into fit and test."""
+"""Splits of data into fit and test, and parts of the training data that are left out in turn."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mckibben.arrays import Array, Mask
-from mckibben.channels import Channels, held_at_levels
+from mckibben.channels import Channels
 from mckibben.errors import DataError
 from mckibben.numerals import counted
 from mckibben.recording import Recording
 from mckibben.signals.reversals import reversals
 
 FEWEST = 10
-"""Smallest number of samples on either side of a split."""
+"""Smallest number of samples on either side of a split, and of a part of a recording."""
+
+N_PARTS = 8
+"""Number of parts; a few more where recordings are cut equally."""
 
 HELD_OUT = 0.25
 """Share of the input's travel that is held out by default."""
@@ -52,6 +55,20 @@ class Split:
     described: str
 
 
+Part = tuple[Mask, ...]
+"""For every recording, the samples of a part."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """Samples of one recording that belong to a part: from and to, in a unit (none: sample numbers)."""
+
+    recording: str
+    start: float
+    stop: float
+    unit: str
+
+
 def given_split(train: Sequence[Recording], test: Sequence[Recording]) -> Split:
     """Return the user's split."""
     rows = tuple(~recording.bridged for recording in test)
@@ -81,11 +98,11 @@ def held_out(recordings: Sequence[Recording], channels: Channels) -> Split:
         if len(groups) > 1:
             tested = [place in groups[-1] for place in range(len(recordings))]
             return _parted(recordings, tested, f"the last run at each {channels.inputs[0]}")
-    given = channels.inputs[:1] if channels.single else channels.scheduled(recordings)
-    for name in given if len(recordings) > 1 else ():
+    given = channels.inputs if channels.single else channels.scheduling
+    for name in channels.held if len(recordings) > 1 else ():
         means = [float(f"{recording[name].mean():.3g}") for recording in recordings]
         unseen = sorted(set(means))[1:-1][::EVERY]
-        if unseen and held_at_levels(recordings, name):
+        if unseen and name in given:
             levels = f"{', '.join(f'{level:g}' for level in unseen)} {recordings[0].units[name]}"
             return _parted(
                 recordings, [mean in unseen for mean in means], f"runs at {name} {levels}"
@@ -204,3 +221,46 @@ def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]
     repeat = [levels[:place].count(level) for place, level in enumerate(levels)]
     groups = [[place for place, k in enumerate(repeat) if k % n == one] for one in range(n)]
     return [group for group in groups if group] if min(map(levels.count, levels)) > 1 else []
+
+
+def parts_of(recordings: Sequence[Recording], channels: Channels) -> tuple[Part, ...]:
+    """Return the parts: blocks of time of fewer than `N_PARTS` recordings, else whole recordings.
+
+    These are dealt to the parts in the order of what is held in each of them, such as a load or a
+    length, so that every part has several levels, and repeats are in different parts. Samples bridged in
+    reading belong to none. There are none of too little data.
+    """
+    each = -(-N_PARTS // len(recordings))
+    pieces = [
+        (place, piece)
+        for place in _by_level(recordings, channels)
+        for piece in np.array_split(
+            np.arange(len(recordings[place])), np.clip(len(recordings[place]) // FEWEST, 1, each)
+        )
+    ]
+    count = len(pieces) if each > 1 else N_PARTS
+    measured = [~recording.bridged for recording in recordings]
+    parts = []
+    for first in range(count if count > 1 else 0):
+        rows = [np.zeros(len(recording), dtype=bool) for recording in recordings]
+        for place, piece in pieces[first::count]:
+            rows[place][piece] = measured[place][piece]
+        if any(kept.any() for kept in rows):
+            parts.append(tuple(rows))
+    return tuple(parts)
+
+
+def spans_of(part: Part, recordings: Sequence[Recording]) -> tuple[Span, ...]:
+    """Return what a part has of each recording."""
+    found = []
+    for recording, rows in zip(recordings, part, strict=True):
+        times, unit = recording.time[rows], "" if recording.sample_time is None else "s"
+        if times.size:
+            found.append(Span(recording.name, float(times[0]), float(times[-1]), unit))
+    return tuple(found)
+
+
+def _by_level(recordings: Sequence[Recording], channels: Channels) -> list[int]:
+    """Return the indices of recordings, in the order of the channels that each of them holds."""
+    levels = [tuple(float(f"{r[name].mean():.3g}") for name in channels.held) for r in recordings]
+    return sorted(range(len(recordings)), key=lambda place: levels[place])

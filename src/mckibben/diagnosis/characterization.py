@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from mckibben.channels import loop_of
 from mckibben.diagnosis.conditions import COVERS, constant_segments, levelled, others_of
 from mckibben.diagnosis.excitation import extremes
 from mckibben.diagnosis.loops import (
@@ -170,8 +171,8 @@ class Characterization(DrawsItself):
 
 def characterize(
     recordings: Recording | Sequence[Recording],
-    input: str = "pressure",  # noqa: A002
-    output: str = "displacement",
+    input: str | None = None,  # noqa: A002
+    output: str | None = None,
     *,
     scheduling: Sequence[str] = (),
 ) -> Characterization:
@@ -187,8 +188,8 @@ def characterize(
     ----------
     recordings : Recording or sequence of Recording
         One muscle; every recording starts with unknown memory.
-    input, output : str
-        Channels.
+    input, output : str, optional
+        Channels; default those that `compare` models.
     scheduling : sequence of str
         Other inputs that move the output, in addition to channels of the input's quantity, loads, and
         channels that are constant within recordings and differ between them.
@@ -200,8 +201,8 @@ def characterize(
     Raises
     ------
     DataError
-        On no recordings, a missing or constant channel, units that differ between recordings, fewer
-        than ten samples, or an input that moves only while others do.
+        On no recordings, several inputs or outputs, a missing or constant channel, units that differ
+        between recordings, fewer than ten samples, or an input that moves only while others do.
 
     Examples
     --------
@@ -216,15 +217,16 @@ def characterize(
     (2, 1.0)
     """
     runs = listed(recordings)
-    others = others_of(runs, input, output, scheduling) if runs else []
+    given, wanted = loop_of(runs, input, output)
+    others = others_of(runs, given, wanted, scheduling) if runs else []
     if not others:
-        return _measured(runs, input, output)
-    levels = _levels(runs, input, output, others)
+        return _measured(runs, given, wanted)
+    levels = _levels(runs, given, wanted, others)
     if not levels:
         raise DataError(
             f"it never moves while constant: {', '.join(others)}; its effect cannot be identified",
             file=runs[0].source,
-            channel=input,
+            channel=given,
             remedy="record one in which it moves alone; models of several inputs need no such recording",
         )
     found = max(
@@ -236,7 +238,7 @@ def characterize(
         cycles=tuple(cycle for level in levels for cycle in level.found.cycles),
         n_stretches=sum(level.found.n_recordings for level in levels),
         levels=tuple(levels) if len(levels) > 1 else (),
-        **_counts(runs, input, output),
+        **_counts(runs, given, wanted),
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.channels import schedules
+from mckibben.channels import by_name, channels_of
 from mckibben.diagnosis.tracks import FEWEST
 from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, moves
@@ -27,15 +27,16 @@ def others_of(
 ) -> list[str]:
     """Return other inputs that vary within or between recordings.
 
-    Those asked for, other channels of the input's quantity, what schedules models, and channels that
-    every recording holds.
+    Those asked for, what drives beside the input, what schedules models, and channels that every
+    recording holds.
     """
-    quantity = given.rstrip("0123456789")
     seen = [name for name in recordings[0].channels if all(name in one for one in recordings)]
+    driving = by_name(recordings)[0]
+    further = channels_of(recordings, given, wanted).further
     candidates = [
         *asked,
-        *(n for n in seen if given != quantity and n.rstrip("0123456789") == quantity),
-        *(n for n in schedules(recordings) if n in seen),
+        *(n for n in driving if given in driving and n in seen),
+        *(n for n in further if n in seen),
         *(n for n in seen if all(np.ptp(one[n]) == 0 for one in recordings)),
     ]
     named = [n for n in dict.fromkeys(candidates) if n not in (given, wanted)]

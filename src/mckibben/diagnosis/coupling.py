@@ -47,7 +47,7 @@ class Coupling:
         place = self.outputs.index(output)
         moving = [k for k, name in enumerate(self.inputs) if any_moves(recordings, (name,))]
         moving = moving or list(range(len(self.inputs)))
-        pair = self.inputs.index(Channels(self.inputs, self.outputs).pairs()[place][0])
+        pair = self.inputs.index(Channels(self.inputs, self.outputs).pairs[place][0])
         effects = np.abs(self.effects[place, moving])
         if pair in moving and (self.paired or not np.isfinite(effects).all()):
             return self.inputs[pair]
@@ -58,11 +58,8 @@ class Coupling:
 
         That is the input that is its own; where all are held, what else drives and moves.
         """
-        shared = [n for n in recordings[0].channels if all(n in each for each in recordings)]
-        others = [name for name in shared if name not in self.outputs]
         return tuple(
-            (moved_by(recordings, self.own(output, recordings), others), output)
-            for output in self.outputs
+            (moved_by(recordings, self.own(output, recordings)), output) for output in self.outputs
         )
 
     @property

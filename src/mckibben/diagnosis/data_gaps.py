@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mckibben.channels import channels_of, schedules
+from mckibben.channels import PRESSURE, channels_of
 from mckibben.diagnosis.excitation import Excitation, extremes
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
@@ -147,11 +147,8 @@ def excitation(
     every = listed(recordings)
     if not every:
         raise DataError("there are no recordings to judge", remedy="give at least one")
-    found = channels_of(every, inputs, outputs, None)
-    driven = found.inputs
-    if inputs is None and found.outputs == ("force",) and "pressure" in every[0]:
-        # which models of force find themselves
-        driven = tuple(dict.fromkeys(("pressure", *driven)))
+    found = channels_of(every, inputs, outputs)
+    driven = (*(name for name in found.offered if name == PRESSURE), *found.inputs)
     names = (*driven, *found.outputs)
     for recording in every:
         if len(recording) < FEWEST_SAMPLES:
@@ -167,7 +164,7 @@ def excitation(
                 channel=absent[0],
                 remedy="name them with `input` and `output`, or give recordings with the same channels",
             )
-    further = dict.fromkeys((*(found.scheduling or ()), *schedules(every, names)))
+    further = (name for name in found.further if name not in names)
     loads = tuple(name for name in further if all(name in recording for recording in every))
     kept = tuple(without_copies(every, driven, found.outputs))
     return Excitation(kept, tuple(tests), driven, loads, found.outputs)

@@ -13,8 +13,8 @@ from mckibben import registry
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.inverse import Inverse
-from mckibben.channels import Channels
-from mckibben.comparison.parts import parts_of
+from mckibben.channels import channels_of
+from mckibben.comparison.splits import parts_of
 from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.estimators.catalogue import declared
 from mckibben.recording import Recording
@@ -79,13 +79,14 @@ def refitted(
     whole = [log.select(names) for log in logs]
     older_runs = [one.select(names) for one in older if all(name in one for name in names)]
     driving = [name for name in inputs if name not in old.scheduling]
-    settings = {"seed": seed} | estimator.channel_settings(driving, outputs, old.scheduling)
+    channels = channels_of(whole, driving, outputs, old.scheduling)
+    settings = {"seed": seed} | estimator.channel_settings(channels)
     for part in old.parts if isinstance(old, Series) else (old,):
         thresholds = getattr(part, "thresholds", None)
         if thresholds is not None and "n_operators" in {one.name for one in fields(estimator)}:
             settings["n_operators"] = len(thresholds) - (thresholds[0] == 0)
 
-    parts = parts_of(whole, Channels(tuple(driving), tuple(outputs), tuple(old.scheduling) or None))
+    parts = parts_of(whole, channels)
     if not parts:
         return "The log is too short to leave parts of it out."
     kept = tuple(np.zeros(len(one), dtype=bool) for one in older_runs)

@@ -17,7 +17,6 @@ from mckibben.control.identified import known_ranges
 from mckibben.control.loop import ends
 from mckibben.diagnosis.coupling import coupling
 from mckibben.errors import DataError, ModelError
-from mckibben.estimators.coupled.base import driving
 from mckibben.recording import Recording
 from mckibben.report import (
     model_subjects,
@@ -130,7 +129,7 @@ def plot(thing: Any, kind: str | None, ax: Any, choices: Mapping[str, Any]) -> A
 def pair_of(recording: Recording) -> tuple[str, str] | None:
     """Return the first pair of varying input and output, or None."""
     try:
-        pairs = channels_of([recording]).pairs()
+        pairs = channels_of([recording]).pairs
     except DataError:
         return None
     return next((pair for pair in pairs if all(any_moves([recording], (x,)) for x in pair)), None)
@@ -196,7 +195,7 @@ def _of_rig(drawn: Callable[..., Drawing]) -> Callable[..., Drawing]:
         ends = rig.limits(driven).low, rig.limits(driven).high
         run = rig.run(_triangle(rig.name, driven, ends, resting))
         moved = [name for name in rig.outputs if name not in rig.inputs] or [*rig.outputs]
-        pairs = Channels(tuple(rig.inputs), tuple(moved)).pairs()
+        pairs = Channels(tuple(rig.inputs), tuple(moved)).pairs
         own = next((wanted for given, wanted in pairs if given == driven), moved[0])
         return drawn([run], input=driven, output=output or own)
 
@@ -246,7 +245,7 @@ def _against(kind: str) -> Callable[..., Drawing]:
         blocks = {"model": thing} if isinstance(thing, Block) else _blocks(thing, models)
         first, several = next(iter(blocks.values())), _several(recording)
         wanted = output or first.outputs[0].name
-        coupled = coupling(several, _driving(first, several[0]), (wanted,))
+        coupled = coupling(several, _driving(first), (wanted,))
         runs = [
             Shown(
                 one,
@@ -277,11 +276,9 @@ def _blocks(board: Leaderboard, models: str | Sequence[str]) -> dict[str, Block]
     return {name: known[name] for name in asked}
 
 
-def _driving(block: Block, recording: Recording) -> tuple[str, ...]:
+def _driving(block: Block) -> tuple[str, ...]:
     """Return a model's driving inputs, without scheduling ones."""
-    names = tuple(channel.name for channel in block.inputs)
-    muscles = tuple(name for name in driving(recording) if name in names)
-    return muscles if names[0] in muscles else names[:1]
+    return tuple(one.name for one in block.inputs if one.name not in block.scheduling)
 
 
 def _one_each(

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from mckibben.arrays import Array
     from mckibben.blocks.fields import Channel
     from mckibben.comparison.choosing import Against
-    from mckibben.comparison.doubts import Span
     from mckibben.comparison.leaderboard import Leaderboard
+    from mckibben.comparison.splits import Span
     from mckibben.control import Learned
     from mckibben.diagnosis.bands import Calibration
     from mckibben.diagnosis.causes import Cause
@@ -134,10 +134,10 @@ def comparison(board: Leaderboard) -> list[str]:
     best, said = board.best, list(board.shared)
     if board.loads:
         said.append(f"Further inputs of all models: {', '.join(board.loads)}.")
-    said += [
-        f"{name} varies, but is not an input of the models; see `inputs` and `load`."
-        for name in board.ignored
-    ]
+    if board.offered:
+        said.append(f"Further inputs of models that can take them: {', '.join(board.offered)}.")
+    if board.unused:
+        said.append(f"Not used: {', '.join(board.unused)}; see `inputs` and `load`.")
     said += [
         f"{name} is outside its training range in {numeral(100 * share, 2)} % of the test samples."
         for name, share in board.outside.items()

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.channels import moved_by
+from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.planning import plan_of
 from mckibben.comparison.ranking import Standing, ranked
@@ -175,7 +176,7 @@ def study(
         if choices.get("inputs") is None:
             recordings = [_driven(one) for one in recordings]
     plan = plan_of(recordings, tests, seed=seed, **choices)
-    kept, channels = plan.kept(folder), plan.data.channels
+    channels = plan.data.channels
     if rig is not None and channels.single:
         raise DataError(
             "loops are closed on a rig with recordings of several muscles, or under a load",
@@ -183,8 +184,8 @@ def study(
         )
     looped, loop = channels.inputs, None
     if len(channels.inputs) == len(channels.outputs) == 1:
-        looped = (moved_by([*recordings, *tests], looped[0], list(recordings[0].channels)),)
-        others = {*channels.inputs, *(channels.scheduling or ())} - set(looped)
+        looped = (moved_by([*recordings, *tests], looped[0]),)
+        others = {*channels.inputs, *channels.scheduling} - set(looped)
         with suppress(DataError):  # of a load that follows the input, which is a data gap
             loop = characterize(
                 [*recordings, *tests], looped[0], channels.outputs[0], scheduling=sorted(others)
@@ -193,10 +194,10 @@ def study(
         train=plan.data.split.train,
         test=plan.data.split.test,
         characterization=loop,
-        leaderboard=plan.board(),
+        leaderboard=plan.empty,
         predictions={},
         inverse=None,
-        load=next(iter(channels.scheduling or ()), None),
+        load=choices.get("load"),
         notes=plan.empty.notes,
         data_gaps=data_gaps(recordings, looped, channels.outputs, tests=tests),
         review=reviewed,
@@ -207,7 +208,7 @@ def study(
         with (
             telling(progress, "studying", lines=True) as tell,
             closing(
-                ranked(plan, jobs=jobs, executor=executor, kept=kept, progress=tell)
+                ranked(plan, jobs=jobs, executor=executor, folder=folder, progress=tell)
             ) as rankings,
         ):
             for ranking in rankings:
@@ -242,7 +243,7 @@ def study(
     if found is not None:
         found(so_far)
     if clear:
-        kept.clear()
+        Checkpoints(folder).clear()
     return so_far
 
 

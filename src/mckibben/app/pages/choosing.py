@@ -51,7 +51,7 @@ class _Choice:
         before = state.chosen.get("models.ticked", ())
         self.ticked = [name for name in before if name in offered.models] or offered.quick
         self.boxes: dict[str, Any] = {}
-        told = f", given {', '.join(sides.scheduling)}" if sides.scheduling else ""
+        told = f", given {', '.join(sides.further)}" if sides.further else ""
         sets = {"Quick choice": offered.quick, "All": offered.models, "None": []}
         with ui.element("div").classes("stack scroll"):
             with ui.element("div"):
@@ -123,7 +123,7 @@ class _Choice:
         """Start the fits, quick ones first."""
         sides, state = self.sides, self.state
         given: dict[str, Any] = {"inputs": list(sides.inputs), "outputs": list(sides.outputs)}
-        given["load"] = (sides.scheduling or ("",))[0]
+        given["load"] = state.load
         given["allow_shared"] = bool(state.chosen.get("models.shared"))
         state.jobs.forget_ended("fit")
         for model in sorted(self.ticked, key=self.offered.seconds):

@@ -146,7 +146,7 @@ def _coupling(state: State, found: Coupling, pair: Pair) -> None:
 def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
     (given, wanted), kind = pair, state.chosen.get("look.view", "loop")
     shared = [name for name in runs[0].channels if all(name in run for run in runs)]
-    named = [n for n in (*sides.inputs, *sides.outputs, *(sides.scheduling or ())) if n in shared]
+    named = [n for n in (*sides.inputs, *sides.outputs, *sides.further) if n in shared]
     channels = [*dict.fromkeys([given, wanted, *(named if len(named) <= MOST else ())])]
     with widgets.row(classes="spread"):
         ui.label(f"{wanted} over {given}").classes("subtitle")
@@ -164,7 +164,7 @@ def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) ->
 
 def _words(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
     """Show the characterization: a few sentences, and all numbers behind a fold-out."""
-    others = tuple(n for n in (*sides.inputs, *(sides.scheduling or ())) if n != pair[0])
+    others = tuple(n for n in (*sides.inputs, *sides.further) if n != pair[0])
     key = "characterization", state.workspace.digest(), pair, others
     make = partial(characterize, runs, *pair, scheduling=others)
     with mark(ui.element("div"), "words"):

@@ -22,11 +22,11 @@ def characterize(
     as_json: Json = False,
 ) -> None:
     from mckibben.diagnosis.characterization import characterize as find
-    from mckibben.reading import read_pair
+    from mckibben.reading import read_loop
     from mckibben.recording import notes_by_file, reading_notes
     from mckibben.report import results, text
 
-    recordings, *pair = read_pair(files, input, output, reading, scheduling)
+    recordings, *pair = read_loop(files, input, output, reading, scheduling)
     found = find(recordings, *pair, scheduling=scheduling)
     about = found.to_dict() | {"notes": notes_by_file(recordings)}
     show(

@@ -28,13 +28,13 @@ def plot(
 ) -> None:
     from mckibben.blocks.saving import load
     from mckibben.outputs import claim
-    from mckibben.reading import read_pair
+    from mckibben.reading import read_loop
     from mckibben.report.figures import write_figure
     from mckibben.report.printed import format_of
 
     format_of(out)  # another ending is refused now
     claim(out, inputs=[*files, *([] if model is None else [model])], force=force)
-    recordings, given, moved = read_pair(files, input, output, reading)
+    recordings, given, moved = read_loop(files, input, output, reading)
     if model is None:
         write_figure(recordings, out, kind, input=given, output=moved)
     else:

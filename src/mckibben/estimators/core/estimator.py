@@ -21,6 +21,7 @@ from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.free_runs import FreeRuns, as_it_is
+from mckibben.channels import Channels, Names, channels_of, quantity
 from mckibben.errors import DataError, MckibbenError, ModelError, ModelWarning
 from mckibben.estimators.core.data import TrainingData, training_data
 from mckibben.estimators.core.leaving_out import stepped
@@ -242,20 +243,27 @@ class Estimator(ABC):
         return sorted(field.name for field in fields(cls))
 
     @classmethod
-    def objection(
+    def resolved(
         cls,
         recordings: Sequence[Recording],
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-        scheduling: Sequence[str] | None = None,
-    ) -> str | None:
+        inputs: Names = None,
+        outputs: Names = None,
+        scheduling: Names = None,
+    ) -> Channels:
+        """Return the channels to fit: as named, as the model is made for, or found by `channels_of`."""
+        given = cls.input if inputs is None and cls.input != Estimator.input else inputs
+        wanted = cls.output if outputs is None and cls.output != Estimator.output else outputs
+        return channels_of(recordings, given, wanted, scheduling)
+
+    @classmethod
+    def objection(cls, recordings: Sequence[Recording], channels: Channels) -> str | None:
         """Return why the model does not apply to recordings, or None."""
-        if len(inputs) != 1 or len(outputs) != 1:
+        if len(channels.inputs) != 1 or len(channels.outputs) != 1:
             return "it is of one input and one output"
-        inputs, scheduling = cls.own_roles(inputs, scheduling)
-        if scheduling is not None:
+        own = cls.own_roles(channels)
+        if own.scheduling:
             return "the load is not one of its inputs"
-        (given,), (wanted,) = inputs, outputs
+        (given,), (wanted,) = own.inputs, own.outputs
         kinds = (given.partition("_")[0], wanted.partition("_")[0])
         if cls.made_for is not None and kinds != cls.made_for:
             nearly = kinds[1] == cls.made_for[1] and conversion(cls.made_for[0], kinds[0], 1.0)
@@ -263,45 +271,35 @@ class Estimator(ABC):
                 f": name that as the input, and state {REST_LENGTH}, which makes it of {kinds[0]}"
             )
             return f"it maps {cls.made_for[0]} to {cls.made_for[1]}{made if nearly else ''}"
-        needed = cls(input=given, output=wanted)._further_inputs()
+        needed = cls(**cls.channel_settings(channels))._further_inputs()
         absent = [name for name in needed if any(name not in r for r in recordings)]
         if absent:
             return f"it needs the channel {absent[0]!r} too"
-        return None if cls.input_settings else resting(recordings, inputs)
+        return None if cls.input_settings else resting(recordings, own.inputs)
 
     @classmethod
-    def channel_settings(
-        cls,
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-        scheduling: Sequence[str] | None = None,
-    ) -> dict[str, Any]:
-        """Return the settings that select channels; None for the default choice."""
-        own, _ = cls.own_roles(inputs, scheduling)
-        further = (*inputs, *(scheduling or ())) if own != tuple(inputs) else ()
-        others = [name for name in further if name not in own]
-        return {
-            "input": own[0],
-            "output": outputs[0],
-            **dict(zip(cls.input_settings, others, strict=False)),
-        }
+    def channel_settings(cls, channels: Channels) -> dict[str, Any]:
+        """Return the settings that select channels."""
+        own = cls.own_roles(channels)
+        given, wanted = own.pair
+        kinds = {quantity(name): name for name in reversed(own.offered)}
+        further = {name: kinds[name] for name in cls.input_settings if name in kinds}
+        return {"input": given, "output": wanted, **further}
 
     @classmethod
-    def own_roles(
-        cls, inputs: Sequence[str], scheduling: Sequence[str] | None
-    ) -> tuple[tuple[str, ...], Sequence[str] | None]:
-        """Return the channels of `input`, and those that schedule what is left.
+    def own_roles(cls, channels: Channels) -> Channels:
+        """Return the channels with what schedules among those offered, if the model takes it.
 
         A model that takes one further input does not mind which of the two drives: force by length and
         pressure is one law, whichever is held.
         """
-        if len(cls.input_settings) == len(inputs) == len(scheduling or ()) == 1:
-            (further,), (given,), (scheduled,) = cls.input_settings, inputs, scheduling or ()
-            if further == given.partition("_")[0]:
-                return (scheduled,), None
-            if further == scheduled.partition("_")[0]:
-                return (given,), None
-        return tuple(inputs), scheduling
+        inputs, scheduling = channels.inputs, channels.scheduling
+        if len(cls.input_settings) == len(inputs) == len(scheduling) == 1:
+            if cls.input_settings[0] == quantity(inputs[0]):
+                return replace(channels, inputs=scheduling, scheduling=(), offered=inputs)
+            if cls.input_settings[0] == quantity(scheduling[0]):
+                return replace(channels, scheduling=(), offered=scheduling)
+        return channels
 
     def channels(self, data: TrainingData) -> dict[str, Channel]:
         """Return the channels of the block to build, as keyword arguments."""

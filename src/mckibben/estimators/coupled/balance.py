@@ -24,9 +24,9 @@ from mckibben.blocks.coupled.balance import Balance, balance_in
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import rows, vector
 from mckibben.blocks.free_runs import FreeRuns
-from mckibben.channels import schedules
+from mckibben.channels import Channels, Names, by_name
 from mckibben.errors import ModelError
-from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.coupled.balance_bench import (
     bench_of,
@@ -215,15 +215,21 @@ class BalanceEstimator(CoupledEstimator):
     prior: PriorLike = None
 
     @classmethod
-    def objection(
+    def resolved(
         cls,
         recordings: Sequence[Recording],
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-        scheduling: Sequence[str] | None = None,
-    ) -> str | None:
-        known = super().objection(recordings, inputs, outputs, scheduling)
-        for name in inputs if known is None else ():
+        inputs: Names = None,
+        outputs: Names = None,
+        scheduling: Names = None,
+    ) -> Channels:
+        """Return the channels to fit: of motion, also where that is held and a force varies."""
+        moved = by_name(recordings)[1] if outputs is None else outputs
+        return super().resolved(recordings, inputs, moved or None, scheduling)
+
+    @classmethod
+    def objection(cls, recordings: Sequence[Recording], channels: Channels) -> str | None:
+        known = super().objection(recordings, channels)
+        for name in channels.inputs if known is None else ():
             unit = next((one.units[name] for one in recordings if name in one), "")
             if unit not in PRESSURES:
                 return (
@@ -231,18 +237,23 @@ class BalanceEstimator(CoupledEstimator):
                 )
         return known
 
+    def completed(self, recordings: list[Recording], scheduling: Sequence[str]) -> list[Recording]:
+        """Return recordings with the loads that others have, unless all are to have one."""
+        return recordings if self.unknown_load is False else with_loads(recordings, scheduling)
+
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
         """Return the training data; recordings may lack a load that others have."""
         every = listed(recordings)
-        if self.unknown_load is False:
-            return super().data(every, rows)
-        scheduling = schedules(every) if self.scheduling is None else self.scheduling
-        filled, lacking = with_loads(every, scheduling)
-        data = super().data(filled, rows)
-        runs = [replace(run, unmeasured=lacking[run.index]) for run in data.runs]
-        return replace(data, runs=tuple(runs))
+        data = super().data(every, rows)
+        scheduled = [channel.name for channel in data.scheduled]
+
+        def unmeasured(run: Run) -> tuple[str, ...]:
+            return tuple(name for name in scheduled if name not in every[run.index])
+
+        runs = tuple(replace(run, unmeasured=unmeasured(run)) for run in data.runs)
+        return replace(data, runs=runs)
 
     @property
     def spans(self) -> tuple[float, ...] | None:
@@ -506,10 +517,8 @@ class BalanceEstimator(CoupledEstimator):
         rows: Sequence[Mask] | None = None,
     ) -> FreeRuns:
         """Return the free runs of a block, each under its own load where one was found."""
-        scheduling = schedules(recordings) if self.scheduling is None else self.scheduling
-        if self.unknown_load is not False:
-            recordings = with_loads(recordings, scheduling)[0]
-        runs = super().free_runs(block, recordings, rows)
+        every = self.completed(listed(recordings), block.scheduling)
+        runs = super().free_runs(block, every, rows)
         return replace(runs, changed=partial(_loaded, self.loads_)) if self.loads_.any() else runs
 
 

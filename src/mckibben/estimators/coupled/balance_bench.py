@@ -50,27 +50,21 @@ channel is at rest.
 """
 
 
-def with_loads(
-    recordings: Sequence[Recording], scheduling: Sequence[str]
-) -> tuple[list[Recording], list[tuple[str, ...]]]:
-    """Return recordings that all have every load, and the loads each one lacked.
-
-    These are what they are in others on average.
-    """
+def with_loads(recordings: Sequence[Recording], scheduling: Sequence[str]) -> list[Recording]:
+    """Return recordings that all have every load; what one lacks is what it is in others on average."""
     means = {}
     for name in scheduling:
         found = [recording for recording in recordings if name in recording]
         if found and all(recording.units[name] in LOADS for recording in found):
             mean = float(np.mean(np.concatenate([recording[name] for recording in found])))
             means[name] = mean, found[0].units[name]
-    filled, lacking = [], []
+    filled = []
     for recording in recordings:
         without = {name: one for name, one in means.items() if name not in recording}
         levels = {name: np.full(len(recording), mean) for name, (mean, _) in without.items()}
         units = {name: unit for name, (_, unit) in without.items()}
         filled.append(recording.with_channels(units, **levels))
-        lacking.append(tuple(without))
-    return filled, lacking
+    return filled
 
 
 def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:

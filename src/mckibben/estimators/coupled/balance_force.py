@@ -19,6 +19,7 @@ from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Affine
+from mckibben.channels import Channels
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.coupled.balance import BalanceEstimator, fixed_in
@@ -77,19 +78,12 @@ class BalanceForceEstimator(SearchEstimator):
     input_settings: ClassVar[tuple[str, ...]] = ("pressure",)
 
     @classmethod
-    def objection(
-        cls,
-        recordings: Sequence[Recording],
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-        scheduling: Sequence[str] | None = None,
-    ) -> str | None:
-        kinds = [
-            name.partition("_")[0] for name in (*cls.own_roles(inputs, scheduling)[0], *outputs)
-        ]
+    def objection(cls, recordings: Sequence[Recording], channels: Channels) -> str | None:
+        own = cls.own_roles(channels)
+        kinds = [name.partition("_")[0] for name in (*own.inputs, *own.outputs)]
         if kinds not in (["length", "force"], ["displacement", "force"]):
             return "it maps length, or displacement, to force"
-        return super().objection(recordings, inputs, outputs, scheduling)
+        return super().objection(recordings, channels)
 
     def fixed(self, block: Block) -> tuple[int, ...]:
         return fixed_in(block)

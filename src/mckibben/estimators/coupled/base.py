@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from mckibben.arrays import Array, Mask
-from mckibben.channels import loads_among, numbered, one, schedules
+from mckibben.channels import PRESSURE, Channels
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData, training_data
 from mckibben.estimators.core.estimator import Estimator, resting
@@ -31,11 +31,10 @@ class CoupledEstimator(Estimator):
     Parameters
     ----------
     input, output : str or sequence of str, optional
-        Channels; default ``pressure_1`` and so on and ``displacement_1`` and so on, as many as there
-        are; or, of a single muscle, ``voltage`` or else ``pressure``, and ``displacement``.
+        Channels; default as many as `mckibben.channels.channels_of` finds.
     scheduling : sequence of str, optional
-        Channels that schedule the model: an extensor's pressure, a load, a temperature. Default
-        ``pressure_extensor`` and ``force``, where there are any.
+        Channels that schedule the model: an extensor's pressure, a load, a temperature. Default those
+        that are found.
     """
 
     purpose = "several"
@@ -70,20 +69,13 @@ class CoupledEstimator(Estimator):
     """Maximum number of muscles."""
 
     @classmethod
-    def objection(
-        cls,
-        recordings: Sequence[Recording],
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-        scheduling: Sequence[str] | None = None,
-    ) -> str | None:
+    def objection(cls, recordings: Sequence[Recording], channels: Channels) -> str | None:
+        inputs, outputs = channels.inputs, channels.outputs
         if len(inputs) < cls.fewest_inputs:
             return "it is of several muscles"
         if len(inputs) > cls.most_inputs:
             return "it is of one muscle under a load"
-        scheduled = scheduling
-        if scheduled is None:
-            scheduled = schedules(recordings, (*inputs, *outputs))
+        scheduled = taken(channels)
         for name in scheduled:
             lacking = [recording.name for recording in recordings if name not in recording]
             if lacking and not cls.unmeasured:
@@ -110,50 +102,28 @@ class CoupledEstimator(Estimator):
         return fewer or not cls.paired or n_inputs == n_outputs
 
     @classmethod
-    def channel_settings(
-        cls,
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-        scheduling: Sequence[str] | None = None,
-    ) -> dict[str, Any]:
-        named = None if scheduling is None else tuple(scheduling)
-        return {"input": tuple(inputs), "output": tuple(outputs), "scheduling": named}
+    def channel_settings(cls, channels: Channels) -> dict[str, Any]:
+        return {
+            "input": channels.inputs,
+            "output": channels.outputs,
+            "scheduling": taken(channels),
+        }
+
+    def completed(self, recordings: list[Recording], scheduling: Sequence[str]) -> list[Recording]:
+        """Return recordings with what they may lack."""
+        return recordings
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
-        """Return the training data, with channels found by name if not given."""
+        """Return the training data, of the channels that are named or found."""
         every = listed(recordings)
         if not every:
             raise DataError("there are no recordings", remedy="give at least one")
         first = every[0]
-        inputs, outputs = (
-            (given,) if isinstance(given, str) else given for given in (self.input, self.output)
-        )
-        inputs = inputs or in_any(every, driving)
-        outputs = outputs or in_any(every, moved)
-        for what, names in (("pressure", inputs), ("displacement", outputs)):
-            if not names:
-                raise DataError(
-                    f"there is no channel {what}_1, nor {what}",
-                    file=first.source,
-                    remedy=f"name the columns {what}_1, {what}_2 ..., or use `columns[CHANNEL]=COLUMN`",
-                )
-        loads = loads_among(every, inputs)
-        inputs = tuple(name for name in inputs if name not in loads)
-        scheduling = self.scheduling
-        if scheduling is None:
-            scheduling = schedules(every, (*inputs, *outputs))
-        scheduling = tuple(dict.fromkeys((*scheduling, *loads)))
-        for recording in every:
-            for name in (*inputs, *outputs, *scheduling):
-                if name not in recording:
-                    raise DataError(
-                        "the model needs it, and the recording has no such channel",
-                        file=recording.source,
-                        channel=name,
-                        remedy="give all recordings the same channels, or name others",
-                    )
+        channels = self.resolved(every, self.input, self.output, self.scheduling)
+        inputs, outputs, scheduling = channels.inputs, channels.outputs, taken(channels)
+        every = self.completed(every, scheduling)
         longest = max(map(len, every))
         if longest < FEWEST_SAMPLES:  # shorter ones beside a longer one are passed over below
             raise DataError(
@@ -186,6 +156,11 @@ class CoupledEstimator(Estimator):
     def spans(self) -> tuple[float, ...] | None:
         """Ranges of the outputs, if known in advance."""
         return None
+
+
+def taken(channels: Channels) -> tuple[str, ...]:
+    """Return the channels that schedule a model; an offered pressure is for laws of force."""
+    return tuple(name for name in channels.further if name != PRESSURE)
 
 
 def bridged(data: TrainingData) -> TrainingData:
@@ -243,22 +218,3 @@ def _never_alone(recordings: Sequence[Recording], inputs: Sequence[str]) -> str 
                 "a run in which the other inputs rest"
             )
     return None
-
-
-def driving(recording: Recording) -> tuple[str, ...]:
-    """Return the driving channels of a recording, by name, pressure first."""
-    several = numbered(recording, "pressure") or numbered(recording, "voltage")
-    return several or one(recording, "pressure", "voltage")
-
-
-def moved(recording: Recording) -> tuple[str, ...]:
-    """Return the displacements of a recording, or its angles, by their names."""
-    several = numbered(recording, "displacement") or numbered(recording, "angle")
-    return several or one(recording, "displacement", "angle")
-
-
-def in_any(
-    recordings: Sequence[Recording], named: Callable[[Recording], tuple[str, ...]]
-) -> tuple[str, ...]:
-    """Return the channels of so many muscles that any recording has."""
-    return max((named(recording) for recording in recordings), key=len)

@@ -13,6 +13,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import LONGEST_DELAY
+from mckibben.channels import Channels
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SEARCH_SAMPLES, SeparableEstimator
@@ -77,17 +78,11 @@ class AirEstimator(SeparableEstimator):
     supply: float | None = None
 
     @classmethod
-    def objection(
-        cls,
-        recordings: Sequence[Recording],
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-        scheduling: Sequence[str] | None = None,
-    ) -> str | None:
-        objection = super().objection(recordings, inputs, outputs, scheduling)
+    def objection(cls, recordings: Sequence[Recording], channels: Channels) -> str | None:
+        objection = super().objection(recordings, channels)
         if objection is not None:
             return objection
-        command, pressure = inputs[0].partition("_")[0], outputs[0].partition("_")[0]
+        (command, pressure) = (name.partition("_")[0] for name in channels.pair)
         if command in NO_COMMANDS or pressure != "pressure":
             return "it maps a command to a pressure"
         return None

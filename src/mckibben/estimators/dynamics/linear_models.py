@@ -15,7 +15,7 @@ from mckibben.blocks.compose import Parallel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import vector
 from mckibben.blocks.parameters import Parametrised
-from mckibben.channels import schedules
+from mckibben.channels import Channels
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Grid, Start, resting
@@ -124,34 +124,23 @@ class PredictionErrorEstimator(Estimator):
         return isinstance(self.input, str) and isinstance(self.output, str) and not self.scheduling
 
     @classmethod
-    def objection(
-        cls,
-        recordings: Sequence[Recording],
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-        scheduling: Sequence[str] | None = None,
-    ) -> str | None:
-        if not inputs or not outputs:
+    def objection(cls, recordings: Sequence[Recording], channels: Channels) -> str | None:
+        if not channels.inputs or not channels.outputs:
             return "it needs an input and an output"
-        further = scheduling or ()
-        if scheduling is None and len((*inputs, *outputs)) > 2:
-            further = schedules(recordings, (*inputs, *outputs))
-        for name in further:
+        for name in () if channels.single else channels.further:
             if absent := [each.name for each in recordings if name not in each]:
                 return f"it needs the channel {name!r}, which {absent[0]} lacks"
-        return resting(recordings, inputs)
+        return resting(recordings, channels.inputs)
 
     @classmethod
-    def channel_settings(
-        cls,
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-        scheduling: Sequence[str] | None = None,
-    ) -> dict[str, Any]:
-        if len(inputs) == len(outputs) == 1 and scheduling is None:
-            return {"input": inputs[0], "output": outputs[0]}
-        named = None if scheduling is None else tuple(scheduling)
-        return {"input": tuple(inputs), "output": tuple(outputs), "scheduling": named}
+    def channel_settings(cls, channels: Channels) -> dict[str, Any]:
+        if channels.single:
+            return {"input": channels.inputs[0], "output": channels.outputs[0]}
+        return {
+            "input": channels.inputs,
+            "output": channels.outputs,
+            "scheduling": channels.further,
+        }
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
@@ -159,11 +148,9 @@ class PredictionErrorEstimator(Estimator):
         """Return the training data; with several inputs, of all driving channels."""
         if self.single:
             return super().data(recordings, rows)
-        driving, given = ((of,) if isinstance(of, str) else of for of in (self.input, self.output))
         every = listed(recordings)
-        further = self.scheduling
-        if further is None:
-            further = schedules(every, (*driving, *given))
+        found = self.resolved(every, self.input, self.output, self.scheduling)
+        driving, given, further = found.inputs, found.outputs, found.further
         moving = [name for name in further if any(name in r and np.ptp(r[name]) > 0 for r in every)]
         whole = replace(self, input=(*driving, *moving), output=tuple(given))
         return super(PredictionErrorEstimator, whole).data(recordings, rows)

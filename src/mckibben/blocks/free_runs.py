@@ -13,17 +13,14 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block, check_units
-from mckibben.blocks.running import run_many
+from mckibben.blocks.derivatives import DIFFERENCE, derivatives, differences, relative_sizes
 from mckibben.blocks.runs import FreeRun, Run
-from mckibben.blocks.starts import history, run_on, state_after
+from mckibben.blocks.starts import history, known_state, run_on, state_after
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 
-DIFFERENCE = 1e-6
-"""Step of finite differences, relative to the size of a parameter."""
-
 AT_ONCE = 2_000_000
-"""Numbers of outputs of several blocks that are held in memory at once."""
+"""Numbers of derivatives that are held in memory at once."""
 
 AWAY = 1e3
 """Error, in ranges of the measured output, above which a model has diverged."""
@@ -31,18 +28,13 @@ AWAY = 1e3
 Kind = TypeVar("Kind", np.float64, np.bool_)
 
 Changed = Callable[[Block, int], Block]
-"""Returns a block as it runs over a recording, by the recording's index."""
+"""Returns a block as it runs over a recording, by the recording's index: some parameters shifted."""
 
 
 def as_it_is(block: Block, index: int) -> Block:
     """Return the block itself, for every recording."""
     del index
     return block
-
-
-def relative_sizes(parameters: Array) -> Array:
-    """Return the scales of parameters, with a lower bound."""
-    return np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))
 
 
 def free_run(block: Block, recording: Recording) -> FreeRun:
@@ -132,7 +124,7 @@ class FreeRuns:
     @cached_property
     def modelled(self) -> list[Array]:
         """Outputs of the block over every run, shape (n, m) each."""
-        return [table[0] for table in self.simulated([self.block])]
+        return self.simulated(self.block)
 
     @cached_property
     def residual(self) -> Array:
@@ -164,42 +156,52 @@ class FreeRuns:
         pairs = zip(outputs, self.runs, strict=True)
         return np.concatenate([table[run.counts].ravel() for table, run in pairs])
 
-    def simulated(self, blocks: Sequence[Block]) -> list[Array]:
-        """Return the outputs of blocks over every run, shape (blocks, n, m) each."""
+    def simulated(self, block: Block) -> list[Array]:
+        """Return the outputs of a block over every run, shape (n, m) each."""
         found = []
         for run, past in zip(self.runs, self.pasts, strict=True):
-            own = [self.changed(block, run.index) for block in blocks]
+            own = self.changed(block, run.index)
             if run.source.periodic:
-                found.append(
-                    np.array([block.simulate(run.source).matrix(self.names) for block in own])
-                )
+                found.append(own.simulate(run.source).matrix(self.names))
                 continue
-            states = [state_after(block, past, run) for block in own]
-            found.append(run_many(own, run.inputs, sample_time=run.sample_time, states=states))
+            state, outputs = state_after(own, past, run), np.empty(run.outputs.shape)
+            own.bind(run.sample_time, state, run.inputs, outputs)()
+            found.append(outputs)
         return found
-
-    def outputs(self, blocks: Sequence[Block]) -> Array:
-        """Return the outputs of blocks at the samples that count, shape (blocks, N)."""
-        tables = self.simulated(blocks)
-        return np.array([self.scored([table[k] for table in tables]) for k in range(len(blocks))])
 
     def slopes(self, places: Sequence[int], kept: Array | slice = slice(None)) -> Array:
         """Return derivatives of the outputs by parameters in units of their sizes, shape (n, k).
 
-        By finite differences, at the outputs ``kept`` of the N that count.
+        At the outputs ``kept`` of the N that count; see `mckibben.blocks.derivatives`.
         """
-        parameters = self.block.pack()
-        sizes = relative_sizes(parameters)
-        base = self.scored(self.modelled)[kept]
-        found = np.empty((base.size, len(places)))
+        sizes, found = relative_sizes(self.block.pack()), []
         many = max(1, AT_ONCE // max(sum(map(len, self.runs)) * len(self.names), 1))
         for first in range(0, len(places), many):
             some = places[first : first + many]
-            blocks = []
-            for place in some:
-                moved = parameters.copy()
-                moved[place] += DIFFERENCE * sizes[place]
-                blocks.append(self.block.unpack(moved))
-            moved_by = self.outputs(blocks)[:, kept] - base
-            found[:, first : first + len(some)] = moved_by.T / DIFFERENCE
-        return found
+            tables = [
+                self._slopes_over(*pair, some) for pair in zip(self.runs, self.pasts, strict=True)
+            ]
+            pairs = zip(tables, self.rows, strict=True)
+            scored = np.concatenate([table[rows].reshape(-1, len(some)) for table, rows in pairs])
+            found.append(scored[kept] * sizes[some])
+        return np.concatenate(found, axis=1)
+
+    def _slopes_over(self, run: Run, past: Array, places: Sequence[int]) -> Array:
+        """Return the derivatives of the outputs over a run, shape (n, m, k)."""
+        block = self.changed(self.block, run.index)
+        if run.source.periodic:
+            values = block.pack()
+
+            def simulated(moved: Array) -> Array:
+                return block.unpack(moved).simulate(run.source).matrix(self.names)
+
+            return differences(simulated, values, DIFFERENCE * relative_sizes(values), places)
+
+        def start(other: Block) -> Array:
+            state = known_state(other, run)
+            assert state is not None
+            return state
+
+        begun = start if known_state(block, run) is not None else None
+        whole = np.vstack([past, run.inputs])
+        return derivatives(block, whole, run.sample_time, begun, places)[len(past) :]

@@ -155,21 +155,14 @@ def run_many(
     *,
     sample_time: float | None = None,
     initial: Initial | None = None,
-    states: Sequence[Array] | None = None,
 ) -> Array:
-    """Return outputs of blocks with the same channels, shape (blocks, n, n_outputs), on all cores.
-
-    ``states`` are those before the first sample, block by block, instead of ``initial`` ones; changed.
-    """
+    """Return outputs of blocks with the same channels, shape (blocks, n, n_outputs), on all cores."""
     refuse_time(sample_time)
     outputs = np.empty((len(blocks), inputs.shape[0], len(blocks[0].outputs)))
 
     def run(share: Iterable[int]) -> None:
         for index in share:
-            if states is None:
-                state = blocks[index].initial_state(inputs[0], initial, sample_time)
-            else:
-                state = states[index]
+            state = blocks[index].initial_state(inputs[0], initial, sample_time)
             blocks[index].bind(sample_time, state, inputs, outputs[index])()
 
     workers = min(cores(), len(blocks))

@@ -77,8 +77,8 @@ def state_after(block: Block, before: Array, run: Run) -> Array:
 
     That of a block of past outputs is given by the first outputs instead.
     """
-    outputs, first, step = first_outputs(block, run), run.first, run.sample_time
-    known = None if outputs is None else block.state_at(first, outputs)
+    first, step = run.first, run.sample_time
+    known = known_state(block, run)
     if known is not None:
         return known
     if not len(before):
@@ -87,6 +87,12 @@ def state_after(block: Block, before: Array, run: Run) -> Array:
     before = np.ascontiguousarray(before)
     block.bind(step, state, before, np.empty((len(before), len(block.outputs))))()
     return state
+
+
+def known_state(block: Block, run: Run) -> Array | None:
+    """Return the state of a block of past outputs, shape (n_states,), which the first outputs give."""
+    outputs = first_outputs(block, run)
+    return None if outputs is None else block.state_at(run.first, outputs)
 
 
 def first_outputs(block: Block, run: Run) -> Array | None:

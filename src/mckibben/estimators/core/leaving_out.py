@@ -22,7 +22,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mckibben.arrays import Array, Mask
-from mckibben.blocks.free_runs import FreeRuns, relative_sizes
+from mckibben.blocks.derivatives import relative_sizes
+from mckibben.blocks.free_runs import FreeRuns
 from mckibben.errors import MckibbenError
 from mckibben.estimators.core.uncertainty import LARGEST
 
@@ -32,7 +33,7 @@ determines stays about as it is, as the fit's start or bounds would hold it.
 """
 
 MOST_FREE = 150
-"""Number of free parameters up to which slopes are computed by differences."""
+"""Number of free parameters up to which slopes are computed."""
 
 MOST_ROWS = 20_000
 """Number of outputs, evenly spread, on which slopes are computed."""
@@ -82,7 +83,7 @@ def stepped(
         there[places] += step * units
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                tables = [table[0] for table in runs.simulated([runs.block.unpack(there)])]
+                tables = runs.simulated(runs.block.unpack(there))
         except MckibbenError:
             return None
         return tables if all(np.isfinite(table).all() for table in tables) else None

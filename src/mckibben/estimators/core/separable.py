@@ -18,6 +18,7 @@ from annotated_types import Ge
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
+from mckibben.blocks.derivatives import differences
 from mckibben.blocks.memoryless import Negative
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Start
@@ -100,16 +101,10 @@ class SeparableEstimator(Estimator):
 
         Shape (samples that count, m); by finite differences of the basis.
         """
-        here, (lower, upper) = self.matrix(theta, data) @ linear, self.bounds(data)
+        lower, upper = self.bounds(data)
         steps = DIFFERENCE * (upper - lower)
-        steps = np.where(theta + steps <= upper, steps, -steps)
-        columns = []
-        for index in range(theta.size):
-            moved = theta.copy()
-            moved[index] += steps[index]
-            there = self.matrix(moved, data) @ linear
-            columns.append((there - here) / (moved[index] - theta[index]))
-        return np.column_stack(columns)
+        inside = np.where(theta + steps <= upper, steps, -steps)
+        return differences(lambda moved: self.matrix(moved, data) @ linear, theta, inside)
 
     def jacobian(
         self, theta: Array, matrix: Array, linear: Array | None, data: TrainingData

@@ -169,6 +169,16 @@ def by_shape(
 
 
 @inlined
+def by_least_area(c: Array, k: int, y: float, p: float, slopes: Array, to: Array) -> None:
+    """Replace a taut muscle's derivatives by its area where that is at its least, relative to rest."""
+    first = terms_at(c, k) + DYNAMIC + int(c[7])
+    least, column = LEAST_AREA * c[first], first - coordinate_at(c, 0)
+    if least > 0.0 and slopes[3] != 0.0 and not area(c, k, y)[0] > least:
+        clear(to[column : column + int(c[8])])
+        to[column] = -LEAST_AREA * p
+
+
+@inlined
 def through_past(c: Array, k: int, slopes: Array, past: Array, moved: Array, to: Array) -> None:
     """Add derivatives of the force of muscle k through its past, given in ``past``.
 
@@ -263,13 +273,15 @@ def approach(
     q: Array,
     x: Array,
     p: Array,
+    sloped: bool,
     copied: Array,
     inverse: Array,
     work: Array,
 ) -> None:
-    """Approach equilibrium, and fill the last step, yet to be taken, and the inverse of the slopes.
+    """Solve for equilibrium by Newton's method from where coordinates are, or by `solve_equilibrium`.
 
-    By Newton's method from where coordinates are, or, where that does not end, `solve_equilibrium`.
+    If slopes are wanted, fill the terms of the last muscle and the inverse of the slopes there: a step
+    before, they would be as far off as the step is long.
     """
     m = int(c[1])
     residual, step, sizes = work[:m], work[m : 2 * m], work[3 * m : 4 * m]
@@ -278,22 +290,23 @@ def approach(
         if turn == FEW_STEPS:
             fill(q, state)
             solve_equilibrium(c, state, way, q, x, p, work)
+            break
         left = unbalanced(c, state, way, q, x, p, residual, matrix, sizes, terms)
-        for i in range(m):
-            for j in range(m):
-                step[j] = 1.0 if i == j else 0.0
-                fill(copied[j], matrix[j])
-            eliminate(copied, step)
-            for j in range(m):
-                inverse[j, i] = step[j]
+        eliminate(matrix, residual)
         for j in range(m):
-            step[j] = 0.0
-            for i in range(m if turn < FEW_STEPS else 0):
-                step[j] -= inverse[j, i] * residual[i]
+            q[j] -= residual[j]
         if left <= CLOSE:
-            return
+            break
+    if not sloped:
+        return
+    unbalanced(c, state, way, q, x, p, residual, matrix, sizes, terms)
+    for i in range(m):
         for j in range(m):
-            q[j] += step[j]
+            step[j] = 1.0 if i == j else 0.0
+            fill(copied[j], matrix[j])
+        eliminate(copied, step)
+        for j in range(m):
+            inverse[j, i] = step[j]
 
 
 @inlined
@@ -318,7 +331,7 @@ def move(
     two rows a muscle to compute in.
     """
     n, m, width, sloped = int(c[0]), int(c[1]), n_terms(c), slopes.shape[1] > 0
-    step, terms = work[m : 2 * m], work[4 * m + m * m :]
+    terms = work[4 * m + m * m :]
     values, by_y = terms[:width], terms[width : 2 * width]
     copied, inverse = rows[2 * n : 2 * n + m, :m], rows[2 * n + m : 2 * n + 2 * m, :m]
     shape, late = slopes.shape[1] - n_shape(c) - dp.shape[1], rows[2 * n + 2 * m]
@@ -326,7 +339,7 @@ def move(
         matrix, sizes = work[4 * m : 4 * m + m * m].reshape((m, m)), work[3 * m : 4 * m]
         unbalanced(c, state, way, q, x, p, found, matrix, sizes, terms)
     else:
-        approach(c, state, way, q, x, p, copied, inverse, work)
+        approach(c, state, way, q, x, p, sloped, copied, inverse, work)
     for j in range(m if sloped else 0):
         by_coupling(c, j, q, x, shape + walls_at(c) + 1 + n, slopes[j])
     for back in range(n if sloped else 0):
@@ -341,17 +354,17 @@ def move(
                 mix(moved, 1.0, c[own + j], past[j])
         place = own + m - coordinate_at(c, 0)
         fill(by_force[place : place + width], values)
+        by_least_area(c, k, y, p[k], by_y, by_force)
         own_late, to = late[k * int(c[6]) : (k + 1) * int(c[6])], by_force[shape:]
         by_shape(c, k, state, way, y, p[k], x, dp[k], values, by_y, own_late, to)
         if way != AT_REST:
             through_past(c, k, by_y, past, moved, by_force)
-        if way == IN_TIME and not held and c[15] > 0.0 and c[terms_at(c, k) + 1] > 0.0:
+        if way == IN_TIME and c[15] > 0.0 and c[terms_at(c, k) + 1] > 0.0:
             through_line(c, k, state, values, moved, by_force)
         for j in range(m):
             if c[own + j] != 0.0:
                 mix(slopes[j], 1.0, c[own + j], by_force)
     for j in range(m if not held else 0):
-        q[j] += step[j]
         found[j] = q[j]
     update_state(c, state, way, q, p, x)
     if not sloped:
@@ -396,8 +409,8 @@ def follow(
         Coefficients of the block.
     driven, measured, x : arrays, shapes (t, n), (t, m), (t, s)
         Pressures, coordinates, what schedules and loads.
-    dp : array, shape (t, n, f)
-        How pressures that act move with what acts on them.
+    dp : array, shape (1 + t, n, f)
+        How pressures that act move with what acts on them: none, then those of every sample.
     held : bool
         Whether muscles are where they were measured.
     every : int
@@ -417,7 +430,8 @@ def follow(
     for t in range(-1, driven.shape[0]):
         way = AT_REST if t < 0 else FROM_REST if t == 0 else IN_TIME
         now, place = max(t, 0), max(t, 0) // every
-        fill(p, driven[now] if t >= 0 or (held and c[22] == 0.0) else p)
+        acts = t >= 0 or (held and c[22] == 0.0)
+        fill(p, driven[now] if acts else p)
         for j in range(m):
             ahead = 2.0 * q[j] - last[j] if t > 0 else q[j]
             last[j] = q[j]
@@ -430,7 +444,7 @@ def follow(
             q,
             x[now],
             p,
-            dp[now],
+            dp[now + 1 if acts else 0],
             past,
             rows,
             found[place],
@@ -463,6 +477,7 @@ def run(
     moves = 2 if c[18] else 0
     n_states = n * (1 + n_s + n_l + moves) + 2 * m + 2
     dp = np.zeros((len(driven), n, 0)) if dp is None else dp
+    dp = np.concatenate([np.zeros((1, n, dp.shape[2])), dp])
     n_c = (c.size - coordinate_at(c, 0) + n_shape(c) + dp.shape[2]) * sloped
     kept = -(-len(driven) // every)
     found, slopes = np.empty((kept, m)), np.zeros((kept, m, n_c))

@@ -26,6 +26,7 @@ from annotated_types import Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.derivatives import relative_sizes
 from mckibben.blocks.dynamics.narx import (
     Narx,
     NarxNetwork,
@@ -33,7 +34,6 @@ from mckibben.blocks.dynamics.narx import (
     products,
 )
 from mckibben.blocks.fields import vector
-from mckibben.blocks.free_runs import relative_sizes
 from mckibben.blocks.kernels import kernel
 from mckibben.blocks.starts import start_state
 from mckibben.errors import DataError, ModelError, ModelWarning

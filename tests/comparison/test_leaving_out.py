@@ -17,8 +17,8 @@ from mckibben.comparison.leaderboard import Row
 from mckibben.comparison.parts import N_PARTS, parts_of, spans_of
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.leaving_out import MOST_FREE, held_out
-from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.metrics import Scores
+from mckibben.numerics.tracker import Tracker
 from mckibben.registry import load
 from mckibben.signals import irregular_triangle, triangle
 

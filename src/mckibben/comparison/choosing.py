@@ -8,7 +8,7 @@ from typing import Literal, Protocol, TypeVar
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.statistics import RESAMPLES
+from mckibben.numerics.blocks import RESAMPLES
 
 CONSTANT = "constant"
 """Name of the row that predicts the mean of the training output, whatever the input: never chosen."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.comparison.choosing import CAUTION
+from mckibben.numerics.statistics import half_interval
 
 if TYPE_CHECKING:
     from mckibben.comparison.leaderboard import Row
@@ -114,8 +115,5 @@ def _counted(row: Row) -> Array:
 
 def _interval(values: Array) -> tuple[float, float]:
     """Return the interval of the mean of independent values, by Student's t."""
-    from scipy.special import stdtrit
-
-    mean, n = float(values.mean()), values.size
-    half = stdtrit(n - 1, 0.5 + LEVEL / 2) * float(values.std(ddof=1)) / np.sqrt(n)
+    mean, half = float(values.mean()), half_interval(values, LEVEL)
     return mean - half, mean + half

@@ -30,14 +30,9 @@ from mckibben.comparison.planning import Models, Plan, plan_of
 from mckibben.diagnosis.bands import tested_band
 from mckibben.errors import MckibbenError
 from mckibben.numerals import duration
+from mckibben.numerics.blocks import BlockBootstrap, block_length, differences, interval
+from mckibben.numerics.statistics import correlation_length
 from mckibben.recording import Recording
-from mckibben.statistics import (
-    BlockBootstrap,
-    block_length,
-    correlation_length,
-    differences,
-    interval,
-)
 from mckibben.system.progress import telling
 from mckibben.system.workers import checked
 

@@ -15,8 +15,8 @@ from mckibben.comparison.choosing import useful
 from mckibben.diagnosis.causes import Cause, averaged, block_length, causes
 from mckibben.diagnosis.description import ModelDescription
 from mckibben.diagnosis.free_runs import Run, runs_of
+from mckibben.numerics.statistics import NORMAL_95, correlation_length
 from mckibben.recording import Recording, listed
-from mckibben.statistics import NORMAL_95, correlation_length
 from mckibben.system.progress import Tell, one_by_one, telling
 from mckibben.system.showing import DrawsItself
 from mckibben.system.threads import one_blas_thread

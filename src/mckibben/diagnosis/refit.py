@@ -20,8 +20,9 @@ from mckibben.comparison.parts import parts_of
 from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.estimators.catalogue import declared
 from mckibben.estimators.core.leaving_out import held_out
+from mckibben.numerics.blocks import BlockBootstrap, interval
+from mckibben.numerics.statistics import correlation_length
 from mckibben.recording import Recording
-from mckibben.statistics import BlockBootstrap, correlation_length, interval
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,9 +23,10 @@ from mckibben.blocks.starts import start_state
 from mckibben.control.twin import COMMAND
 from mckibben.diagnosis.refit import Refit, refitted
 from mckibben.errors import DataError, ModelError, ModelWarning
+from mckibben.numerics.blocks import block_length
+from mckibben.numerics.statistics import NORMAL_95, correlation_length
 from mckibben.recording import Recording, listed, sample_time_of
 from mckibben.signals.shared_rows import check_shared
-from mckibben.statistics import NORMAL_95, block_length, correlation_length
 from mckibben.system.showing import DrawsItself
 
 REFERENCE = "reference_"

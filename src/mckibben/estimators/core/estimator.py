@@ -26,7 +26,7 @@ from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.estimators.core.leaving_out import stepped
 from mckibben.estimators.core.settings import check_settings
 from mckibben.estimators.core.uncertainty import covariance_of, unknown, vanishing
-from mckibben.estimators.optimisers.tracker import Progress, Tracker
+from mckibben.numerics.tracker import Progress, Tracker
 from mckibben.recording import REST_LENGTH, Recording, conversion, is_frame, listed
 from mckibben.signals.checking import LARGEST_SEED
 from mckibben.system.progress import telling

@@ -9,7 +9,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -21,9 +20,10 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.memoryless import Negative
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Start
-from mckibben.estimators.optimisers.linear import solve_linear
-from mckibben.estimators.optimisers.multi_start import Choice, multi_start
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.descent import Errors
+from mckibben.numerics.least_squares import solve_bounded
+from mckibben.numerics.multi_start import Choice, multi_start
+from mckibben.numerics.tracker import Tracker
 
 SEARCH_SAMPLES = 1500
 """Largest number of samples used to compare starts."""
@@ -168,16 +168,13 @@ class SeparableEstimator(Estimator):
             thin = thin.condensed()
         most = self.most_evaluations(lower.size)
         tracker.budget = self.n_starts + self.n_refined * most
-        residuals, jacobian = self._errors(thin)
         theta = multi_start(
-            residuals,
+            self._errors(thin),
             self.guesses(data) + self._scattered(lower, upper),
-            lower,
-            upper,
+            (lower, upper),
             tracker,
             n_refined=self.n_refined,
             max_evaluations=most,
-            jacobian=jacobian,
             choices=self.choices(data),
         )
         tracker.near = self._polish(theta, data, tracker)
@@ -194,17 +191,14 @@ class SeparableEstimator(Estimator):
         lower, upper = self.bounds(data)
         if lower.size == 0:
             return theta
-        residuals, jacobian = self._errors(data.thinned(POLISH_SAMPLES))
         own = tracker.part(0.9, 1.0)
         best = multi_start(
-            residuals,
+            self._errors(data.thinned(POLISH_SAMPLES)),
             [theta],
-            lower,
-            upper,
+            (lower, upper),
             own,
             n_refined=1,
             max_evaluations=self.polish_evaluations,
-            jacobian=jacobian,
         )
         tracker.update_from(own)
         return best
@@ -215,13 +209,8 @@ class SeparableEstimator(Estimator):
 
     def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
         """Return the least-squares linear parameters and offset."""
-        return solve_linear(
-            matrix,
-            data.target,
-            nonnegative=self.solves_nonnegative,
-            least=self.least(matrix, data),
-            with_offset=self.solves_offset,
-        )
+        least = self.least(matrix, data) if self.solves_nonnegative else None
+        return solve_bounded(matrix, data.target, least, with_offset=self.solves_offset)
 
     @property
     def solves_offset(self) -> bool:
@@ -245,33 +234,18 @@ class SeparableEstimator(Estimator):
         floor[0] = LEAST_REVERSIBLE * span / reach if reach > 0 else 0.0
         return floor
 
-    def _solved(self, theta: Array, data: TrainingData) -> tuple[Array, Array | None, Array]:
-        """Return regressors, linear parameters if finite, and residuals."""
-        matrix = self.matrix(theta, data)
-        if not np.isfinite(matrix).all():
-            return matrix, None, np.full(data.target.size, WORST)
-        linear, offset = self.solve(matrix, data)
-        return matrix, linear, np.asarray(matrix @ linear + offset - data.target)
+    def _errors(self, data: TrainingData) -> Errors:
+        """Return the function to the errors by nonlinear parameters, linear ones solved for."""
 
-    def _errors(
-        self, data: TrainingData
-    ) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
-        """Return functions for residuals and derivatives by the nonlinear parameters.
+        def errors(theta: Array) -> tuple[Array, Callable[[], Array]]:
+            matrix = self.matrix(theta, data)
+            linear, left = None, np.full(data.target.size, WORST)
+            if np.isfinite(matrix).all():
+                linear, offset = self.solve(matrix, data)
+                left = np.asarray(matrix @ linear + offset - data.target)
+            return left, lambda: self.jacobian(theta, matrix, linear, data)
 
-        A search asks for both at one place, where the linear parameters are solved for once.
-        """
-
-        @lru_cache(maxsize=1)
-        def solved(place: bytes) -> tuple[Array, Array | None, Array]:
-            return self._solved(np.frombuffer(place).copy(), data)
-
-        def residuals(theta: Array) -> Array:
-            return solved(theta.tobytes())[2]
-
-        def jacobian(theta: Array) -> Array:
-            return self.jacobian(theta, *solved(theta.tobytes())[:2], data)
-
-        return residuals, jacobian
+        return errors
 
     def best_of(
         self, setting: str, values: Sequence[float], data: TrainingData, tracker: Tracker

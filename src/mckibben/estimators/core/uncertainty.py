@@ -21,7 +21,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import TrainingData, stretches
 from mckibben.estimators.core.free_runs import FreeRuns, relative_sizes
-from mckibben.statistics import Autoregression, autoregression
+from mckibben.numerics.statistics import Autoregression, autoregression
 
 LARGEST = 1e150
 """Largest sensitivity; its square is finite."""

@@ -15,7 +15,7 @@ from mckibben.channels import loads_among, numbered, one, schedules
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData, training_data
 from mckibben.estimators.core.estimator import Estimator, resting
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording, listed
 
 MOVES = 0.1

@@ -29,8 +29,8 @@ from mckibben.errors import DataError, MckibbenError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors
-from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.swarm import Swarm, particle_swarm
+from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording
 
 UNLOADED = 0.05

@@ -15,7 +15,7 @@ system identification", 1989 (error reduction ratio).
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import combinations_with_replacement, islice, pairwise
@@ -39,8 +39,8 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, SearchEstimator
 from mckibben.estimators.core.free_runs import relative_sizes
 from mckibben.estimators.hysteresis.pi import play_operators
-from mckibben.estimators.optimisers.multi_start import trust_region
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.descent import trust_region
+from mckibben.numerics.tracker import Tracker
 from mckibben.presets import preset
 
 BOUND = 1.0
@@ -224,7 +224,6 @@ class NarxEstimator(SearchEstimator):
             first = rng.normal(0.0, 1.0, self.n_units * (x.shape[1] + 1))
             *_, (layer, _) = trust_region(
                 layers.errors,
-                layers.slopes,
                 first,
                 scale=np.ones(first.size),
                 least_gain=LEAST_GAIN,
@@ -248,7 +247,6 @@ class NarxEstimator(SearchEstimator):
         runs = FreeRuns(model, pieces, tracker)
         path = trust_region(
             runs.errors,
-            runs.slopes,
             start,
             scale=relative_sizes(start),
             least_gain=LEAST_GAIN,
@@ -372,16 +370,17 @@ class HiddenLayers:
         )
         return network, columns @ weights - target
 
-    def errors(self, layer: Array) -> Array:
-        """Return the errors."""
+    def errors(self, layer: Array) -> tuple[Array, Callable[[], Array]]:
+        """Return the errors, and a function to their derivatives."""
         self.tracker.evaluations += 1
-        return self.solved(layer)[1]
+        network, left = self.solved(layer)
+        return left, lambda: self.slopes(layer, network)
 
-    def slopes(self, layer: Array) -> Array:
+    def slopes(self, layer: Array, network: NarxNetwork) -> Array:
         """Return the projected derivatives of the errors (Kaufman)."""
         n, k = self.x.shape
         columns = self._columns(layer.reshape(self.units, -1))
-        by_all, _ = self.solved(layer)[0].slopes(self.x)
+        by_all, _ = network.slopes(self.x)
         moved = np.zeros((len(columns), layer.size))
         moved[:n] = by_all[:, 1 + k :].reshape(n, self.units, -1)[:, :, :-1].reshape(n, -1)
         taken = np.linalg.qr(columns)[0]
@@ -487,18 +486,21 @@ class FreeRuns:
             model.kernel.batch(coefficients, each.state.copy(), each.inputs, outputs[start:stop])
         return outputs[:, 0]
 
-    def errors(self, theta: Array) -> Array:
-        """Return the errors at scored samples, relative to half the output's range."""
-        half = self.model.output_scale[1]
-        errors = (self.outputs(self.model.unpack(theta))[self.counts] - self.target) / half
+    def errors(self, theta: Array) -> tuple[Array, Callable[[], Array]]:
+        """Return the errors at scored samples, relative to half the output's range.
+
+        And a function to their derivatives.
+        """
+        half, model = self.model.output_scale[1], self.model.unpack(theta)
+        outputs = self.outputs(model)
+        errors = (outputs[self.counts] - self.target) / half
         errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
         self.tracker.update(theta, half * float(np.sqrt(np.mean(errors**2))))
-        return errors
+        return errors, lambda: self.slopes(model, outputs)
 
-    def slopes(self, theta: Array) -> Array:
+    def slopes(self, model: Narx, outputs: Array) -> Array:
         """Return the derivatives of the errors, shape (errors, parameters)."""
-        model = self.model.unpack(theta)
-        y = scaled(self.outputs(model), model.output_scale)
+        y = scaled(outputs, model.output_scale)
         behind = self._behind.copy()
         behind[self._own] = y
         with np.errstate(over="ignore", invalid="ignore"):

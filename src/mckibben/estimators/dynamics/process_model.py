@@ -13,7 +13,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.tracker import Tracker
 from mckibben.presets import Preset, preset
 
 LEAST_DAMPING, MOST_DAMPING = 0.02, 100.0

@@ -7,6 +7,7 @@ left to the descent, whose derivatives are exact.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar
 
@@ -24,8 +25,8 @@ from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.dynamics.process_model import ProcessModelEstimator
-from mckibben.estimators.optimisers.multi_start import trust_region
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.descent import trust_region
+from mckibben.numerics.tracker import Tracker
 from mckibben.signals.periodic import band_limited
 
 ANGLE = 1 / 3
@@ -195,7 +196,6 @@ class StateNetworkEstimator(SearchEstimator):
         tracker.budget = self.n_steps
         (_, squares), *_ = trust_region(
             search.errors,
-            search.slopes,
             template.pack(),
             scale=np.ones(template.n_parameters),
             least_gain=LEAST_GAIN,
@@ -259,18 +259,12 @@ class NetworkRuns:
         self.rate = template.rate * data.timed()
         self.paths = paths(data, template.substeps, warm, self.at_rest)
 
-    def errors(self, theta: Array) -> Array:
-        """Return the errors at scored samples; infinite for diverging runs."""
+    def errors(self, theta: Array) -> tuple[Array, Callable[[], Array]]:
+        """Return the errors at scored samples, infinite for diverging runs, and a function to slopes."""
         found = self._followed(theta, theta.size)
-        self._slopes = found[:, 1:]
         errors = found[:, 0] - self.target
         self.tracker.update(theta, float(np.sqrt(np.mean(errors**2))))
-        return np.asarray(errors)
-
-    def slopes(self, theta: Array) -> Array:
-        """Return the derivatives of the last evaluation of errors."""
-        del theta
-        return self._slopes
+        return np.asarray(errors), lambda: found[:, 1:]
 
     def outputs(self, theta: Array) -> Array:
         """Return the outputs at scored samples."""

@@ -30,7 +30,7 @@ from mckibben.estimators.core.separable import (
 )
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap
 from mckibben.estimators.hysteresis.pi import play_operators, spread
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.tracker import Tracker
 
 RAISED = 1e-5
 """Step of the logarithm of the input offset, for its derivative."""

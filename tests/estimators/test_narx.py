@@ -63,7 +63,7 @@ def test_slopes_of_free_runs_are_those_of_finite_differences(
     polynomial = kind == "narx-polynomial"
     block = load("blocks", kind if polynomial else "narx-network").example()
     model = replace(block, **scales, **(terms if polynomial else network))
-    runs = FreeRuns(model, stretches(model, data, horizon), Tracker())
+    runs = FreeRuns(model, stretches(model, data, horizon))
     parameters, step = model.pack(), 1e-6
     differences = [
         (runs.errors(parameters + move)[0] - runs.errors(parameters - move)[0]) / (2 * step)

@@ -14,6 +14,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
+from mckibben.numerics.statistics import rms
 
 Errors = Callable[[Array], tuple[Array, Callable[[], Array]]]
 """From parameters, shape (p,), to errors, shape (n,), and a function to their derivatives there, shape
@@ -152,7 +153,7 @@ def levenberg_marquardt(
     """
     damping, slow, point = FIRST_DAMPING, 0, start
     found, slopes = errors(point, True)
-    cost = _size(found)
+    cost = rms(found)
     improved(point, cost)
     for number in range(steps):
         if not len(slopes):
@@ -165,7 +166,7 @@ def levenberg_marquardt(
                 tried = step(triangle, point, damping)
                 # most others are accepted, so that their slopes are needed
                 found, slopes = errors(tried, turn == 0 and number < steps - 1)
-                size = _size(found)
+                size = rms(found)
             except ModelError:
                 size = np.inf
             if size < cost:
@@ -180,9 +181,3 @@ def levenberg_marquardt(
             return point
         damping = max(LIGHTER * damping, LIGHTEST)
     return point
-
-
-def _size(errors: Array) -> float:
-    """Return the root mean square, infinite if that of an error is not finite."""
-    size = float(np.sqrt(np.mean(errors**2)))
-    return size if np.isfinite(size) else np.inf

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.numerics.descent import Errors, trust_region
+from mckibben.numerics.statistics import rms
 from mckibben.numerics.tracker import Tracker
 
 EXCHANGES = 3
@@ -58,14 +59,10 @@ def multi_start(
     Every start is evaluated once; the best ``n_refined`` are refined in a trust region. Where there are
     choices, the best is then improved by exchange, and refined again.
     """
-
-    def tracked(point: Array) -> tuple[Array, Callable[[], Array]]:
-        found = errors(point)
-        tracker.update(point, float(np.sqrt(np.mean(found[0] ** 2))))
-        return found
+    tracked = tracker.watched(errors)
 
     def cost(point: Array) -> float:
-        return float(np.mean(tracked(point)[0] ** 2))
+        return rms(tracked(point)[0])
 
     def evaluated(start: Array) -> tuple[Array, float]:
         inside = np.clip(start, *bounds)

@@ -24,6 +24,12 @@ NORMAL_95 = 1.96
 """Standard deviations in which 95 % of a normal distribution lie."""
 
 
+def rms(errors: Array) -> float:
+    """Return the root mean square, infinite if that of an error is not finite."""
+    size = float(np.sqrt(np.mean(errors**2)))
+    return size if np.isfinite(size) else np.inf
+
+
 def correlation_length(series: Sequence[Array]) -> float:
     """Return the integral of the autocorrelation of a series, in samples: 1 for white noise.
 

@@ -20,7 +20,7 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.memoryless import Negative
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Start
-from mckibben.numerics.descent import Errors
+from mckibben.numerics.descent import Errors, by_differences
 from mckibben.numerics.least_squares import solve_bounded
 from mckibben.numerics.multi_start import Choice, multi_start
 from mckibben.numerics.tracker import Tracker
@@ -101,15 +101,8 @@ class SeparableEstimator(Estimator):
 
         Shape (samples that count, m); by finite differences of the basis.
         """
-        here = self.matrix(theta, data) @ linear
         steps = differences(theta, *self.bounds(data))
-        columns = []
-        for index in range(theta.size):
-            moved = theta.copy()
-            moved[index] += steps[index]
-            there = self.matrix(moved, data) @ linear
-            columns.append((there - here) / (moved[index] - theta[index]))
-        return np.column_stack(columns)
+        return by_differences(lambda at: self.matrix(at, data) @ linear, steps)(theta)[1]()
 
     def jacobian(
         self, theta: Array, matrix: Array, linear: Array | None, data: TrainingData

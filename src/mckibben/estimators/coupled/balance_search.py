@@ -24,7 +24,7 @@ from mckibben.estimators.coupled.balance_structure import Indices, Structure, Te
 from mckibben.numerics.blocks import blocks_of, squared_errors, sums_of_others
 from mckibben.numerics.descent import LIGHTEST, levenberg_marquardt
 from mckibben.numerics.least_squares import solve_constrained, solve_products
-from mckibben.numerics.statistics import autoregression
+from mckibben.numerics.statistics import autoregression, rms
 from mckibben.numerics.tracker import Tracker
 
 BLOCKS, FOLDS = 20, 5
@@ -97,8 +97,7 @@ class Search:
 
     def cost(self, z: Array) -> float:
         """Return the root mean square error."""
-        size = float(np.sqrt(np.mean(self.errors(z)[0] ** 2)))
-        return size if np.isfinite(size) else np.inf
+        return rms(self.errors(z)[0])
 
     @property
     def free(self) -> NDArray[np.intp]:

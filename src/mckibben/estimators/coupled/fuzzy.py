@@ -18,6 +18,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.numerics.descent import trust_region
+from mckibben.numerics.statistics import rms
 from mckibben.numerics.swarm import Swarm, particle_swarm
 from mckibben.numerics.tracker import Tracker
 
@@ -157,7 +158,7 @@ class Problem:
 
     def cost(self, sets: Sets) -> float:
         """Return the root mean square over all outputs, ordered as the paper's Eq. (26)."""
-        return float(np.sqrt(np.mean(self.errors(sets) ** 2)))
+        return rms(self.errors(sets))
 
 
 @dataclass(frozen=True)
@@ -217,20 +218,18 @@ def project(problem: Problem, n_sets: int, low: Array, high: Array, tracker: Tra
 
     def errors(theta: Array) -> tuple[Array, Callable[[], Array]]:
         sets = start.replaced(theta)
-        left = problem.errors(sets).ravel()
-        tracker.update(theta, float(np.sqrt(np.mean(left**2))))
-        every = np.append(left, staying * (theta - start.vector))
+        every = np.append(problem.errors(sets), staying * (theta - start.vector))
         return every, lambda: np.vstack([sensitivities(problem, sets), np.diag(staying)])
 
     tracker.budget = MOST_STEPS + 1
-    trust_region(
-        errors,
+    path = trust_region(
+        tracker.watched(errors),
         start.vector,
         bounds=(lower, upper),
         least_gain=LEAST_GAIN,
         max_evaluations=MOST_STEPS + 1,
     )
-    return start if tracker.best is None else start.replaced(tracker.best)
+    return start.replaced(path[-1][0])
 
 
 def sensitivities(problem: Problem, sets: Sets) -> Array:

@@ -29,6 +29,7 @@ from mckibben.errors import DataError, MckibbenError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors
+from mckibben.numerics.statistics import rms
 from mckibben.numerics.swarm import Swarm, particle_swarm
 from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording
@@ -255,8 +256,7 @@ class RecurrentProblem:
         """Return the free-running RMSE; infinite for diverging runs."""
         errors = np.concatenate([z - y for z, y in zip(outputs, self.targets, strict=True)])
         with np.errstate(over="ignore", invalid="ignore"):
-            value = float(np.sqrt(np.mean(errors**2)))
-        return value if np.isfinite(value) else np.inf
+            return rms(errors)
 
     def best(self, sets: Sets, feedbacks: Array) -> RecurrentFuzzyNetwork:
         """Return the network of lowest free-running error, trained on its own past outputs.

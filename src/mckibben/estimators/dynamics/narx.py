@@ -40,6 +40,7 @@ from mckibben.estimators.core.estimator import Grid, SearchEstimator
 from mckibben.estimators.core.free_runs import relative_sizes
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.numerics.descent import trust_region
+from mckibben.numerics.statistics import rms
 from mckibben.numerics.tracker import Tracker
 from mckibben.presets import preset
 
@@ -140,7 +141,7 @@ class NarxEstimator(SearchEstimator):
         found = self._polynomials if self.mapping == "polynomial" else self._networks
         error = cache(partial(free_run_rmse, data=data))
         paths: list[list[Narx]] = []
-        for model in found(self._fields(data), data, tracker):
+        for model in found(self._fields(data), data):
             if data.target.size <= model.n_parameters:
                 raise DataError(
                     f"{data.target.size} samples are too few for {model.n_parameters} parameters",
@@ -187,11 +188,8 @@ class NarxEstimator(SearchEstimator):
             **self.channels(data),
         }
 
-    def _polynomials(
-        self, fields: Mapping[str, Any], data: TrainingData, tracker: Tracker
-    ) -> list[Narx]:
+    def _polynomials(self, fields: Mapping[str, Any], data: TrainingData) -> list[Narx]:
         """Return polynomials of the most significant terms: the maximum number, half, and a quarter."""
-        del tracker
         x, y = one_step_pairs(fields, data, SELECTION_SAMPLES)
         terms = tuple(
             term
@@ -212,12 +210,10 @@ class NarxEstimator(SearchEstimator):
             models.append(NarxPolynomial(terms=chosen, weights=vector(weights), **fields))
         return models
 
-    def _networks(
-        self, fields: Mapping[str, Any], data: TrainingData, tracker: Tracker
-    ) -> list[Narx]:
+    def _networks(self, fields: Mapping[str, Any], data: TrainingData) -> list[Narx]:
         """Return networks fitted to one-step errors by variable projection, one per start."""
         x, y = one_step_pairs(fields, data, LAYER_SAMPLES)
-        layers = HiddenLayers(x, y, fields, self.n_units, tracker)
+        layers = HiddenLayers(x, y, fields, self.n_units)
         rng = np.random.default_rng(self.seed)
         models: list[Narx] = []
         for _ in range(self.n_starts):
@@ -244,9 +240,9 @@ class NarxEstimator(SearchEstimator):
         # the samples before a stretch may be measured nowhere, or seldom
         if sum(int(piece.counts.sum()) for piece in pieces) < start.size:
             return []
-        runs = FreeRuns(model, pieces, tracker)
+        runs = FreeRuns(model, pieces)
         path = trust_region(
-            runs.errors,
+            tracker.watched(runs.errors, model.output_scale[1]),
             start,
             scale=relative_sizes(start),
             least_gain=LEAST_GAIN,
@@ -351,7 +347,6 @@ class HiddenLayers:
 
     fields: Mapping[str, Any]
     units: int
-    tracker: Tracker
 
     def solved(self, layer: Array) -> tuple[NarxNetwork, Array]:
         """Return the best network for hidden weights, shape (units * (k + 1),), and its errors.
@@ -372,7 +367,6 @@ class HiddenLayers:
 
     def errors(self, layer: Array) -> tuple[Array, Callable[[], Array]]:
         """Return the errors, and a function to their derivatives."""
-        self.tracker.evaluations += 1
         network, left = self.solved(layer)
         return left, lambda: self.slopes(layer, network)
 
@@ -461,8 +455,8 @@ def feed_back(slopes: Array, by_past: Array) -> None:
 class FreeRuns:
     """Free runs over segments of data, for models of one structure."""
 
-    def __init__(self, model: Narx, stretches: Sequence[Stretch], tracker: Tracker) -> None:
-        self.model, self.stretches, self.tracker = model, stretches, tracker
+    def __init__(self, model: Narx, stretches: Sequence[Stretch]) -> None:
+        self.model, self.stretches = model, stretches
         self.counts = np.concatenate([each.counts for each in stretches])
         self.target = np.concatenate([each.outputs for each in stretches])[self.counts]
         self._driven = np.concatenate([each.regressors for each in stretches])
@@ -491,11 +485,10 @@ class FreeRuns:
 
         And a function to their derivatives.
         """
-        half, model = self.model.output_scale[1], self.model.unpack(theta)
+        model = self.model.unpack(theta)
         outputs = self.outputs(model)
-        errors = (outputs[self.counts] - self.target) / half
+        errors = (outputs[self.counts] - self.target) / model.output_scale[1]
         errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
-        self.tracker.update(theta, half * float(np.sqrt(np.mean(errors**2))))
         return errors, lambda: self.slopes(model, outputs)
 
     def slopes(self, model: Narx, outputs: Array) -> Array:
@@ -518,10 +511,9 @@ class FreeRuns:
 
 def free_run_rmse(model: Narx, data: TrainingData) -> float:
     """Return the RMSE of free runs from measured starts; infinite on overflow."""
-    runs = FreeRuns(model, stretches(model, data, None), Tracker())
+    runs = FreeRuns(model, stretches(model, data, None))
     with np.errstate(over="ignore", invalid="ignore"):
-        value = float(np.sqrt(np.mean((runs.outputs(model)[runs.counts] - runs.target) ** 2)))
-    return value if np.isfinite(value) else np.inf
+        return rms(runs.outputs(model)[runs.counts] - runs.target)
 
 
 def stable(model: Narx, data: TrainingData) -> bool:

@@ -27,6 +27,7 @@ from mckibben.arrays import Array, Mask
 from mckibben.estimators.core.data import Run
 from mckibben.numerics.descent import trust_region
 from mckibben.numerics.multi_start import follow_best
+from mckibben.numerics.statistics import rms
 from mckibben.numerics.tracker import Tracker
 
 STABLE = 1.0 - 1e-7
@@ -286,7 +287,7 @@ def evaluate(
         found.append(e)
         slopes.append(own)
     e = np.concatenate(found)
-    return e, np.concatenate(slopes), float(np.sqrt(np.mean(e**2)))
+    return e, np.concatenate(slopes), rms(e)
 
 
 def from_rest(theta: Array, orders: Orders, run: Run, start: Beginning) -> tuple[Array, Array]:
@@ -347,13 +348,12 @@ def minimise(
     n_errors = sum(int(run.counts.sum()) for run in runs)
 
     def sloped(theta: Array) -> tuple[Array, Callable[[], Array]]:
-        e, slopes, cost = np.full(n_errors, np.inf), np.empty((n_errors, 0)), np.inf
+        e, slopes = np.full(n_errors, np.inf), np.empty((n_errors, 0))
         if admissible(theta, orders):
-            e, slopes, cost = evaluate(theta, orders, runs, start)
-        tracker.update(theta, cost)
+            e, slopes, _ = evaluate(theta, orders, runs, start)
         return e, lambda: slopes
 
-    search = partial(trust_region, sloped, least_gain=LEAST_GAIN)
+    search = partial(trust_region, tracker.watched(sloped), least_gain=LEAST_GAIN)
 
     def first_steps(theta: Array) -> tuple[Array, float]:
         found, squares = search(theta, max_evaluations=FIRST_STEPS)[-1]

@@ -192,10 +192,10 @@ class StateNetworkEstimator(SearchEstimator):
         turned = step / linear.time_constants[0]
         fewest = int(np.clip(np.ceil(turned / ANGLE), 1, MOST_SUBSTEPS))
         template = self.start(linear, merged, self.substeps or fewest)
-        search = self.search(template, merged, tracker)
+        search = self.search(template, merged)
         tracker.budget = self.n_steps
         (_, squares), *_ = trust_region(
-            search.errors,
+            tracker.watched(search.errors),
             template.pack(),
             scale=np.ones(template.n_parameters),
             least_gain=LEAST_GAIN,
@@ -239,9 +239,9 @@ class StateNetworkEstimator(SearchEstimator):
             **channels,
         )
 
-    def search(self, template: StateNetwork, data: TrainingData, tracker: Tracker) -> NetworkRuns:
+    def search(self, template: StateNetwork, data: TrainingData) -> NetworkRuns:
         """Return the errors of networks of one structure on all runs."""
-        return NetworkRuns(template, data, self._warm if self.periodic else None, tracker)
+        return NetworkRuns(template, data, self._warm if self.periodic else None)
 
 
 class NetworkRuns:
@@ -251,10 +251,8 @@ class NetworkRuns:
     begin as after their first input has long been held, unless the template's start is virgin.
     """
 
-    def __init__(
-        self, template: StateNetwork, data: TrainingData, warm: int | None, tracker: Tracker
-    ) -> None:
-        self.template, self.target, self.tracker = template, data.target, tracker
+    def __init__(self, template: StateNetwork, data: TrainingData, warm: int | None) -> None:
+        self.template, self.target = template, data.target
         self.at_rest = warm is None and template.initial == "first_sample"
         self.rate = template.rate * data.timed()
         self.paths = paths(data, template.substeps, warm, self.at_rest)
@@ -262,9 +260,7 @@ class NetworkRuns:
     def errors(self, theta: Array) -> tuple[Array, Callable[[], Array]]:
         """Return the errors at scored samples, infinite for diverging runs, and a function to slopes."""
         found = self._followed(theta, theta.size)
-        errors = found[:, 0] - self.target
-        self.tracker.update(theta, float(np.sqrt(np.mean(errors**2))))
-        return np.asarray(errors), lambda: found[:, 1:]
+        return np.asarray(found[:, 0] - self.target), lambda: found[:, 1:]
 
     def outputs(self, theta: Array) -> Array:
         """Return the outputs at scored samples."""

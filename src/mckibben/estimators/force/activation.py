@@ -229,12 +229,10 @@ class ActivationPressureEstimator(SearchEstimator):
 
         def errors(point: Array) -> tuple[Array, Callable[[], Array]]:
             shape, grown = powers @ point[:4], (1 + point[4] * rise) * rate
-            left = shape * grown - rest
-            tracker.update(point, float(np.sqrt(np.mean(left**2))))
             slopes = [powers * grown[:, np.newaxis], shape * rise * rate]
-            return left, lambda: np.column_stack(slopes)
+            return shape * grown - rest, lambda: np.column_stack(slopes)
 
-        found = _searched(errors, np.append(start, 0.0), (lower, upper))
+        found = _searched(tracker.watched(errors), np.append(start, 0.0), (lower, upper))
         phi = found[:4] / largest ** np.array([3, 2, 1, 0])
         slope = float(found[4]) / max(middle, 1e-9)
         return phi, (slope, 1.0 - slope * middle)

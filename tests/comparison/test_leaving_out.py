@@ -15,8 +15,8 @@ from mckibben.comparison.leaderboard import Row, doubts_of
 from mckibben.comparison.splits import N_PARTS, Span, parts_of, spans_of
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.leaving_out import MOST_FREE
-from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.metrics import Scores
+from mckibben.numerics.tracker import Tracker
 from mckibben.registry import load
 from mckibben.signals import irregular_triangle, triangle
 

@@ -14,8 +14,8 @@ import mckibben
 SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
-    {"errors", "arrays", "registry", "numerals", "version", "system"},
-    {"recording", "signals", "channels", "metrics", "statistics"},
+    {"errors", "arrays", "registry", "numerals", "version", "system", "numerics"},
+    {"recording", "signals", "channels", "metrics"},
     {"files"},
     {"rigs"},
     {"blocks"},
@@ -41,6 +41,7 @@ LAYERS = (
 BASE = {"arrays", "errors"}
 
 STANDS_ON = {
+    "numerics": {"numerics", *BASE},
     "files": {"files", "recording", "registry", "system", *BASE},
     "rigs": {"rigs", "recording", "signals", "registry", "system", "metrics", *BASE},
     "export": {"export", "blocks", "outputs", "registry", "system", *BASE},

@@ -17,7 +17,6 @@ from mckibben.blocks.fields import DISPLACEMENT, FORCE, PRESSURE, Channel
 from mckibben.blocks.memoryless import PiecewiseLinear
 from mckibben.estimators.coupled.balance import TERMS, BalanceEstimator
 from mckibben.estimators.coupled.balance_slopes import run
-from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.rigs import load_rig
 from mckibben.signals.broadband import random_wave
 
@@ -391,22 +390,6 @@ def test_fronts_of_several_muscles_stand_before_each() -> None:
     assert isinstance(zones, PerChannel)
     for zone in zones.parts:  # sharp, or one that fades
         assert 3.0 - zone.simulate(np.array([3.0]))[0] == pytest.approx(0.294, rel=0.1)
-
-
-def test_least_squares_within_inequalities_meet_the_conditions_of_optimality() -> None:
-    rng = np.random.default_rng(0)
-    slopes, target = rng.standard_normal((40, 6)), rng.standard_normal(40)
-    sides, least = rng.standard_normal((9, 6)), 0.3 * rng.standard_normal(9)
-    x, pressed = constrained_least_squares(slopes, target, sides, least)
-    assert (sides @ x - least > -1e-12).all()
-    assert (pressed >= 0).all()
-    np.testing.assert_allclose(pressed * (sides @ x - least), 0.0, atol=1e-9)
-    np.testing.assert_allclose(slopes.T @ (slopes @ x - target), sides.T @ pressed, atol=1e-9)
-    x, pressed = constrained_least_squares(slopes, target, np.eye(6), np.zeros(6))
-    assert (pressed > 0).any()
-    assert (x[pressed > 0] == 0.0).all()
-    with pytest.raises(ModelError):
-        constrained_least_squares(slopes, target, np.eye(6)[[0, 0]] * [[1.0], [-1.0]], np.ones(2))
 
 
 def test_the_order_of_recordings_does_not_change_what_terms_are_chosen() -> None:

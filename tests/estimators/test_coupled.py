@@ -28,7 +28,7 @@ def test_projected_derivatives_agree_with_differences() -> None:
     y += 0.2 * rng.standard_normal(y.shape)
     sets = Sets.even(np.zeros(2), np.ones(2), 2)
     problem = Problem(x, y, Consequents(True, 1e-10))
-    jacobian, residual = sensitivities(problem, sets)
+    jacobian, residual = sensitivities(problem, sets), problem.errors(sets).ravel()
     gradient = jacobian.T @ residual
     for k in range(sets.vector.size):
         moved = sets.vector

@@ -19,7 +19,7 @@ from mckibben.estimators.dynamics.narx import (
     select,
     stretches,
 )
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.tracker import Tracker
 from mckibben.registry import load
 from tests.twins import fed_back
 
@@ -63,13 +63,13 @@ def test_slopes_of_free_runs_are_those_of_finite_differences(
     polynomial = kind == "narx-polynomial"
     block = load("blocks", kind if polynomial else "narx-network").example()
     model = replace(block, **scales, **(terms if polynomial else network))
-    runs = StretchErrors(model, stretches(model, data, horizon), Tracker())
+    runs = StretchErrors(model, stretches(model, data, horizon))
     parameters, step = model.pack(), 1e-6
     differences = [
-        (runs.errors(parameters + move) - runs.errors(parameters - move)) / (2 * step)
+        (runs.errors(parameters + move)[0] - runs.errors(parameters - move)[0]) / (2 * step)
         for move in step * np.eye(parameters.size)
     ]
-    slopes = runs.slopes(parameters)
+    slopes = runs.errors(parameters)[1]()
     np.testing.assert_allclose(slopes, np.transpose(differences), atol=1e-6 * np.ptp(slopes))
 
 

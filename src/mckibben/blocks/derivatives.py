@@ -27,6 +27,7 @@ from mckibben.blocks.fields import Initial
 from mckibben.blocks.kernels import in_scratch
 from mckibben.blocks.parameters import Parametrised
 from mckibben.errors import ModelError
+from mckibben.numerics.descent import differences
 from mckibben.system.threads import cores
 
 Complex = NDArray[np.complex128]
@@ -50,28 +51,6 @@ WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 def relative_sizes(parameters: Array) -> Array:
     """Return the scales of parameters, with a lower bound."""
     return np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))
-
-
-def differences(
-    function: Callable[[Array], Array], at: Array, steps: Array, places: Sequence[int] | None = None
-) -> Array:
-    """Return the differences of a function's values by each of k arguments, shape (..., k).
-
-    Parameters
-    ----------
-    function : callable
-        Arguments, shape (n,), to values of any shape.
-    at, steps : array, shape (n,)
-        Arguments, and how far each is moved; either way.
-    places : sequence of int, optional
-        Of the k arguments; all by default.
-    """
-    here, found = function(at), []
-    for place in range(at.size) if places is None else places:
-        moved = at.copy()
-        moved[place] += steps[place]
-        found.append((function(moved) - here) / (moved[place] - at[place]))
-    return np.stack(found, axis=-1) if found else np.zeros((*here.shape, 0))
 
 
 def _laid_out(block: Block) -> Layout:

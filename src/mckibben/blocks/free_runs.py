@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block, check_units
-from mckibben.blocks.derivatives import DIFFERENCE, derivatives, differences, relative_sizes
+from mckibben.blocks.derivatives import DIFFERENCE, derivatives, relative_sizes
 from mckibben.blocks.runs import FreeRun, Run
 from mckibben.blocks.starts import history, known_state, run_on, state_after
 from mckibben.errors import ModelError
+from mckibben.numerics.descent import differences
 from mckibben.recording import Recording
 
 AT_ONCE = 2_000_000

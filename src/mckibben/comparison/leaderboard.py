@@ -19,6 +19,7 @@ from mckibben.diagnosis.bands import TestedBand
 from mckibben.diagnosis.branch_gaps import Memory
 from mckibben.errors import MckibbenError
 from mckibben.metrics import Scores
+from mckibben.numerics.statistics import half_interval
 from mckibben.system.showing import DrawsItself
 
 if TYPE_CHECKING:
@@ -491,8 +492,5 @@ def _counted(row: Row) -> Array:
 
 def _interval(values: Array) -> tuple[float, float]:
     """Return the interval of the mean of independent values, by Student's t."""
-    from scipy.special import stdtrit
-
-    mean, n = float(values.mean()), values.size
-    half = stdtrit(n - 1, 0.5 + LEVEL / 2) * float(values.std(ddof=1)) / np.sqrt(n)
+    mean, half = float(values.mean()), half_interval(values, LEVEL)
     return mean - half, mean + half

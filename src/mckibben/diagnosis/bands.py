@@ -24,10 +24,11 @@ from mckibben.blocks.inverse import commands
 from mckibben.blocks.runs import FreeRun
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
+from mckibben.numerics.blocks import block_length
+from mckibben.numerics.statistics import correlation_length
 from mckibben.recording import Recording, check_sample_times, listed
 from mckibben.signals.reversals import reversals
 from mckibben.signals.shared_rows import check_shared
-from mckibben.statistics import block_length, correlation_length
 from mckibben.system.progress import Tell, one_by_one, telling
 
 if TYPE_CHECKING:

@@ -18,9 +18,11 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.runs import FreeRun
+from mckibben.numerics.blocks import blocks_of, squared_errors, sums_of_others
+from mckibben.numerics.least_squares import solve_products
+from mckibben.numerics.statistics import correlation_length, half_interval, hats
 from mckibben.signals.holds import holds
 from mckibben.signals.reversals import reversals
-from mckibben.statistics import correlation_length, hats
 
 PER_BRANCH, FEWEST, MOST = 24, 400, 6000
 """Smallest number of blocks per typical branch of the input; smallest and largest number of blocks, if
@@ -149,30 +151,19 @@ class _Test:
         wanted = min(int(e.size / (MEMORIES * memory(x))), SEGMENTS)
         segments = [
             part
-            for run in np.split(np.arange(e.size), ends)
-            for part in np.array_split(run, max(round(wanted * run.size / e.size), 1))
+            for run in blocks_of(np.split(np.column_stack([x, e]), ends), wanted)
+            for part in run
             if part.size
         ]
-        self.grams = np.array([x[part].T @ x[part] for part in segments])
-        self.products = np.array([x[part].T @ e[part] for part in segments])
-        self.energies = np.array([e[part] @ e[part] for part in segments])
+        self.products = np.array([part.T @ part for part in segments])
         self.folds = np.arange(len(segments)) % min(FOLDS, len(segments))
 
     def errors(self, columns: tuple[int, ...]) -> Array:
         """Return the squared error of every segment, with columns fitted to the other folds."""
-        places = list(dict.fromkeys(columns))
-        if not places:
-            return self.energies
-        grams, products = self.grams[:, places][:, :, places], self.products[:, places]
-        found = np.empty(len(self.energies))
-        for fold in np.unique(self.folds):
-            out = self.folds == fold
-            gram = grams[~out].sum(axis=0)
-            gram += np.diag(RIDGE * np.maximum(np.diag(gram), np.finfo(float).tiny))
-            weights = np.linalg.lstsq(gram, products[~out].sum(axis=0), rcond=1e-12)[0]
-            found[out] = self.energies[out] - 2 * products[out] @ weights
-            found[out] += np.einsum("i,sij,j->s", weights, grams[out], weights)
-        return found
+        places = [*dict.fromkeys(columns), -1]
+        some = self.products[:, places][:, :, places]
+        weights = solve_products(sums_of_others(some, self.folds), len(places) - 1, RIDGE)
+        return squared_errors(some, weights[self.folds])[:, 0]
 
     def gains(self, group: _Group, known: tuple[int, ...]) -> Array:
         """Return the reduction of every segment's squared error by a cause."""
@@ -186,13 +177,10 @@ class _Test:
 
     def significant(self, group: _Group, known: tuple[int, ...]) -> bool:
         """Return whether a cause reduces the error, beyond chance and by a share that matters."""
-        from scipy.special import stdtrit
-
         gains, total = self.gains(group, known), float(self.errors(known).sum())
         if gains.size < 2 or not self.long_enough or not gains.sum() > LEAST_SHARE * total:
             return False
-        spread = float(gains.std(ddof=1)) / np.sqrt(gains.size)
-        return bool(gains.mean() > stdtrit(gains.size - 1, 1 - LEVEL) * spread)
+        return bool(gains.mean() > half_interval(gains, 1 - 2 * LEVEL))
 
     def cause(self, group: _Group, known: tuple[int, ...]) -> Cause:
         """Return what a group explains in addition to known columns."""

@@ -25,6 +25,7 @@ from mckibben.diagnosis.loops import (
 from mckibben.diagnosis.memory import creep, dead_zones, rate_dependence
 from mckibben.diagnosis.tracks import Range, prepare
 from mckibben.errors import DataError
+from mckibben.numerics.statistics import half_interval
 from mckibben.recording import Recording, listed
 from mckibben.signals.reversals import whole_cycles
 from mckibben.system.showing import DrawsItself
@@ -342,13 +343,10 @@ def _interval(values: Sequence[float]) -> Range | None:
 
     It does not reach beyond zero where all values are of one sign.
     """
-    from scipy.special import stdtrit
-
-    n = len(values)
-    if n < REPEATS:
+    if len(values) < REPEATS:
         return None
     # the standard error of a median of normal values is 1.2533 times that of their mean
-    half = 1.2533 * float(np.std(values, ddof=1)) / np.sqrt(n) * float(stdtrit(n - 1, 0.975))
+    half = 1.2533 * half_interval(np.array(values), 0.95)
     low, high = float(np.median(values)) - half, float(np.median(values)) + half
     return max(low, 0.0) if min(values) >= 0 else low, min(high, 0.0) if max(values) <= 0 else high
 

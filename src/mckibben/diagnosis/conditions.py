@@ -9,9 +9,9 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.channels import by_name, channels_of
 from mckibben.diagnosis.tracks import FEWEST
+from mckibben.numerics.statistics import hats
 from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, moves
-from mckibben.statistics import hats
 
 ALIKE, COVERS = 0.02, 0.5
 """Share of another input's range within which its levels are equal, and share of the input range

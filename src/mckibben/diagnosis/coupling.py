@@ -9,8 +9,8 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.channels import Channels, any_moves, moved_by
+from mckibben.numerics.statistics import dependence
 from mckibben.recording import Recording
-from mckibben.statistics import dependence
 
 FOLLOWS = 0.9
 """R² of an input's regression on the others above which their effects are not separable."""

@@ -17,9 +17,9 @@ import numpy as np
 from mckibben.channels import PRESSURE, channels_of
 from mckibben.diagnosis.excitation import Excitation, extremes
 from mckibben.errors import DataError
+from mckibben.numerics.statistics import dependence
 from mckibben.recording import Recording, listed
 from mckibben.signals.shared_rows import without_copies
-from mckibben.statistics import dependence
 
 if TYPE_CHECKING:
     from mckibben.channels import Names

@@ -17,8 +17,9 @@ from mckibben.channels import channels_of
 from mckibben.comparison.splits import parts_of
 from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.estimators.catalogue import declared
+from mckibben.numerics.blocks import BlockBootstrap, interval
+from mckibben.numerics.statistics import correlation_length
 from mckibben.recording import Recording
-from mckibben.statistics import BlockBootstrap, correlation_length, interval
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,12 +11,14 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.runs import run_of
 from mckibben.comparison.splits import Split
+from mckibben.numerics.blocks import squared_errors, sums_of_others
+from mckibben.numerics.least_squares import solve_products
 
 LARGEST_DEGREE, MOST_TERMS = 5, 60
 """Of the polynomial."""
 
 RIDGE = 1e-9
-"""Of the least squares, relative to the largest diagonal element."""
+"""Of the least squares, relative to each term's own effect."""
 
 FEWEST_PARTS = 3
 """Of the data, each left out in turn to choose the degree: recordings, or pieces of them if fewer."""
@@ -61,23 +63,16 @@ def static_map(given: Sequence[Array], wanted: Sequence[Array]) -> Map:
     chosen, least = _constant(wanted), np.inf
     for degree in possible:
         terms = _polynomial(low, high, degree)
-        tables = [terms(part) for part in given]
-        grams = np.array([table.T @ table for table in tables])
-        sides = np.array([table.T @ part for table, part in zip(tables, wanted, strict=True)])
-        missed = 0.0
-        for place, (table, part) in enumerate(zip(tables, wanted, strict=True)):
-            others = np.arange(len(tables)) != place
-            weights = _solved(grams[others].sum(axis=0), sides[others].sum(axis=0))
-            missed += float(((table @ weights - part) ** 2).sum())
+        tables = [np.hstack([terms(part), y]) for part, y in zip(given, wanted, strict=True)]
+        width = tables[0].shape[1] - wanted[0].shape[1]
+        products = np.array([table.T @ table for table in tables])
+        others = sums_of_others(products, np.arange(len(tables)))
+        missed = float(squared_errors(products, solve_products(others, width, RIDGE)).sum())
         if missed < least:
             least = missed
-            chosen = _weighted(terms, _solved(grams.sum(axis=0), sides.sum(axis=0)))
+            whole = solve_products(products.sum(axis=0, keepdims=True), width, RIDGE)[0]
+            chosen = _weighted(terms, whole)
     return chosen
-
-
-def _solved(gram: Array, sides: Array) -> Array:
-    ridge = RIDGE * gram.diagonal().max() * np.eye(len(gram))
-    return np.asarray(np.linalg.solve(gram + ridge, sides))
 
 
 def _weighted(terms: Map, weights: Array) -> Map:

@@ -26,7 +26,7 @@ from mckibben.errors import DataError, MckibbenError, ModelError, ModelWarning
 from mckibben.estimators.core.data import TrainingData, training_data
 from mckibben.estimators.core.leaving_out import stepped
 from mckibben.estimators.core.uncertainty import covariance_of, unknown, vanishing
-from mckibben.estimators.optimisers.tracker import Progress, Tracker
+from mckibben.numerics.tracker import Progress, Tracker
 from mckibben.recording import REST_LENGTH, Recording, conversion, is_frame, listed
 from mckibben.signals.checking import LARGEST_SEED
 from mckibben.system.progress import telling

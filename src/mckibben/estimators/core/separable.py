@@ -7,9 +7,8 @@ are the exact (non-negative) least-squares solution, so the search runs in a han
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -18,13 +17,13 @@ from annotated_types import Ge
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.derivatives import differences
 from mckibben.blocks.memoryless import Negative
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Start
-from mckibben.estimators.optimisers.linear import solve_linear
-from mckibben.estimators.optimisers.multi_start import Choice, multi_start
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.descent import Errors, differences
+from mckibben.numerics.least_squares import solve_bounded
+from mckibben.numerics.multi_start import Choice, multi_start
+from mckibben.numerics.tracker import Tracker
 
 SEARCH_SAMPLES = 1500
 """Largest number of samples used to compare starts."""
@@ -166,11 +165,25 @@ class SeparableEstimator(Estimator):
             most = self.most_evaluations(lower.size)
             tracker.budget = self.n_starts + self.n_refined * most
             starts = self.guesses(data) + self._scattered(lower, upper)
-            choices, refined = self.choices(data), self.n_refined
-            theta = self._least_from(starts, thin, ends, tracker, refined, most, choices)
+            theta = multi_start(
+                self._errors(thin),
+                starts,
+                ends,
+                tracker,
+                n_refined=self.n_refined,
+                max_evaluations=most,
+                choices=self.choices(data),
+            )
         own, whole = tracker.part(0.9, 1.0), data.thinned(POLISH_SAMPLES)
         start = np.clip(theta, lower, upper)
-        tracker.near = self._least_from([start], whole, ends, own, 1, self.polish_evaluations)
+        tracker.near = multi_start(
+            self._errors(whole),
+            [start],
+            ends,
+            own,
+            n_refined=1,
+            max_evaluations=self.polish_evaluations,
+        )
         tracker.update_from(own)
         return tracker.near
 
@@ -181,53 +194,14 @@ class SeparableEstimator(Estimator):
         points = qmc.Sobol(lower.size, seed=self.seed).random_base2(exponent)[: self.n_starts]
         return list(qmc.scale(points, lower, upper))
 
-    def _least_from(
-        self,
-        starts: Sequence[Array],
-        data: TrainingData,
-        ends: tuple[Array, Array],
-        tracker: Tracker,
-        n_refined: int,
-        most: int,
-        choices: Sequence[Choice] = (),
-    ) -> Array:
-        """Return the nonlinear parameters of least error.
-
-        Errors and derivatives are asked for at one place, where linear parameters are solved for once.
-        """
-
-        @lru_cache(maxsize=1)
-        def solved(place: bytes) -> tuple[Array, Array | None, Array]:
-            matrix = self.matrix(np.frombuffer(place).copy(), data)
-            if not np.isfinite(matrix).all():
-                return matrix, None, np.full(data.target.size, WORST)
-            linear, offset = self.solve(matrix, data)
-            return matrix, linear, matrix @ linear + offset - data.target
-
-        return multi_start(
-            lambda theta: solved(theta.tobytes())[2],
-            starts,
-            *ends,
-            tracker,
-            n_refined=n_refined,
-            max_evaluations=most,
-            jacobian=lambda theta: self.jacobian(theta, *solved(theta.tobytes())[:2], data),
-            choices=choices,
-        )
-
     def matrix(self, theta: Array, data: TrainingData) -> Array:
         """Return the regressors at the scored samples of all runs, shape (samples, k)."""
         return data.scored(lambda run: self.basis(theta, run, data))
 
     def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
         """Return the least-squares linear parameters and offset."""
-        return solve_linear(
-            matrix,
-            data.target,
-            nonnegative=self.solves_nonnegative,
-            least=self.least(matrix, data),
-            with_offset=self.solves_offset,
-        )
+        least = self.least(matrix, data) if self.solves_nonnegative else None
+        return solve_bounded(matrix, data.target, least, with_offset=self.solves_offset)
 
     @property
     def solves_offset(self) -> bool:
@@ -250,6 +224,19 @@ class SeparableEstimator(Estimator):
         span = data.output_range[1] - data.output_range[0]
         floor[0] = LEAST_REVERSIBLE * span / reach if reach > 0 else 0.0
         return floor
+
+    def _errors(self, data: TrainingData) -> Errors:
+        """Return the function to the errors by nonlinear parameters, linear ones solved for."""
+
+        def errors(theta: Array) -> tuple[Array, Callable[[], Array]]:
+            matrix = self.matrix(theta, data)
+            linear, left = None, np.full(data.target.size, WORST)
+            if np.isfinite(matrix).all():
+                linear, offset = self.solve(matrix, data)
+                left = np.asarray(matrix @ linear + offset - data.target)
+            return left, lambda: self.jacobian(theta, matrix, linear, data)
+
+        return errors
 
     def best_of(
         self, setting: str, values: Sequence[float], data: TrainingData, tracker: Tracker

@@ -20,7 +20,7 @@ from mckibben.arrays import Array, true_runs
 from mckibben.blocks.base import Block
 from mckibben.blocks.derivatives import relative_sizes
 from mckibben.blocks.free_runs import FreeRuns
-from mckibben.statistics import Autoregression, autoregression
+from mckibben.numerics.statistics import Autoregression, autoregression
 
 LARGEST = 1e150
 """Largest sensitivity; its square is finite."""

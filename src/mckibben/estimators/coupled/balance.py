@@ -53,8 +53,8 @@ from mckibben.estimators.coupled.balance_problem import coarser, compared, front
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
 from mckibben.estimators.coupled.base import CoupledEstimator
-from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.muscles.traits import TRAVELS
+from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording, listed
 
 PRESSURES = ("bar", "V", "")

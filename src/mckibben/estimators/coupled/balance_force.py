@@ -25,7 +25,7 @@ from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.coupled.balance import BalanceEstimator, fixed_in
 from mckibben.estimators.coupled.balance_prior import PriorLike, as_prior
 from mckibben.estimators.coupled.base import FEWEST_SAMPLES
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import InstanceOf
 
 from mckibben.arrays import Array, Mask
-from mckibben.blocks.derivatives import differences
 from mckibben.channels import LOADS
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
@@ -20,6 +19,7 @@ from mckibben.estimators.coupled.balance_structure import Bench, Structure
 from mckibben.muscles.prior import Prior, prior_of
 from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import TIMES, traits
+from mckibben.numerics.descent import differences
 
 STEP = 1e-5
 """Step of finite differences, relative to the scale of the parameter."""

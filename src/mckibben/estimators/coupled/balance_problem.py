@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance_law import coordinate_at
-from mckibben.blocks.derivatives import differences
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Contact, PiecewiseLinear
@@ -24,7 +23,8 @@ from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_structure import Structure
-from mckibben.estimators.coupled.constrained import constrained_least_squares
+from mckibben.numerics.descent import differences
+from mckibben.numerics.least_squares import solve_constrained, solve_products
 
 OF_AIR = ("filling", "venting", "dead", "contact")
 """Nonlinear parameters of the air, the last; derivatives by all others are exact."""
@@ -43,9 +43,6 @@ STRAIGHT = 0.01
 
 RIDGE = 1e-7
 """Ridge of least squares, relative to each coefficient's own effect."""
-
-LEAST_EFFECT = 0.01
-"""Effect of a coefficient, relative to that in others of a stack, that its ridge is of at least."""
 
 LEAST_AT_REST, PASSES = 0.1, 3
 """Smallest area at rest, relative to the mean over samples; number of reweightings of forces."""
@@ -318,7 +315,8 @@ class Problem:
 
         for _ in range(PASSES):
             flat = (table * weight[..., np.newaxis]).reshape(-1, table.shape[2])
-            put(bounded_least_squares((flat.T @ flat)[np.newaxis], bounded)[0])
+            products = (flat.T @ flat)[np.newaxis]
+            put(solve_products(products, bounded.size, RIDGE, bounded=bounded)[0, :, 0])
             if not of_force:
                 weight = 1.0 / (self.stiffness(structure, start) * structure.bench.travel)
         # the same within physics, in the unit in which the area is 1 on average
@@ -343,7 +341,7 @@ class Problem:
         sides, bounds = asked(sides, bounds)
         for _ in range(MOST_CUTS):
             asks = (sides != 0).any(axis=1)
-            put(constrained_least_squares(system, right, sides[asks], bounds[asks])[0])
+            put(solve_constrained(system, right, sides[asks], bounds[asks])[0])
             side, softest = structure.softest(structure.base + structure.mix @ start[:n])
             if softest >= 0.5 * structure.least_stiffness:
                 break
@@ -378,35 +376,6 @@ class Problem:
             found.append(own)
         whole = np.concatenate(found)
         return np.maximum(whole, 0.1 * np.median(np.abs(whole), axis=0))
-
-
-def bounded_least_squares(
-    grams: Array, bounded: Mask, near: Array | None = None, ridge: float = RIDGE
-) -> Array:
-    """Return bounded least squares from products of columns and, last, a target, of all in a stack.
-
-    Damped towards what is ``near``, or 0, by every number's own effect. With the bounded columns last,
-    the last rows of the Cholesky factor are what those are solved from.
-    """
-    from scipy.optimize import nnls
-
-    order, first = np.argsort(bounded, kind="stable"), int((~bounded).sum())
-    size = np.sqrt(np.diagonal(grams, axis1=1, axis2=2)[:, order])
-    size = np.maximum(size, LEAST_EFFECT * size.max(axis=0))
-    size[~(size > 0.0)] = 1.0
-    a = grams[:, order][:, :, order] / (size[:, :, np.newaxis] * size[:, np.newaxis])
-    b = grams[:, order, -1] / size
-    if near is not None:
-        b += ridge * size * near[order]
-    lower = np.linalg.cholesky(a + ridge * np.eye(order.size))
-    upper = lower.transpose(0, 2, 1)
-    found = np.linalg.solve(lower, b[:, :, np.newaxis])[:, :, 0]
-    for one, root in zip(found[:, first:], upper[:, first:, first:], strict=True):
-        one[:] = nnls(root, one, maxiter=100 * one.size)[0] if one.size else one
-    found[:, :first] -= (upper[:, :first, first:] @ found[:, first:, np.newaxis])[:, :, 0]
-    rest = found[:, :first, np.newaxis]
-    found[:, :first] = np.linalg.solve(upper[:, :first, :first], rest)[:, :, 0]
-    return (found / size)[:, np.argsort(order)]
 
 
 def compared(data: TrainingData, most: int, *, of_force: bool = False) -> Problem:

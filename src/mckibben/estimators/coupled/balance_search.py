@@ -11,19 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import compress, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
-from mckibben.errors import ModelError
 from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, PriorErrors
-from mckibben.estimators.coupled.balance_problem import MOST_CUTS, Problem, bounded_least_squares
+from mckibben.estimators.coupled.balance_problem import MOST_CUTS, Problem
 from mckibben.estimators.coupled.balance_structure import Indices, Structure, Term
-from mckibben.estimators.coupled.constrained import constrained_least_squares
-from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.statistics import autoregression
+from mckibben.numerics.blocks import blocks_of, squared_errors, sums_of_others
+from mckibben.numerics.descent import LIGHTEST, levenberg_marquardt
+from mckibben.numerics.least_squares import solve_constrained, solve_products
+from mckibben.numerics.statistics import autoregression, rms
+from mckibben.numerics.tracker import Tracker
 
 BLOCKS, FOLDS = 20, 5
 """Approximate number of blocks of all runs, and of cross-validation folds."""
@@ -34,12 +36,6 @@ DAMPED = 1e-2
 AHEAD = 4
 """Number of term groups that may be added before they, together, must reduce errors."""
 
-MOST_TRIES = 7
-"""Number of dampings tried per step, each ten times the last."""
-
-FIRST_DAMPING, LIGHTEST = 1e-3, 1e-7
-"""Damping of the first step, and the smallest."""
-
 UNKNOWN = 1e-10
 """Effect of a parameter, relative to the largest, that counts as none."""
 
@@ -48,9 +44,6 @@ FAR, LEAST_SEPARATION = 0.5, 0.7
 
 NO_GAIN = 1e-6
 """Gain of a term, relative to the squared errors, that is rounding."""
-
-SLOW, SLOWEST = 1e-3, 2
-"""Relative gain of a slow step, and number of slow steps that end a descent."""
 
 DEVIATIONS = (("areas",), ("elasticity", "bladder"), ("friction",), ("relaxation", "damping"))
 """Kinds in which muscles may differ together."""
@@ -104,7 +97,7 @@ class Search:
 
     def cost(self, z: Array) -> float:
         """Return the root mean square error."""
-        return _size(self.errors(z)[0])
+        return rms(self.errors(z)[0])
 
     @property
     def free(self) -> NDArray[np.intp]:
@@ -131,42 +124,17 @@ class Search:
 
     def descend(self, z: Array, steps: int, tracker: Tracker) -> Array:
         """Descend, report improvements to a tracker, and return the best unknowns."""
-        damping, slow = FIRST_DAMPING, 0
-        errors, slopes = self.errors(z, self.active)
-        cost = _size(errors)
-        tracker.update(z, cost)
-        for step in range(steps):
-            if not len(slopes):
-                errors, slopes = self.errors(z, self.active)
-            both = np.column_stack([slopes, errors])[:, np.append(self.free, z.size)]
-            both[~np.isfinite(both).all(axis=1)] = 0.0
-            both[:, -1] = both[:, :-1] @ z[self.free] - both[:, -1]
-            triangle: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
-            for turn in range(MOST_TRIES):
-                last = turn > 0 or step == steps - 1  # most others are accepted
-                try:
-                    tried = self._solved(triangle, z, damping)
-                    errors, slopes = self.errors(tried, None if last else self.active)
-                    found = _size(errors)
-                except ModelError:
-                    found = np.inf
-                if found < cost:
-                    break
-                damping = max(10.0 * damping, 1e-9)
-            else:
-                return z
-            slow = slow + 1 if found > (1.0 - SLOW) * cost else 0
-            z, cost = tried, found
-            tracker.update(z, cost)
-            if slow >= SLOWEST:
-                return z
-            damping = max(damping / 5.0, LIGHTEST**2)
-        return z
+
+        def errors(z: Array, sloped: bool) -> tuple[Array, Array]:
+            found, slopes = self.errors(z, self.active if sloped else None)
+            return found, slopes[:, self.free]
+
+        return levenberg_marquardt(errors, self._solved, z, steps, tracker.update)
 
     def _solved(self, triangle: Array, z: Array, damping: float) -> Array:
         """Return the least-squares solution of the linearised problem within physical bounds.
 
-        ``triangle`` is that of slopes and target. Damped towards what they are, by every number's own
+        ``triangle`` is that of slopes and errors. Damped towards what they are, by every number's own
         effect, so that units do not matter; where it has none it stays. Springs are made stiff where
         they were found soft.
         """
@@ -175,8 +143,8 @@ class Search:
         size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
         known = self._known(free, size)
         free, size, reduced = free[known], size[known], triangle[:, np.append(known, True)]
-        held = np.maximum(np.sqrt(damping), LIGHTEST) * size
-        reduced[:, -1] -= triangle[:, :-1][:, ~known] @ z[self.free[~known]]
+        held = np.sqrt(max(damping, LIGHTEST)) * size
+        reduced[:, -1] = reduced[:, :-1] @ z[free] - reduced[:, -1]
         system = np.vstack([reduced[:, :-1], np.diag(held)])
         right = np.append(reduced[:, -1], held * z[free])
         sides, least = self._conditions(z)
@@ -186,9 +154,7 @@ class Search:
             others[free] = False
             missing = least - sides[:, others] @ z[others]
             asks = (sides[:, free] != 0).any(axis=1)  # not only of what stays
-            tried[free] = constrained_least_squares(
-                system, right, sides[asks][:, free], missing[asks]
-            )[0]
+            tried[free] = solve_constrained(system, right, sides[asks][:, free], missing[asks])[0]
             linear = structure.base + structure.mix @ tried[:n]
             side, softest = structure.softest(linear)
             if softest >= 0.5 * structure.least_stiffness:
@@ -235,8 +201,7 @@ class Search:
         new = np.array([term.kind in NEW_SHAPE for term in structure.terms]) & ~self.active
         wanted = (np.any(groups, axis=0) & new) | self.active
         (grams, folds), likely = self._grams(z, wanted, new), self._likely(z, wanted)
-        apart = [folds != fold for fold in range(FOLDS)]
-        others = np.array([grams[out if out.any() else ~out].sum(axis=0) for out in apart]) + likely
+        others = sums_of_others(grams, folds) + likely
         bounded = self._bounded(z.size)
         known: dict[bytes, Array] = {}
 
@@ -244,10 +209,9 @@ class Search:
             """Return the squared errors of every block under the least squares of other folds."""
             if (key := active.tobytes()) not in known:
                 free = np.append(active, np.ones(z.size - n, dtype=bool))
-                theta = np.tile(np.append(z, -1.0), (len(others), 1))
+                theta = np.tile(z, (len(others), 1))
                 theta[:, np.flatnonzero(free)] = _solved(others, free, bounded, z)
-                theta = theta[folds, :, np.newaxis]
-                known[key] = (theta * (grams @ theta)).sum(axis=(1, 2))
+                known[key] = squared_errors(grams, theta[folds, :, np.newaxis])[:, 0]
             return known[key]
 
         active = self.active
@@ -288,7 +252,9 @@ class Search:
     def _by_block(self, z: Array) -> Array:
         """Return the squared errors per block of time."""
         parts = self.problem.errors(self.structure, z)[0]
-        return np.array([float(block @ block) for part in _blocks(parts) for block in part])
+        return np.array(
+            [float(block @ block) for part in blocks_of(parts, BLOCKS) for block in part]
+        )
 
     def _grams(self, z: Array, wanted: Mask, new: Mask | None = None) -> tuple[Array, Indices]:
         """Return the products of derivatives and target, per block of time, and the folds of blocks.
@@ -302,7 +268,7 @@ class Search:
         size = np.sqrt((table[:, :-1] ** 2).sum(axis=0))
         table[:, :-1] *= self._known(np.arange(z.size), size)
         ends = np.cumsum([part.size for part in parts])[:-1]
-        runs = _blocks(np.split(table, ends))
+        runs = blocks_of(np.split(table, ends), BLOCKS)
         folds = [
             (np.arange(len(run)) * FOLDS // len(run) + place) % FOLDS
             for place, run in enumerate(runs)
@@ -397,12 +363,6 @@ class Search:
         return [Term(kind, which, muscle) for which in whiches for muscle in muscles]
 
 
-def _blocks(parts: list[Array]) -> list[list[Array]]:
-    """Return the time blocks of every run."""
-    total = sum(len(part) for part in parts)
-    return [np.array_split(part, max(1, round(BLOCKS * len(part) / total))) for part in parts]
-
-
 def _solved(grams: Array, free: Mask, bounded: Mask, z: Array) -> Array:
     """Return the least squares of free unknowns, others as they are, of every matrix in a stack.
 
@@ -412,10 +372,5 @@ def _solved(grams: Array, free: Mask, bounded: Mask, z: Array) -> Array:
     keep = np.append(moving, z.size)
     parts = grams[:, keep][:, :, keep]
     parts[:, :-1, -1] -= grams[:, moving] @ np.append(np.where(free, 0.0, z), 0.0)
-    return bounded_least_squares(parts, bounded[free], z[free], DAMPED)
-
-
-def _size(errors: Array) -> float:
-    """Return the root mean square, infinite if that of an error is not finite."""
-    size = float(np.sqrt(np.mean(errors**2)))
-    return size if np.isfinite(size) else np.inf
+    solve = partial(solve_products, bounded=bounded[free], near=z[free])
+    return solve(parts, moving.size, DAMPED)[:, :, 0]

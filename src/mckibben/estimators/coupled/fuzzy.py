@@ -10,6 +10,7 @@ effect, and the inertia is not printed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,9 +19,10 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.fields import Channels, rows, vector
-from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
-from mckibben.estimators.optimisers.multi_start import trust_region
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.descent import trust_region
+from mckibben.numerics.statistics import rms
+from mckibben.numerics.swarm import Swarm, particle_swarm
+from mckibben.numerics.tracker import Tracker
 
 LIGHTEST = 1e-11
 """Smallest ridge of a consequent, relative to its regressor."""
@@ -150,7 +152,7 @@ class Problem:
 
     def cost(self, sets: Sets) -> float:
         """Return the root mean square over all outputs, ordered as the paper's Eq. (26)."""
-        return float(np.sqrt(np.mean(self.errors(sets) ** 2)))
+        return rms(self.errors(sets))
 
 
 @dataclass(frozen=True)
@@ -227,31 +229,24 @@ def project(problem: Problem, n_sets: int, low: Array, high: Array, tracker: Tra
 
     staying = STAYING * float(np.linalg.norm(problem.errors(start))) / unit
 
-    def errors(theta: Array) -> Array:
-        left = problem.errors(start.replaced(theta)).ravel()
-        return np.append(left, staying * (theta - start.vector))
-
-    def slopes(theta: Array) -> Array:
+    def errors(theta: Array) -> tuple[Array, Callable[[], Array]]:
         sets = start.replaced(theta)
-        by_theta, left = sensitivities(problem, sets)
-        tracker.update(theta, float(np.sqrt(np.mean(left**2))))
-        return np.vstack([by_theta, np.diag(staying)])
+        every = np.append(problem.errors(sets), staying * (theta - start.vector))
+        return every, lambda: np.vstack([sensitivities(problem, sets), np.diag(staying)])
 
     tracker.budget = MOST_STEPS + 1
-    trust_region(
-        errors,
-        slopes,
+    path = trust_region(
+        tracker.watched(errors),
         start.vector,
-        scale=unit,
         bounds=(lower, upper),
         least_gain=LEAST_GAIN,
         max_evaluations=MOST_STEPS + 1,
     )
-    return start if tracker.best is None else start.replaced(tracker.best)
+    return start.replaced(path[-1][0])
 
 
-def sensitivities(problem: Problem, sets: Sets) -> tuple[Array, Array]:
-    """Return the projected derivatives by centres and widths, and the errors."""
+def sensitivities(problem: Problem, sets: Sets) -> Array:
+    """Return the projected derivatives of the errors by centres and widths."""
     x, y, solver = problem.x, problem.y, problem.solver
     n, n_in = x.shape
     n_sets, n_out = sets.centres.shape[1], y.shape[1]
@@ -273,7 +268,7 @@ def sensitivities(problem: Problem, sets: Sets) -> tuple[Array, Array]:
             derivative[:, :, place, i] = np.moveaxis(change * slope[:, :, np.newaxis], 2, 1)
     flat = derivative.reshape(n, -1)
     projected = flat - columns @ solver.fit(x, columns, flat)  # less what consequents can take up
-    return projected.reshape(n * n_out, -1), (f - y).ravel()
+    return np.asarray(projected.reshape(n * n_out, -1))
 
 
 def swarmed(problem: Problem, n_sets: int, swarm: Swarm, seed: int, tracker: Tracker) -> Sets:

@@ -31,8 +31,9 @@ from mckibben.errors import DataError, MckibbenError, ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors
-from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.statistics import rms
+from mckibben.numerics.swarm import Swarm, particle_swarm
+from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording, check_sample_times
 
 UNLOADED = 0.05
@@ -246,9 +247,7 @@ class RecurrentProblem:
     def cost(self, outputs: Sequence[Array]) -> float:
         """Return the free-running RMSE; infinite for diverging runs."""
         with np.errstate(over="ignore", invalid="ignore"):
-            errors = np.concatenate(outputs) - self.data.stacked("y")
-            value = float(np.sqrt(np.mean(errors**2)))
-        return value if np.isfinite(value) else np.inf
+            return rms(np.concatenate(outputs) - self.data.stacked("y"))
 
     def best(self, sets: Sets, feedbacks: Array) -> RecurrentFuzzyNetwork:
         """Return the network of lowest free-running error, trained on its own past outputs.

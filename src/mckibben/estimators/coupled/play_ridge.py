@@ -1,18 +1,16 @@
 """Ridge regression on play operators, lags and products of all inputs.
 
 Linear in the readout: least squares on what a block with a unit readout gives, with a penalty that is
-chosen for every output by leaving out blocks of time. A fit to all but one block is a fit to the sum of
-the others' normal equations, so no block is simulated twice. Samples that follow one another are alike,
-which generalized cross-validation, of one sample left out at a time, takes for evidence; where whole
-blocks are left out they are none.
+chosen for every output by leaving out blocks of time, since generalized cross-validation, of one sample
+left out at a time, takes for evidence that samples which follow one another are alike.
 
-Source: Hoerl and Kennard, "Ridge regression", Technometrics, 1970; Burman, Chow and Nolan, "A
-cross-validatory method for dependent data", Biometrika, 1994.
+Source: Hoerl and Kennard, "Ridge regression", Technometrics, 1970.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from itertools import combinations_with_replacement
 from typing import Annotated
 
@@ -26,7 +24,9 @@ from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.blocks.free_runs import FreeRuns
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.blocks import squared_errors, sums_of_others
+from mckibben.numerics.least_squares import solve_products
+from mckibben.numerics.tracker import Tracker
 
 PENALTIES = np.geomspace(1e-8, 10.0, 28)
 """Candidate penalties, relative to the size of the regressors."""
@@ -154,13 +154,11 @@ def readout_of(sums: Array, width: int, penalties: Sequence[float]) -> Array:
     penalties : sequence of m float
         Relative to the diagonal of ``sums``.
     """
-    size = np.sqrt(np.maximum(np.diag(sums), 1e-300))
-    scaled = sums / np.outer(size, size)
     readout = [
-        np.linalg.solve(scaled[:width, :width] + np.diag(_damping(width, one)), scaled[:width, k])
-        for k, one in enumerate(penalties, start=width)
+        solve_products(sums[np.newaxis], width, _damping(width, one))[0, :, k]
+        for k, one in enumerate(penalties)
     ]
-    return np.array(readout) * size[width:, np.newaxis] / size[:width]
+    return np.array(readout)
 
 
 def _damping(width: int, penalty: float) -> Array:
@@ -179,19 +177,12 @@ def chosen(blocks: Array, width: int) -> tuple[float, ...]:
         Sums as of `readout_of`, of every block, which are left out in turn.
     width : int
     """
-    size = np.sqrt(np.maximum(np.diag(blocks.sum(axis=0)), 1e-300))
-    blocks = blocks / np.outer(size, size)
-    total = blocks.sum(axis=0)
-    m = total.shape[0] - width
-
-    def missed(block: Array, penalty: float) -> Array:
-        """Return the squared error of every output on a held-out block, relative to its own."""
-        rest = total - block
-        gram = rest[:width, :width] + np.diag(_damping(width, penalty))
-        w = np.vstack([np.linalg.solve(gram, rest[:width, width:]), -np.eye(m)])
-        return np.asarray(np.einsum("ij,ik,kj->j", w, block, w))
-
-    errors = np.array([[missed(block, one) for one in PENALTIES] for block in blocks])
+    others, m = sums_of_others(blocks, np.arange(len(blocks))), blocks.shape[1] - width
+    solve = partial(solve_products, others, width, effects=np.diag(blocks.sum(axis=0))[:width])
+    # squared errors of every output on blocks left out, by penalty
+    errors = np.stack(
+        [squared_errors(blocks, solve(ridge=_damping(width, one))) for one in PENALTIES], axis=1
+    )
     least = errors.sum(axis=0).argmin(axis=0)
     more = errors - errors[:, least, range(m)][:, np.newaxis]
     spread = more.std(axis=0, ddof=1) * np.sqrt(len(blocks))

@@ -37,9 +37,9 @@ from mckibben.estimators.coupled.fuzzy import (
     printed_swarm,
 )
 from mckibben.estimators.hysteresis.pi import play_operators
-from mckibben.estimators.optimisers.linear import solve_linear
-from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.metrics import rmse
+from mckibben.numerics.least_squares import solve_bounded
+from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording
 
 BEYOND = 0.1
@@ -218,7 +218,7 @@ class SDCHMEstimator(CoupledEstimator):
         # weights are differences of partial sums, which must stay positive for an inverse
         steps = np.column_stack([-np.diff(plays, axis=1), plays[:, -1]])
         least = np.full(radii.size, LEAST_SLOPE)
-        sums, offset = solve_linear(steps, np.concatenate(wanted), nonnegative=True, least=least)
+        sums, offset = solve_bounded(steps, np.concatenate(wanted), least)
         weights = np.diff(sums, prepend=0.0)
         margin = BEYOND * span
         return PI(

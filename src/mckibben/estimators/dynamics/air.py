@@ -16,9 +16,10 @@ from mckibben.blocks.fields import LONGEST_DELAY
 from mckibben.channels import Channels
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.separable import SEARCH_SAMPLES, SeparableEstimator
-from mckibben.estimators.optimisers.multi_start import multi_start
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.estimators.core.separable import DIFFERENCE, SEARCH_SAMPLES, SeparableEstimator
+from mckibben.numerics.descent import by_differences
+from mckibben.numerics.multi_start import multi_start
+from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording
 
 NO_COMMANDS = ("contraction", "displacement", "force", "length")
@@ -187,7 +188,8 @@ class AirEstimator(SeparableEstimator):
             return data.simulated([block_at(point)])[0] - data.target
 
         part = tracker.part(0.9, 1.0)
-        best = multi_start(residuals, [start], lower, upper, part, n_refined=1, max_evaluations=40)
+        errors = by_differences(residuals, DIFFERENCE * (upper - lower))
+        best = multi_start(errors, [start], (lower, upper), part, n_refined=1, max_evaluations=40)
         tracker.update_from(part)
         without = best.copy()
         without[2] = 0.0

@@ -29,7 +29,7 @@ from mckibben.estimators.dynamics.prediction_error import (
     starting_points,
     with_noise,
 )
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording, listed
 
 Order = Annotated[int, Interval(ge=0, le=20)]

@@ -15,7 +15,7 @@ system identification", 1989 (error reduction ratio).
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import combinations_with_replacement, islice, pairwise
@@ -40,8 +40,9 @@ from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, SearchEstimator
 from mckibben.estimators.hysteresis.pi import play_operators
-from mckibben.estimators.optimisers.multi_start import trust_region
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.descent import trust_region
+from mckibben.numerics.statistics import rms
+from mckibben.numerics.tracker import Tracker
 
 BOUND = 1.0
 """Largest distance of a stable model's output from the data's range, relative to the range."""
@@ -138,7 +139,7 @@ class NarxEstimator(SearchEstimator):
         found = self._polynomials if self.mapping == "polynomial" else self._networks
         error = cache(partial(free_run_rmse, data=data))
         paths: list[list[Narx]] = []
-        for model in found(self._fields(data), data, tracker):
+        for model in found(self._fields(data), data):
             if data.target.size <= model.n_parameters:
                 raise DataError(
                     f"{data.target.size} samples are too few for {model.n_parameters} parameters",
@@ -185,11 +186,8 @@ class NarxEstimator(SearchEstimator):
             **self.channels(data),
         }
 
-    def _polynomials(
-        self, fields: Mapping[str, Any], data: TrainingData, tracker: Tracker
-    ) -> list[Narx]:
+    def _polynomials(self, fields: Mapping[str, Any], data: TrainingData) -> list[Narx]:
         """Return polynomials of the most significant terms: the maximum number, half, and a quarter."""
-        del tracker
         x, y = one_step_pairs(fields, data, SELECTION_SAMPLES)
         terms = tuple(
             term
@@ -210,19 +208,16 @@ class NarxEstimator(SearchEstimator):
             models.append(NarxPolynomial(terms=chosen, weights=vector(weights), **fields))
         return models
 
-    def _networks(
-        self, fields: Mapping[str, Any], data: TrainingData, tracker: Tracker
-    ) -> list[Narx]:
+    def _networks(self, fields: Mapping[str, Any], data: TrainingData) -> list[Narx]:
         """Return networks fitted to one-step errors by variable projection, one per start."""
         x, y = one_step_pairs(fields, data, LAYER_SAMPLES)
-        layers = HiddenLayers(x, y, fields, self.n_units, tracker)
+        layers = HiddenLayers(x, y, fields, self.n_units)
         rng = np.random.default_rng(self.seed)
         models: list[Narx] = []
         for _ in range(self.n_starts):
             first = rng.normal(0.0, 1.0, self.n_units * (x.shape[1] + 1))
             *_, (layer, _) = trust_region(
                 layers.errors,
-                layers.slopes,
                 first,
                 scale=np.ones(first.size),
                 least_gain=LEAST_GAIN,
@@ -243,10 +238,9 @@ class NarxEstimator(SearchEstimator):
         # the samples before a stretch may be measured nowhere, or seldom
         if sum(int(piece.run.counts.sum()) for piece in pieces) < start.size:
             return []
-        found = StretchErrors(model, pieces, tracker)
+        found = StretchErrors(model, pieces)
         path = trust_region(
-            found.errors,
-            found.slopes,
+            tracker.watched(found.errors, model.output_scale[1]),
             start,
             scale=relative_sizes(start),
             least_gain=LEAST_GAIN,
@@ -350,7 +344,6 @@ class HiddenLayers:
 
     fields: Mapping[str, Any]
     units: int
-    tracker: Tracker
 
     def solved(self, layer: Array) -> tuple[NarxNetwork, Array]:
         """Return the best network for hidden weights, shape (units * (k + 1),), and its errors.
@@ -369,16 +362,16 @@ class HiddenLayers:
         )
         return network, columns @ weights - target
 
-    def errors(self, layer: Array) -> Array:
-        """Return the errors."""
-        self.tracker.evaluations += 1
-        return self.solved(layer)[1]
+    def errors(self, layer: Array) -> tuple[Array, Callable[[], Array]]:
+        """Return the errors, and a function to their derivatives."""
+        network, left = self.solved(layer)
+        return left, lambda: self.slopes(layer, network)
 
-    def slopes(self, layer: Array) -> Array:
+    def slopes(self, layer: Array, network: NarxNetwork) -> Array:
         """Return the projected derivatives of the errors (Kaufman)."""
         n, k = self.x.shape
         columns = self._columns(layer.reshape(self.units, -1))
-        by_all, _ = self.solved(layer)[0].slopes(self.x)
+        by_all, _ = network.slopes(self.x)
         moved = np.zeros((len(columns), layer.size))
         moved[:n] = by_all[:, 1 + k :].reshape(n, self.units, -1)[:, :, :-1].reshape(n, -1)
         taken = np.linalg.qr(columns)[0]
@@ -440,8 +433,8 @@ def feed_back(slopes: Array, by_past: Array) -> None:
 class StretchErrors:
     """Errors over segments of data, running free in each, for models of one structure."""
 
-    def __init__(self, model: Narx, stretches: Sequence[Stretch], tracker: Tracker) -> None:
-        self.model, self.stretches, self.tracker = model, stretches, tracker
+    def __init__(self, model: Narx, stretches: Sequence[Stretch]) -> None:
+        self.model, self.stretches = model, stretches
         self.counts = np.concatenate([each.run.counts for each in stretches])
         self.target = np.concatenate([each.run.y for each in stretches])[self.counts]
         self._driven = np.concatenate([each.regressors for each in stretches])
@@ -467,18 +460,20 @@ class StretchErrors:
             )
         return outputs[:, 0]
 
-    def errors(self, theta: Array) -> Array:
-        """Return the errors at scored samples, relative to half the output's range."""
-        half = self.model.output_scale[1]
-        errors = (self.outputs(self.model.unpack(theta))[self.counts] - self.target) / half
-        errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
-        self.tracker.update(theta, half * float(np.sqrt(np.mean(errors**2))))
-        return errors
+    def errors(self, theta: Array) -> tuple[Array, Callable[[], Array]]:
+        """Return the errors at scored samples, relative to half the output's range.
 
-    def slopes(self, theta: Array) -> Array:
-        """Return the derivatives of the errors, shape (errors, parameters)."""
+        And a function to their derivatives.
+        """
         model = self.model.unpack(theta)
-        y = scaled(self.outputs(model), model.output_scale)
+        outputs = self.outputs(model)
+        errors = (outputs[self.counts] - self.target) / model.output_scale[1]
+        errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
+        return errors, lambda: self.slopes(model, outputs)
+
+    def slopes(self, model: Narx, outputs: Array) -> Array:
+        """Return the derivatives of the errors, shape (errors, parameters)."""
+        y = scaled(outputs, model.output_scale)
         behind = self._behind.copy()
         behind[self._own] = y
         with np.errstate(over="ignore", invalid="ignore"):
@@ -496,10 +491,9 @@ class StretchErrors:
 
 def free_run_rmse(model: Narx, data: TrainingData) -> float:
     """Return the RMSE of free runs from measured starts; infinite on overflow."""
-    whole = StretchErrors(model, stretches(model, data, None), Tracker())
+    whole = StretchErrors(model, stretches(model, data, None))
     with np.errstate(over="ignore", invalid="ignore"):
-        value = float(np.sqrt(np.mean((whole.outputs(model)[whole.counts] - whole.target) ** 2)))
-    return value if np.isfinite(value) else np.inf
+        return rms(whole.outputs(model)[whole.counts] - whole.target)
 
 
 def stable(model: Narx, data: TrainingData) -> bool:

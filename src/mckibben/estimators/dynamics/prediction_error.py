@@ -15,7 +15,7 @@ Source: Ljung, "System Identification", 1999, chapters 4 and 7.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations_with_replacement
@@ -25,8 +25,10 @@ import numpy as np
 
 from mckibben.arrays import Array, Mask
 from mckibben.estimators.core.data import Run
-from mckibben.estimators.optimisers.multi_start import follow_best, trust_region
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.descent import trust_region
+from mckibben.numerics.multi_start import follow_best
+from mckibben.numerics.statistics import rms
+from mckibben.numerics.tracker import Tracker
 
 STABLE = 1.0 - 1e-7
 """Largest magnitude of a pole."""
@@ -285,7 +287,7 @@ def evaluate(
         found.append(e)
         slopes.append(own)
     e = np.concatenate(found)
-    return e, np.concatenate(slopes), float(np.sqrt(np.mean(e**2)))
+    return e, np.concatenate(slopes), rms(e)
 
 
 def from_rest(theta: Array, orders: Orders, run: Run, start: Beginning) -> tuple[Array, Array]:
@@ -343,41 +345,27 @@ def minimise(
     """Return the best parameters found from all starts."""
     tracker.budget = len(starts) * FIRST_STEPS + FOLLOWED * STEPS
 
-    here = At(orders, runs, start, tracker)
-    search = partial(trust_region, scale="jac", least_gain=LEAST_GAIN)
+    n_errors = sum(int(run.counts.sum()) for run in runs)
+
+    def sloped(theta: Array) -> tuple[Array, Callable[[], Array]]:
+        e, slopes = np.full(n_errors, np.inf), np.empty((n_errors, 0))
+        if admissible(theta, orders):
+            e, slopes, _ = evaluate(theta, orders, runs, start)
+        return e, lambda: slopes
+
+    search = partial(trust_region, tracker.watched(sloped), least_gain=LEAST_GAIN)
 
     def first_steps(theta: Array) -> tuple[Array, float]:
-        found, squares = search(here.errors, here.slopes, theta, max_evaluations=FIRST_STEPS)[-1]
+        found, squares = search(theta, max_evaluations=FIRST_STEPS)[-1]
         return found, float(np.sqrt(squares))
 
     def followed(theta: Array) -> None:
-        search(here.errors, here.slopes, theta, max_evaluations=STEPS)
+        search(theta, max_evaluations=STEPS)
 
     starting = (theta for theta in starts if admissible(theta, orders))
     follow_best(starting, first_steps, followed, FOLLOWED, SAME)
     assert tracker.best is not None
     return tracker.best
-
-
-class At:
-    """Errors at parameters, with derivatives computed together."""
-
-    def __init__(
-        self, orders: Orders, runs: Sequence[Run], start: Beginning, tracker: Tracker
-    ) -> None:
-        self.orders, self.runs, self.start, self.tracker = orders, runs, start, tracker
-
-    def errors(self, theta: Array) -> Array:
-        """Return the errors."""
-        if not admissible(theta, self.orders):
-            return np.full(sum(int(run.counts.sum()) for run in self.runs), np.inf)
-        e, self._slopes, cost = evaluate(theta, self.orders, self.runs, self.start)
-        self.tracker.update(theta, cost)
-        return e
-
-    def slopes(self, theta: Array) -> Array:
-        """Return the derivatives of the last evaluation of errors."""
-        return self._slopes
 
 
 def arx(runs: Sequence[Run], orders: Orders) -> Array:

@@ -7,6 +7,7 @@ left to the descent, whose derivatives are exact.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -24,8 +25,8 @@ from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.dynamics.process_model import ProcessModelEstimator
-from mckibben.estimators.optimisers.multi_start import trust_region
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.descent import trust_region
+from mckibben.numerics.tracker import Tracker
 from mckibben.signals.periodic import band_limited
 
 ANGLE = 1 / 3
@@ -190,11 +191,10 @@ class StateNetworkEstimator(SearchEstimator):
         turned = step / linear.time_constants[0]
         fewest = int(np.clip(np.ceil(turned / ANGLE), 1, MOST_SUBSTEPS))
         template = self.start(linear, merged, self.substeps or fewest)
-        search = NetworkErrors(template, merged, warm, tracker)
+        search = NetworkErrors(template, merged, warm)
         tracker.budget = self.n_steps
         (_, squares), *_ = trust_region(
-            search.errors,
-            search.slopes,
+            tracker.watched(search.errors),
             template.pack(),
             scale=np.ones(template.n_parameters),
             least_gain=LEAST_GAIN,
@@ -246,26 +246,16 @@ class NetworkErrors:
     begin as after their first input has long been held, unless the template's start is virgin.
     """
 
-    def __init__(
-        self, template: StateNetwork, data: TrainingData, warm: int | None, tracker: Tracker
-    ) -> None:
-        self.template, self.target, self.tracker = template, data.target, tracker
+    def __init__(self, template: StateNetwork, data: TrainingData, warm: int | None) -> None:
+        self.template, self.target = template, data.target
         self.at_rest = warm is None and template.initial == "first_sample"
         self.rate = template.rate * data.timed()
         self.paths = paths(data, template.substeps, warm, self.at_rest)
 
-    def errors(self, theta: Array) -> Array:
-        """Return the errors at scored samples; infinite for diverging runs."""
+    def errors(self, theta: Array) -> tuple[Array, Callable[[], Array]]:
+        """Return the errors at scored samples, infinite for diverging runs, and a function to slopes."""
         found = self._followed(theta)
-        self._slopes = found[:, 1:]
-        errors = found[:, 0] - self.target
-        self.tracker.update(theta, float(np.sqrt(np.mean(errors**2))))
-        return np.asarray(errors)
-
-    def slopes(self, theta: Array) -> Array:
-        """Return the derivatives of the last evaluation of errors."""
-        del theta
-        return self._slopes
+        return np.asarray(found[:, 0] - self.target), lambda: found[:, 1:]
 
     def _followed(self, theta: Array) -> Array:
         """Return the outputs at scored samples, and derivatives by the p weights, (n, 1 + p)."""

@@ -7,7 +7,7 @@ the paper has a particle swarm.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Annotated
 
@@ -21,12 +21,16 @@ from mckibben.blocks.force.activation import ActivationMemory, ActivationPressur
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators, SearchEstimator
-from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.estimators.core.separable import DIFFERENCE, SeparableEstimator
+from mckibben.numerics.descent import Errors, by_differences, trust_region
+from mckibben.numerics.tracker import Tracker
 from mckibben.signals.reversals import reversals
 
 SMOOTHED = 3.0
 """Default length of the rate filter [samples]."""
+
+LEAST_GAIN, MOST_EVALUATIONS = 1e-8, 100
+"""Smallest relative reduction of the squared error for another step; most evaluations of a search."""
 
 # -- with memory -----------------------------------------------------------------------------
 
@@ -216,16 +220,22 @@ class ActivationPressureEstimator(SearchEstimator):
         width = np.maximum(np.abs(start), np.abs(start).max(initial=1e-6))
         lower, upper = np.append(start - 2 * width, -1.0), np.append(start + 2 * width, 1.0)
 
-        def errors(point: Array) -> Array:
-            return (powers @ point[:4]) * (1 + point[4] * rise) * rate - rest
+        def errors(point: Array) -> tuple[Array, Callable[[], Array]]:
+            shape, grown = powers @ point[:4], (1 + point[4] * rise) * rate
+            slopes = [powers * grown[:, np.newaxis], shape * rise * rate]
+            return shape * grown - rest, lambda: np.column_stack(slopes)
 
-        from scipy.optimize import least_squares
-
-        found = least_squares(errors, np.append(start, 0.0), bounds=(lower, upper)).x
-        tracker.update(found, float(np.sqrt(np.mean(errors(found) ** 2))))
+        found = _searched(tracker.watched(errors), np.append(start, 0.0), (lower, upper))
         phi = found[:4] / largest ** np.array([3, 2, 1, 0])
         slope = float(found[4]) / max(middle, 1e-9)
         return phi, (slope, 1.0 - slope * middle)
+
+
+def _searched(errors: Errors, start: Array, bounds: tuple[Array, Array]) -> Array:
+    path = trust_region(
+        errors, start, bounds=bounds, least_gain=LEAST_GAIN, max_evaluations=MOST_EVALUATIONS
+    )
+    return path[-1][0]
 
 
 def frequencies(runs: Sequence[Run]) -> Array:
@@ -343,8 +353,6 @@ def boundaries(runs: Sequence[Run], extremes: Array, levels: tuple[float, float]
     The errors of a run are relative to its own range of pressure, so that loops and slow cycles count
     alike.
     """
-    from scipy.optimize import least_squares
-
     (e_1, y_1), (e_2, y_2) = extremes
     every = [(run.u[run.counts], run.y[run.counts]) for run in runs]
     e, p = (np.concatenate(parts) for parts in zip(*every, strict=True))
@@ -361,7 +369,8 @@ def boundaries(runs: Sequence[Run], extremes: Array, levels: tuple[float, float]
     rise = max(y_2 - y_1, 1e-9)
     straight = np.array([y_1 - levels[0], levels[1] - y_2]) / rise
     start = np.clip(straight, 2 * MARGIN, 0.5 * FARTHEST)
-    away = least_squares(errors, start, bounds=(MARGIN, FARTHEST)).x
+    bounds = np.full(2, MARGIN), np.full(2, FARTHEST)
+    away = _searched(by_differences(errors, DIFFERENCE * (bounds[1] - bounds[0])), start, bounds)
     return e_1 + (e_2 - e_1) * np.array([-away[0], 1.0 + away[1]])
 
 

@@ -22,7 +22,7 @@ from mckibben.blocks.force.multistate_friction import (
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.force.laws import ORDERS, Law, force_columns, force_law
-from mckibben.estimators.optimisers.multi_start import Choice
+from mckibben.numerics.multi_start import Choice
 from mckibben.recording import Recording, listed
 
 Structure = Literal["eleven", "each-way", "eighteen"]

@@ -24,7 +24,7 @@ from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap, centred
 from mckibben.estimators.hysteresis.pi import spread
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.tracker import Tracker
 
 LEAST_SLOPE = 1e-4
 """Smallest share of the output's range for each piece of the polynomial."""

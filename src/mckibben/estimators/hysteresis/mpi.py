@@ -17,8 +17,8 @@ from mckibben.estimators.core.estimator import InverseKind, Operators, Purpose
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import MAPS, PolynomialMap
 from mckibben.estimators.hysteresis.pi import play_operators, spread
-from mckibben.estimators.optimisers.linear import solve_linear
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.least_squares import solve_bounded
+from mckibben.numerics.tracker import Tracker
 
 LEAST_PIECE = 1e-6
 """Smallest share of the output's range for a piece of an increasing map."""
@@ -182,7 +182,7 @@ class MPIEstimator(SeparableEstimator):
             share = (2 * even / (high - low)) ** power
             radii = even if power == 1 else 0.5 * (high - low) * share
             matrix = self._plays(radii, data)
-            weights, _ = solve_linear(matrix, data.target, nonnegative=True)
+            weights, _ = solve_bounded(matrix, data.target, np.zeros(matrix.shape[1]))
             top = weights.max() if weights.max() > 0 else 1.0
             fading = np.exp(-3 * radii / (high - low))
             reversible = np.where(radii == 0, 1.0, 0.1)

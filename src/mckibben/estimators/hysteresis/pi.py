@@ -19,7 +19,7 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, Operators
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.tracker import Tracker
 
 
 def spread(n: int, ends: tuple[float, float]) -> Array:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.numerics.descent import Errors
+from mckibben.numerics.statistics import rms
 
 Progress = Callable[[float, float], None]
 """Called with the share of the work done, 0 to 1, and the best RMSE so far."""
@@ -50,6 +52,16 @@ class Tracker:
     def update_from(self, part: Tracker) -> None:
         """Register a finished part, without its best point."""
         self.evaluations += part.evaluations
+
+    def watched(self, errors: Errors, unit: float = 1.0) -> Errors:
+        """Return the same function, which registers every evaluation, its errors in a unit."""
+
+        def found(point: Array) -> tuple[Array, Callable[[], Array]]:
+            given = errors(point)
+            self.update(point, unit * rms(given[0]))
+            return given
+
+        return found
 
     def update(self, point: Array, cost: float) -> None:
         """Register one evaluation."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.numerics.tracker import Tracker
 
 WORST = float(np.finfo(np.float64).max)
 """Cost of points whose cost is not finite."""

@@ -1,7 +1,41 @@
+"""Blocks left out against refits, and drawn again against the same written out."""
+
 import numpy as np
 from scipy.stats import t as student
 
-from mckibben.statistics import BlockBootstrap, differences, interval
+from mckibben.numerics.blocks import (
+    BlockBootstrap,
+    blocks_of,
+    differences,
+    interval,
+    squared_errors,
+    sums_of_others,
+)
+from mckibben.numerics.least_squares import solve_products
+
+
+def test_blocks_are_of_about_the_same_length_in_long_and_short_pieces() -> None:
+    pieces = [np.linspace(0.0, 1.0, n) for n in (300, 100, 3)]
+    blocks = blocks_of(pieces, 20)
+    assert [len(each) for each in blocks] == [15, 5, 1]
+    for piece, each in zip(pieces, blocks, strict=True):
+        np.testing.assert_array_equal(np.concatenate(each), piece)
+
+
+def test_errors_of_blocks_left_out_are_those_of_refits() -> None:
+    rng = np.random.default_rng(3)
+    x, y = rng.standard_normal((90, 4)), rng.standard_normal((90, 2))
+    table = np.hstack([x, y])
+    blocks = np.split(np.arange(90), 9)
+    folds = np.arange(9) % 4
+    products = np.array([table[rows].T @ table[rows] for rows in blocks])
+    weights = solve_products(sums_of_others(products, folds), 4, 1e-14)
+    found = squared_errors(products, weights[folds])
+    for fold, rows, errors in zip(folds, blocks, found, strict=True):
+        others = np.concatenate([b for b, f in zip(blocks, folds, strict=True) if f != fold])
+        refit = np.linalg.lstsq(x[others], y[others], rcond=None)[0]
+        expected = ((x[rows] @ refit - y[rows]) ** 2).sum(axis=0)
+        np.testing.assert_allclose(errors, expected, rtol=1e-9)
 
 
 def naive_rmse(errors: np.ndarray, n: int, seed: int) -> np.ndarray:

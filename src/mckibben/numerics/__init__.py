@@ -1,0 +1,1 @@
+"""Least squares, descents and statistics of arrays."""

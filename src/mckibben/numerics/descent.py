@@ -1,0 +1,205 @@
+"""Nonlinear least squares: a trust region, and Levenberg-Marquardt with steps within constraints.
+
+The trust region is SciPy's; simple bounds are its only constraints.
+
+Source: Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", 1963.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.errors import ModelError
+from mckibben.numerics.statistics import rms
+
+Errors = Callable[[Array], tuple[Array, Callable[[], Array]]]
+"""From parameters, shape (p,), to errors, shape (n,), and a function to their derivatives there, shape
+(n, p). That is called for points from which a search goes on, right after their errors.
+"""
+
+Path = list[tuple[Array, float]]
+"""Parameters and their sums of squares, which decrease."""
+
+MARGIN = 1e-9
+"""Smallest distance of a start from the bounds, relative to their width."""
+
+SHORTEST = 1e-9
+"""Step, relative to the parameters, that counts as zero."""
+
+MOST_TRIES, HEAVIER, LIGHTER = 7, 10.0, 0.2
+"""Number of dampings tried per step; factors on it where errors do not fall, and where they do."""
+
+FIRST_DAMPING, RAISED, LIGHTEST = 1e-3, 1e-9, 1e-14
+"""Damping of the first step, the smallest after a step that failed, and the smallest."""
+
+SLOW, SLOWEST = 1e-3, 2
+"""Relative gain of a slow step, and number of slow steps that end a descent."""
+
+
+def trust_region(
+    errors: Errors,
+    start: Array,
+    *,
+    least_gain: float,
+    max_evaluations: int,
+    scale: Array | Literal["jac"] = "jac",
+    bounds: tuple[Array, Array] | None = None,
+) -> Path:
+    """Return the start, then the points of decreasing cost of the search.
+
+    Parameters
+    ----------
+    errors : callable
+        A step to errors that are not finite is refused.
+    start : array, shape (p,)
+    least_gain : float
+        Share of the sum of squares that a step has to gain for another to follow.
+    max_evaluations : int
+        Of the errors.
+    scale : array, shape (p,), or "jac"
+        How far each parameter may move at first; or by the sizes of the derivatives. Within bounds, it
+        is their width.
+    bounds : (array, array), shapes (p,), optional
+        Of the parameters.
+
+    Returns
+    -------
+    list of (array of shape (p,), float)
+        The start alone where its errors are zero or not finite.
+    """
+    from scipy.optimize import least_squares
+
+    # relative errors of relative parameters, so that nothing depends on a unit
+    origin, limits = np.zeros(start.size), (-np.inf, np.inf)
+    sizes = np.ones(start.size) if isinstance(scale, str) else scale
+    if bounds is not None:
+        origin, sizes, limits = bounds[0], bounds[1] - bounds[0], (0.0, 1.0)
+        start = origin + sizes * np.clip((start - origin) / sizes, MARGIN, 1.0 - MARGIN)
+    last = errors(start)
+    first = float(last[0] @ last[0])
+    if not 0.0 < first < np.inf:
+        return [(start, first)]
+    unit, known = np.sqrt(first / last[0].size), True
+    path: Path = []
+
+    def errors_at(z: Array) -> Array:
+        nonlocal last, known
+        if not known:
+            last = errors(origin + sizes * z)
+        known = False
+        return last[0] / unit
+
+    def slopes_at(z: Array) -> Array:  # called at the start and after every step that is taken
+        path.append((origin + sizes * z if path else start, float(last[0] @ last[0])))
+        return last[1]() * sizes / unit
+
+    least_squares(
+        errors_at,
+        (start - origin) / sizes,
+        slopes_at,
+        bounds=limits,
+        x_scale=scale if bounds is None and isinstance(scale, str) else 1.0,
+        ftol=least_gain,
+        xtol=SHORTEST,
+        gtol=None,
+        max_nfev=max_evaluations,
+    )
+    return path
+
+
+def differences(
+    function: Callable[[Array], Array],
+    at: Array,
+    steps: Array,
+    places: Sequence[int] | None = None,
+    here: Array | None = None,
+) -> Array:
+    """Return the differences of a function's values by each of k arguments, shape (..., k).
+
+    Parameters
+    ----------
+    function : callable
+        Arguments, shape (n,), to values of any shape.
+    at, steps : array, shape (n,)
+        Arguments, and how far each is moved; either way.
+    places : sequence of int, optional
+        Of the k arguments; all by default.
+    here : array, optional
+        Values at the arguments, if known.
+    """
+    here, found = function(at) if here is None else here, []
+    for place in range(at.size) if places is None else places:
+        moved = at.copy()
+        moved[place] += steps[place]
+        found.append((function(moved) - here) / (moved[place] - at[place]))
+    return np.stack(found, axis=-1) if found else np.zeros((*here.shape, 0))
+
+
+def by_differences(errors: Callable[[Array], Array], steps: Array) -> Errors:
+    """Return errors with derivatives by finite differences of so large steps, shape (p,)."""
+
+    def sloped(point: Array) -> tuple[Array, Callable[[], Array]]:
+        here = errors(point)
+        return here, lambda: differences(errors, point, steps, here=here)
+
+    return sloped
+
+
+def levenberg_marquardt(
+    errors: Callable[[Array, bool], tuple[Array, Array]],
+    step: Callable[[Array, Array, float], Array],
+    start: Array,
+    steps: int,
+    improved: Callable[[Array, float], object],
+) -> Array:
+    """Return the best point of a descent whose steps are solved for by the caller.
+
+    Parameters
+    ----------
+    errors : callable
+        From parameters to errors, shape (n,), and their derivatives by what is free, shape (n, p); the
+        latter are needed only where the second argument is true, and may else have no rows.
+    step : callable
+        From the triangle, (p + 1, p + 1), of the derivatives and the errors, the parameters and a
+        damping to other parameters; or it raises a `ModelError`. A step to errors that are not finite,
+        or no smaller, is refused, and tried again with more damping.
+    start : array
+    steps : int
+        Largest number of steps.
+    improved : callable
+        Called with every better point, and its root mean square error.
+    """
+    damping, slow, point = FIRST_DAMPING, 0, start
+    found, slopes = errors(point, True)
+    cost = rms(found)
+    improved(point, cost)
+    for number in range(steps):
+        if not len(slopes):
+            found, slopes = errors(point, True)
+        both = np.column_stack([slopes, found])
+        both[~np.isfinite(both).all(axis=1)] = 0.0
+        triangle: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
+        for turn in range(MOST_TRIES):
+            try:
+                tried = step(triangle, point, damping)
+                # most others are accepted, so that their slopes are needed
+                found, slopes = errors(tried, turn == 0 and number < steps - 1)
+                size = rms(found)
+            except ModelError:
+                size = np.inf
+            if size < cost:
+                break
+            damping = max(HEAVIER * damping, RAISED)
+        else:
+            return point
+        slow = slow + 1 if size > (1.0 - SLOW) * cost else 0
+        point, cost = tried, size
+        improved(point, cost)
+        if slow >= SLOWEST:
+            return point
+        damping = max(LIGHTER * damping, LIGHTEST)
+    return point

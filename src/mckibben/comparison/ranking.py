@@ -32,10 +32,9 @@ from mckibben.diagnosis.bands import tested_band
 from mckibben.errors import MckibbenError
 from mckibben.metrics import Scores, mean_scores, score
 from mckibben.numerals import duration
-from mckibben.numerics.blocks import BlockBootstrap, block_length, differences, interval
+from mckibben.numerics.blocks import RESAMPLES, BlockBootstrap, block_length, differences, interval
 from mckibben.numerics.statistics import correlation_length
 from mckibben.recording import Recording
-from mckibben.statistics import RESAMPLES
 from mckibben.system.progress import telling
 from mckibben.system.workers import checked
 

@@ -26,7 +26,6 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from mckibben.blocks.free_run import run_free
 from tests.plants import DEVELOP, PLANTS, SEALED, Plant, motions
 
 from mckibben import Recording, registry
@@ -101,7 +100,9 @@ def tried(name: str, channels: Channels, plant: Plant, seed: int) -> Found:
 def tested(block: Block, plant: Plant, runs: Sequence[Recording]) -> float:
     """Return the error of free runs."""
     names = plant.bench.outputs
-    return missed(np.vstack([run_free(block, run, names) - run.matrix(names) for run in runs]))
+    return missed(
+        np.vstack([block.simulate(run).matrix(names) - run.matrix(names) for run in runs])
+    )
 
 
 def missed(errors: Array) -> float:

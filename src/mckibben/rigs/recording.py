@@ -13,7 +13,7 @@ from mckibben.rigs.files import load_rig
 from mckibben.rigs.rig import Rig
 from mckibben.signals import cut
 from mckibben.signals.checking import generator
-from mckibben.signals.protocol import Protocol, Run, protocol
+from mckibben.signals.protocol import PlannedRun, Protocol, protocol
 from mckibben.system.threads import cores
 
 
@@ -24,7 +24,7 @@ def record(
     runs: Sequence[str] | None = None,
     seed: int = 0,
     jobs: int | None = None,
-) -> Iterator[tuple[Run, Recording]]:
+) -> Iterator[tuple[PlannedRun, Recording]]:
     """Record a protocol, run by run, in its order.
 
     Parameters
@@ -56,7 +56,7 @@ def record(
     generator(seed)  # refuses what is none
     places = {run.name: place for place, run in enumerate(plan.runs)}
 
-    def recorded(run: Run) -> Recording:
+    def recorded(run: PlannedRun) -> Recording:
         own_seed = int(np.random.SeedSequence((seed, places[run.name])).generate_state(1)[0])
         measured = plant.changed(run.settings).run(run.inputs, own_seed)
         if run.lead:

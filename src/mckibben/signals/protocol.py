@@ -15,7 +15,7 @@ Role = Literal["train", "validation", "test"]
 
 
 @dataclass(frozen=True)
-class Run:
+class PlannedRun:
     """One run of a protocol.
 
     Parameters
@@ -54,7 +54,7 @@ class Protocol:
         Name of the rig it was made for.
     source : str
         The paper and its sections.
-    runs : tuple of Run
+    runs : tuple of PlannedRun
         In the order in which they are to be recorded.
     notes : str
         What the source leaves open, and what is done here.
@@ -63,10 +63,10 @@ class Protocol:
     name: str
     rig: str
     source: str
-    runs: tuple[Run, ...]
+    runs: tuple[PlannedRun, ...]
     notes: str = ""
 
-    def select(self, role: Role | None = None, **labels: Any) -> tuple[Run, ...]:
+    def select(self, role: Role | None = None, **labels: Any) -> tuple[PlannedRun, ...]:
         """Return the runs of a role, and with all of the labels.
 
         >>> from mckibben.signals.protocol import protocol
@@ -80,7 +80,7 @@ class Protocol:
             and all(run.labels.get(name) == value for name, value in labels.items())
         )
 
-    def __getitem__(self, name: str) -> Run:
+    def __getitem__(self, name: str) -> PlannedRun:
         """Return the run of that name."""
         for run in self.runs:
             if run.name == name:

@@ -13,7 +13,7 @@ from mckibben.recording import Recording
 from mckibben.rigs import Rig
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
-from mckibben.signals.protocol import Protocol, Role, Run
+from mckibben.signals.protocol import PlannedRun, Protocol, Role
 
 SAMPLE_TIME = 0.005
 FORCES = (0.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
@@ -76,8 +76,8 @@ def activation_pressure(rig: Rig | None = None) -> Protocol:
 
 def _run(
     name: str, role: Role, wave: np.ndarray, force: float, frequency: float, stage: str
-) -> Run:
-    return Run(
+) -> PlannedRun:
+    return PlannedRun(
         name=name,
         role=role,
         inputs=Recording({"pressure": wave, "force": np.full(wave.size, force)}, SAMPLE_TIME),

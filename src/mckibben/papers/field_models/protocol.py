@@ -11,7 +11,7 @@ import numpy as np
 
 from mckibben.recording import Recording
 from mckibben.signals.excitations import irregular_triangle, triangle
-from mckibben.signals.protocol import Protocol, Run
+from mckibben.signals.protocol import PlannedRun, Protocol
 
 SAMPLE_TIME = 0.02
 PERIOD = 10.0
@@ -33,8 +33,10 @@ def field_models() -> Protocol:
         rig="mas20-hanging",
         source="Analysis and modeling of a pneumatic artificial muscle system, Sections 2.1 and 3.1",
         runs=(
-            Run("decaying-triangle", "train", Recording({"pressure": falling}, SAMPLE_TIME)),
-            Run("irregular-triangle", "test", Recording({"pressure": irregular}, SAMPLE_TIME)),
+            PlannedRun("decaying-triangle", "train", Recording({"pressure": falling}, SAMPLE_TIME)),
+            PlannedRun(
+                "irregular-triangle", "test", Recording({"pressure": irregular}, SAMPLE_TIME)
+            ),
         ),
         notes="Peaks and turning points are ours: the paper shows them in a figure only.",
     )

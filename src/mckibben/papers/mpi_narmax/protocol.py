@@ -14,7 +14,7 @@ from mckibben.recording import Recording
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine, triangle
 from mckibben.signals.loads import pulls, ramps
-from mckibben.signals.protocol import Protocol, Role, Run
+from mckibben.signals.protocol import PlannedRun, Protocol, Role
 
 SAMPLE_TIME, TIME = 0.001, 60.0
 """Of all runs, and how long they are, but for those at 0.05 Hz [s]."""
@@ -45,12 +45,12 @@ def mpi_narmax() -> Protocol:
         # From the lowest voltage on, so that a model knows how the muscle came there.
         labels = {"stage": "held", "level": volt, "start": PULLED_FROM}
         wave = ramps(time, (0.0, 10.0), (LOW, volt))
-        runs.append(Run(f"held-{volt:g}V", "test", _inputs(wave, pulled), labels=labels))
+        runs.append(PlannedRun(f"held-{volt:g}V", "test", _inputs(wave, pulled), labels=labels))
     roles: tuple[Role, ...] = ("train", "train", "test")
     for seed, role in enumerate(roles, start=1):
         wave = random_wave(time, 0.2, HIGH, LOW, seed=seed)
         inputs = _inputs(wave, random_wave(time, 0.2, 200.0, seed=100 + seed))
-        runs.append(Run(f"random-{seed}", role, inputs, labels={"stage": "random"}))
+        runs.append(PlannedRun(f"random-{seed}", role, inputs, labels={"stage": "random"}))
     source = "Actuators 2022, 11(2), 51, doi:10.3390/act11020051, Sections 2 and 4"
     notes = "How the hand pulls three times is ours: the paper gives the peaks. So are random runs."
     return Protocol("mpi-narmax", "rail", source, tuple(runs), notes)
@@ -62,9 +62,9 @@ def _inputs(voltage: Array, force: Array) -> Recording:
 
 def _moving(
     name: str, role: Role, stage: str, f: float, mass: float = 0.0, hand: float = 0.0, **status: int
-) -> Run:
+) -> PlannedRun:
     duration = max(TIME, 4 / f)
     time = np.arange(round(duration / SAMPLE_TIME)) * SAMPLE_TIME
     inputs = _inputs(sine(time, 1 / f, HIGH, LOW), pulls(time, hand, duration=duration / 6))
     labels = {"stage": stage, "frequency": f, "mass": mass, "hand": hand, **status}
-    return Run(name, role, inputs, {"payload": round(mass, 6)}, labels)
+    return PlannedRun(name, role, inputs, {"payload": round(mass, 6)}, labels)

@@ -14,7 +14,7 @@ from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.rigs import Rig
 from mckibben.signals.excitations import irregular_triangle, triangle
-from mckibben.signals.protocol import Protocol, Role, Run
+from mckibben.signals.protocol import PlannedRun, Protocol, Role
 
 SAMPLE_TIME, LONGEST, HIGHEST = 0.02, 200.0, 6.0
 """Time between samples [s]; length at rest [mm] and highest pressure [bar] of the paper's muscle."""
@@ -50,14 +50,14 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
             raise DataError(f"the rig {rig.name!r} imposes no length", remedy=remedy)
         wide = rig.start.get("length", rig.limits("length").high) / LONGEST
         strong = rig.limits("pressure").high / HIGHEST
-    runs = list[Run]()
+    runs = list[PlannedRun]()
 
     def add(name: str, role: Role, bars: Array, lengths: Array, lead: float = 0.0) -> None:
         inputs = {"pressure": strong * bars, "length": wide * lengths}
         start = {f"start.{channel}": float(values[0]) for channel, values in inputs.items()}
         stage, held = ("static", "length") if lead else ("friction", "pressure")
         labels = {"stage": stage, held: start[f"start.{held}"]}
-        runs.append(Run(name, role, Recording(inputs, SAMPLE_TIME), start, labels, lead))
+        runs.append(PlannedRun(name, role, Recording(inputs, SAMPLE_TIME), start, labels, lead))
 
     lead = SWINGS * SWING_PERIOD + VENTING
     time = _time(lead + RISE)

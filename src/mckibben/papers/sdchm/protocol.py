@@ -19,7 +19,7 @@ import numpy as np
 from mckibben.recording import Recording
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
-from mckibben.signals.protocol import Protocol, Role, Run
+from mckibben.signals.protocol import PlannedRun, Protocol, Role
 
 PERIOD, HIGHEST = 50.0, 2.5
 """Of every sine [s], and the pressure that all muscles withstand [bar], Table 1."""
@@ -97,24 +97,24 @@ def quick() -> tuple[Protocol, list[str]]:
     return replace(whole, name="sdchm-quick", runs=tuple(map(_shortened, whole.runs))), names
 
 
-def _shortened(run: Run) -> Run:
+def _shortened(run: PlannedRun) -> PlannedRun:
     stage, inputs = run.labels["stage"], run.inputs
     n = round(QUICK.get(stage, 1.0) * PERIOD / inputs.step)
     part = inputs.slice(0, n) if stage == "joint" else inputs.slice(len(inputs) - n, len(inputs))
     return replace(run, inputs=replace(part, start_time=0.0))
 
 
-def _sines(stage: str, role: Role, driven: str, p0: float, peaks: Sequence[float]) -> Run:
+def _sines(stage: str, role: Role, driven: str, p0: float, peaks: Sequence[float]) -> PlannedRun:
     rate = 50.0 if stage == "hysteresis" else 20.0
     wave = sine(np.arange(round(PERIOD * len(peaks) * rate)) / rate, PERIOD, peaks)
     channels = {f"pressure_{k}": wave if k in driven else 0.0 * wave for k in "123"}
     inputs = Recording(channels | {"pressure_extensor": np.full(wave.size, p0)}, 1 / rate)
     name = NAMES.get(stage, f"{stage}-p0-{{p0}}-drive-{{d}}").format(d=driven, p0=p0)
     labels = {"stage": stage, "p0": p0, "driven": driven}
-    return Run(name, role, inputs, {"start.pressure_extensor": p0}, labels)
+    return PlannedRun(name, role, inputs, {"start.pressure_extensor": p0}, labels)
 
 
-def _joint(role: Role, number: int, p0: float | None) -> Run:
+def _joint(role: Role, number: int, p0: float | None) -> PlannedRun:
     """Return a run with all pressures random: muscles up to 0.05 Hz, the extensor to 0.02 Hz."""
     time = np.arange(round(JOINT_TIME * 20.0)) / 20.0
     seed, rise = 1000 * list(JOINT).index(role) + 10 * number, np.minimum(time / JOINT_START, 1.0)
@@ -126,4 +126,4 @@ def _joint(role: Role, number: int, p0: float | None) -> Run:
     start, kind = float(extensor[0]), "moving" if p0 is None else "constant"
     name = f"joint-{role}-moving-{number}" if p0 is None else f"joint-{role}-p0-{p0}"
     labels = {"stage": "joint", "p0": start, "driven": "123", "extensor": kind}
-    return Run(name, role, inputs, {"start.pressure_extensor": start}, labels)
+    return PlannedRun(name, role, inputs, {"start.pressure_extensor": start}, labels)

@@ -101,13 +101,13 @@ class SeparableEstimator(Estimator):
 
         Shape (samples that count, m); by finite differences of the basis.
         """
-        here = self.matrix(theta, data) @ linear
+        here = self.design_matrix(theta, data) @ linear
         steps = differences(theta, *self.bounds(data))
         columns = []
         for index in range(theta.size):
             moved = theta.copy()
             moved[index] += steps[index]
-            there = self.matrix(moved, data) @ linear
+            there = self.design_matrix(moved, data) @ linear
             columns.append((there - here) / (moved[index] - theta[index]))
         return np.column_stack(columns)
 
@@ -149,7 +149,7 @@ class SeparableEstimator(Estimator):
         Where `rises`, the output of the data rises with the input.
         """
         theta = self._search(data, tracker)
-        linear, offset = self.solve(self.matrix(theta, data), data)
+        linear, offset = self.solve(self.design_matrix(theta, data), data)
         return self.build(theta, linear, offset, data)
 
     def most_evaluations(self, size: int) -> int:
@@ -209,7 +209,7 @@ class SeparableEstimator(Estimator):
         tracker.update_from(own)
         return best
 
-    def matrix(self, theta: Array, data: TrainingData) -> Array:
+    def design_matrix(self, theta: Array, data: TrainingData) -> Array:
         """Return the regressors at the scored samples of all runs, shape (samples, k)."""
         return counting(data, lambda run: self.basis(theta, run, data))
 
@@ -247,7 +247,7 @@ class SeparableEstimator(Estimator):
 
     def _solved(self, theta: Array, data: TrainingData) -> tuple[Array, Array | None, Array]:
         """Return regressors, linear parameters if finite, and residuals."""
-        matrix = self.matrix(theta, data)
+        matrix = self.design_matrix(theta, data)
         if not np.isfinite(matrix).all():
             return matrix, None, np.full(data.target.size, WORST)
         linear, offset = self.solve(matrix, data)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -172,7 +173,7 @@ def channels_of(
     DataError
         If a channel is named twice, or no recording has one that is named to schedule.
     """
-    asked = (scheduling,) if isinstance(scheduling, str) else tuple(scheduling or ())
+    asked = _listed(scheduling)
     finds = scheduling is None
     given = _named(recordings, inputs, by_name(recordings, asked)[0] or (PRESSURE,))
     loads = _loads_among(recordings, given)
@@ -414,11 +415,18 @@ def _named(
 ) -> tuple[str, ...]:
     if given is None:
         return by_default
-    names = (given,) if isinstance(given, str) else tuple(given)
+    names = _listed(given)
     if len(names) == 1 and not any(names[0] in one for one in recordings):
         # of several muscles, all that are called so
         return tuple(name for name in by_default if name.startswith(f"{names[0]}_")) or names
     return names
+
+
+def _listed(names: Names) -> tuple[str, ...]:
+    """Return names as a tuple; what is no list is one name, if a wrong one."""
+    if names is None:
+        return ()
+    return tuple(names) if isinstance(names, list | tuple) else (cast(str, names),)
 
 
 def _schedules(recordings: Sequence[Recording]) -> tuple[str, ...]:

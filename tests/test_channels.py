@@ -46,6 +46,7 @@ def run(*channels: str, held: tuple[str, ...] = (), **units: str) -> Recording:
         ("u1 u2 x_1 y_1 x_2 y_2", "u1 u2", "x_1 y_1 x_2 y_2"),
         ("pressure x y", "pressure", "x y"),
         ("u y", "u", "y"),
+        ("u10 u2 u1 y", "u1 u2 u10", "y"),
         ("pressure_1 pressure_2 displacement angle", "pressure_1 pressure_2", "displacement"),
         ("pressure displacement angle", "pressure", "displacement"),
         ("pressure_1 pressure_2 angle_1 angle_2 x", "pressure_1 pressure_2", "angle_1 angle_2"),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -130,10 +131,8 @@ class Channels:
         """Every output with the input of the same number, or of the same position."""
 
         def own(place: int, output: str) -> str:
-            number = re.search(r"\d*$", output)
-            alike = [
-                name for name in self.inputs if number and number[0] and name.endswith(number[0])
-            ]
+            number = _number(output)
+            alike = [name for name in self.inputs if number and _number(name) == number]
             return alike[0] if len(alike) == 1 else self.inputs[min(place, len(self.inputs) - 1)]
 
         return tuple((own(place, output), output) for place, output in enumerate(self.outputs))
@@ -174,7 +173,7 @@ def channels_of(
     DataError
         If a channel is named twice, or no recording has one that is named to schedule.
     """
-    asked = (scheduling,) if isinstance(scheduling, str) else tuple(scheduling or ())
+    asked = _listed(scheduling)
     finds = scheduling is None
     given = _named(recordings, inputs, by_name(recordings, asked)[0] or (PRESSURE,))
     loads = _loads_among(recordings, given)
@@ -366,14 +365,15 @@ def _shared(recordings: Sequence[Recording], name: str) -> bool:
 
 def _differs(recordings: Sequence[Recording], name: str) -> bool:
     """Return whether a channel varies within or between recordings by more than rounding."""
-    samples = np.concatenate([one[name] for one in recordings if name in one])
+    samples = np.concatenate([*(one[name] for one in recordings if name in one), np.zeros(0)])
     return bool(samples.size and np.ptp(samples) > 1e-6 * (1.0 + np.abs(samples).max()))
 
 
 def _called(channels: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
     """Return the channels with the first of several names that occurs: one, or numbered ones.
 
-    Several are distinguished by numbers, of which the first may be missing, or by places.
+    Several are distinguished by numbers, of which the first may be missing, in their order; or by
+    places.
     """
     for word in words:
         plain = [name for name in channels if re.fullmatch(word, name)]
@@ -388,9 +388,15 @@ def _called(channels: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
         if begun and not (several or plain):  # command_pressure_1, command_pressure_2
             stem = re.escape(re.sub(r"_\d+$", "", begun[0]))
             several = [name for name in begun if re.fullmatch(rf"{stem}_\d+", name)]
-        if found := several or (plain or begun)[:1]:
+        if found := sorted(several, key=_number) or (plain or begun)[:1]:
             return tuple(found)
     return ()
+
+
+def _number(name: str) -> int:
+    """Return the number at the end of a name, 0 without one."""
+    match = re.search(r"\d+$", name)
+    return int(match[0]) if match else 0
 
 
 def _in_units(
@@ -409,23 +415,30 @@ def _named(
 ) -> tuple[str, ...]:
     if given is None:
         return by_default
-    names = (given,) if isinstance(given, str) else tuple(given)
+    names = _listed(given)
     if len(names) == 1 and not any(names[0] in one for one in recordings):
         # of several muscles, all that are called so
         return tuple(name for name in by_default if name.startswith(f"{names[0]}_")) or names
     return names
 
 
+def _listed(names: Names) -> tuple[str, ...]:
+    """Return names as a tuple; what is no list is one name, if a wrong one."""
+    if names is None:
+        return ()
+    return tuple(names) if isinstance(names, list | tuple) else (cast(str, names),)
+
+
 def _schedules(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Return the default scheduling channels of any recording."""
     names = _names(recordings)
     found = (
-        (quantity, int(match[1] or 0), name)
-        for quantity in range(len(SCHEDULES))
-        for name in names
-        if (match := re.fullmatch(rf"{SCHEDULES[quantity]}(?:_(\d+))?", name))
+        name
+        for word in SCHEDULES
+        for name in sorted(names, key=_number)
+        if re.fullmatch(rf"{word}(_\d+)?", name)
     )
-    return tuple(name for _, _, name in sorted(found))
+    return tuple(found)
 
 
 def _loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tuple[str, ...]:

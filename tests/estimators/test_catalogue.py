@@ -14,7 +14,7 @@ import pytest
 import mckibben
 from mckibben import ModelError, Recording, registry
 from mckibben.blocks.force.feedforward import compensator
-from mckibben.channels import Channels
+from mckibben.channels import channels_of
 from mckibben.comparison.leaderboard import inverse_of
 from mckibben.comparison.planning import Candidate, objections
 from mckibben.errors import MckibbenError
@@ -88,9 +88,7 @@ def test_a_load_that_some_recordings_lack_is_an_objection_of_those_that_are_told
     channels = dict.fromkeys(("pressure", "displacement", "force"), wave)
     known = Recording(channels, 0.1, meta={"name": "a"})
     runs = [known, known.select(["pressure", "displacement"]).with_meta(name="b")]
-    found = objections(
-        {name: Candidate(name) for name in MODELS}, runs, Channels(("pressure",), ("displacement",))
-    )
+    found = objections({name: Candidate(name) for name in MODELS}, runs, channels_of(runs))
     assert {"pi", "balance"}.isdisjoint(found)
     assert "force" in found["coupled-memory"]
 

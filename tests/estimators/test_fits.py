@@ -121,12 +121,14 @@ def test_derivatives_by_thresholds_agree_with_differences() -> None:
         estimator = quick("rdpi", "muscle", **settings | how)
         data = estimator.data([run])
         theta = np.array([0.9, 0.4, 0.3, 0.2, 0.1, -0.2, 0.05, 0.02, 0.05, 0.22, 0.41, 0.77])
-        matrix = estimator.matrix(theta, data)
+        matrix = estimator.design_matrix(theta, data)
         linear, _ = estimator.solve(matrix, data)
         slopes = estimator.moves(theta, linear, data)
         for place in range(theta.size):
             steps = 1e-6 * (np.arange(theta.size) == place)
-            apart = estimator.matrix(theta + steps, data) - estimator.matrix(theta - steps, data)
+            apart = estimator.design_matrix(theta + steps, data) - estimator.design_matrix(
+                theta - steps, data
+            )
             error = np.abs(apart @ linear / 2e-6 - slopes[:, place])
             assert np.quantile(error, 0.98) < 1e-3 * np.abs(slopes).max()  # where no operator turns
 

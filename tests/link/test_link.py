@@ -214,10 +214,14 @@ def test_what_a_device_answers_is_not_trusted() -> None:
 
 def test_what_is_beyond_limits_is_not_sent() -> None:
     with linked(line := Line()) as link:
-        for wrong in ([6.1], [float("nan")], [1.0, 2.0], ["x"]):
+        (name,) = (port.name for port in link.device.inputs)
+        twice = {name: 1.0, "other": 2.0}
+        for wrong in ([6.1], [float("nan")], [1.0, 2.0], ["x"], {name: 6.1}, {"other": 1.0}, twice):
             with pytest.raises(DataError):
                 link.step(wrong)
         assert not line.applied
+        link.step({name: 1.0})
+        assert line.applied
 
 
 def test_another_model_is_not_driven() -> None:

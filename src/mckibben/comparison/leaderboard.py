@@ -303,7 +303,7 @@ class Leaderboard(DrawsItself):
         Further input channels of models, which are never commanded.
     offered : tuple of str
         Further input channels of the models that can take them.
-    unused : tuple of str
+    ignored : tuple of str
         Channels that vary in the recordings and that no model is given.
     outside : mapping of str to float
         Channel to the share of the samples tested on that are outside of its range in training.
@@ -330,7 +330,7 @@ class Leaderboard(DrawsItself):
     shared: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
     offered: tuple[str, ...] = ()
-    unused: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
     outside: Mapping[str, float] = field(default_factory=dict)
     parts: tuple[tuple[Span, ...], ...] = ()
 
@@ -425,7 +425,7 @@ class Leaderboard(DrawsItself):
             "notes": list(self.notes),
             "shared": list(self.shared),
             "offered": list(self.offered),
-            "unused": list(self.unused),
+            "ignored": list(self.ignored),
             "outside": dict(self.outside),
             "rows": [row.to_dict() for row in self.ranking],
         }

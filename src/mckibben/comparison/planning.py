@@ -182,7 +182,7 @@ def data_of(
         shared=shared,
         loads=channels.scheduling,
         offered=channels.offered,
-        unused=channels.unused,
+        ignored=channels.unused,
         outside=_outside(split, (*channels.inputs, *channels.further)),
         parts=tuple(spans_of(part, data.held_out) for part in parts),
     )

@@ -7,7 +7,7 @@ import struct
 import time
 import zlib
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
@@ -30,6 +30,9 @@ HEAD, CHECK = struct.Struct("<BB4sI"), struct.Struct("<I")
 PAYLOAD = 250
 ROOM = PAYLOAD - HEAD.size - CHECK.size  # bytes of a body, at most
 STATUSES = ("ok", "malformed", "beyond limits", "another model is there")
+
+Inputs = ArrayLike | Mapping[str, float]
+"""Values of a device's inputs, in their order or by name."""
 
 Kind = IntEnum("Kind", "IDENTIFY STATE READ INPUTS RESET RELEASE SAMPLE")
 Note = IntFlag("Note", "RUNNING TRIPPED LIMITED BAD_INPUT BAD_OUTPUT RESUMED CLIPPED")
@@ -177,27 +180,31 @@ class Link(AbstractContextManager["Link"]):
             self._port.close()
             raise
 
-    def step(self, inputs: ArrayLike) -> State:
+    def step(self, inputs: Inputs) -> State:
         """Step the model by one sample, in lock-step, and return its state.
 
-        ``inputs`` are those of ``device.inputs``, within their limits; NaN where one may be missing.
+        ``inputs`` are those of ``device.inputs``, by name or in their order, within their limits; NaN
+        where one may be missing.
         """
         return self._drive(inputs, lock_step=True)
 
-    def set(self, inputs: ArrayLike) -> State:
+    def set(self, inputs: Inputs) -> State:
         """Set the inputs of the coming steps of the device's timer, before the watchdog acts."""
         return self._drive(inputs, lock_step=False)
 
-    def _drive(self, inputs: ArrayLike, *, lock_step: bool) -> State:
+    def _drive(self, inputs: Inputs, *, lock_step: bool) -> State:
         if lock_step != self._lock_step:
             right = "step()" if self._lock_step else "set()"
             raise LinkError(f"lock_step is {self._lock_step}", remedy=f"call {right}")
         ports, values = self.device.inputs, np.empty(0)
-        with suppress(TypeError, ValueError):
-            values = np.asarray(inputs, dtype=np.float64).ravel().astype(self._kind)
+        names, given = [port.name for port in ports], inputs
+        with suppress(KeyError, TypeError, ValueError):
+            if isinstance(inputs, Mapping) and inputs.keys() <= {*names}:
+                given = [inputs[name] for name in names]
+            values = np.asarray(given, dtype=np.float64).ravel().astype(self._kind)
         if values.size != len(ports):
-            names = ", ".join(port.name for port in ports)
-            raise DataError(f"{inputs!r:.100} cannot be set", remedy=f"give numbers for {names}")
+            remedy = f"give numbers for {', '.join(names)}"
+            raise DataError(f"{inputs!r:.100} cannot be set", remedy=remedy)
         needed = len(ports) - self.device.n_missable
         for port, value in zip(ports[:needed], values[:needed].tolist(), strict=True):
             if not port.low <= value <= port.high:  # as NaN never is

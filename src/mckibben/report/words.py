@@ -136,8 +136,8 @@ def comparison(board: Leaderboard) -> list[str]:
         said.append(f"Further inputs of all models: {', '.join(board.loads)}.")
     if board.offered:
         said.append(f"Further inputs of models that can take them: {', '.join(board.offered)}.")
-    if board.unused:
-        said.append(f"Not used: {', '.join(board.unused)}; see `inputs` and `load`.")
+    if board.ignored:
+        said.append(f"Not used: {', '.join(board.ignored)}; see `inputs` and `load`.")
     said += [
         f"{name} is outside its training range in {numeral(100 * share, 2)} % of the test samples."
         for name, share in board.outside.items()

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mckibben.channels import quantity
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, moves, shortest_hold
@@ -39,13 +40,11 @@ def rest(recording: Recording, channel: str, over: str) -> float | None:
                 channel=name,
                 remedy="name one of them",
             )
-    quantities = {*LOADS, _quantity(over)}
+    quantities = {*LOADS, quantity(over)}
     others = [
         name
         for name in recording.channels
-        if _quantity(name) in quantities
-        and name not in (over, channel)
-        and moves([recording[name]])
+        if quantity(name) in quantities and name not in (over, channel) and moves([recording[name]])
     ]
     columns = recording.matrix([over, *others])
     spans = np.ptp(columns, axis=0)
@@ -89,7 +88,3 @@ def zeroed(recording: Recording, channels: Sequence[str], over: str) -> Recordin
             )
         level[name] = recording[name] - at
     return replace(recording, channels={**recording.channels, **level})
-
-
-def _quantity(name: str) -> str:
-    return name.rstrip("0123456789").rstrip("_")

@@ -246,6 +246,19 @@ def _line(state: State, entry: Entry) -> list[Any]:
     return [entry.name, role, recording.n_samples, ", ".join(recording.channels)]
 
 
+@widgets.shielded
+def _further(state: State) -> None:
+    """Show what models are given beside the inputs, and what is not used."""
+    sides = state.sides
+    for said, names in (
+        ("Every model is given", sides.scheduling),
+        ("Models that can take them are given", sides.offered),
+        ("Not used:", sides.unused),
+    ):
+        if names:
+            ui.label(f"{said} {', '.join(names)}.").classes("muted")
+
+
 def _sides(state: State, known: list[str]) -> None:
     """Let inputs, outputs and the load be chosen, of channels that all recordings have."""
     workspace = state.workspace
@@ -261,8 +274,7 @@ def _sides(state: State, known: list[str]) -> None:
             ui.label(f"Sample times differ, from {times[0]:.4g} to {slow} s.").classes("muted")
             alike = partial(_changed, state, together.resample, workspace, times[1])
             mark(widgets.button(f"Resample to {slow} s", alike), "one-rate")
-    if state.outputs == ["force"] and "pressure" in known and "pressure" not in state.inputs:
-        ui.label("Models of a force also use the pressure.").classes("muted")
+    _further(state)
     rest = [name for name in known if name not in (*state.inputs, *state.outputs)]
 
     def choose(side: str, event: Any) -> None:

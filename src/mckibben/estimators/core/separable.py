@@ -103,7 +103,7 @@ class SeparableEstimator(Estimator):
         lower, upper = self.bounds(data)
         steps = DIFFERENCE * (upper - lower)
         inside = np.where(theta + steps <= upper, steps, -steps)
-        return differences(lambda moved: self.matrix(moved, data) @ linear, theta, inside)
+        return differences(lambda moved: self.design_matrix(moved, data) @ linear, theta, inside)
 
     def jacobian(
         self, theta: Array, matrix: Array, linear: Array | None, data: TrainingData
@@ -145,7 +145,7 @@ class SeparableEstimator(Estimator):
         Where `rises`, the output of the data rises with the input.
         """
         theta = self._search(data, tracker)
-        linear, offset = self.solve(self.matrix(theta, data), data)
+        linear, offset = self.solve(self.design_matrix(theta, data), data)
         return self.build(theta, linear, offset, data)
 
     def most_evaluations(self, size: int) -> int:
@@ -194,7 +194,7 @@ class SeparableEstimator(Estimator):
         points = qmc.Sobol(lower.size, seed=self.seed).random_base2(exponent)[: self.n_starts]
         return list(qmc.scale(points, lower, upper))
 
-    def matrix(self, theta: Array, data: TrainingData) -> Array:
+    def design_matrix(self, theta: Array, data: TrainingData) -> Array:
         """Return the regressors at the scored samples of all runs, shape (samples, k)."""
         return data.scored(lambda run: self.basis(theta, run, data))
 
@@ -229,7 +229,7 @@ class SeparableEstimator(Estimator):
         """Return the function to the errors by nonlinear parameters, linear ones solved for."""
 
         def errors(theta: Array) -> tuple[Array, Callable[[], Array]]:
-            matrix = self.matrix(theta, data)
+            matrix = self.design_matrix(theta, data)
             linear, left = None, np.full(data.target.size, WORST)
             if np.isfinite(matrix).all():
                 linear, offset = self.solve(matrix, data)

@@ -130,7 +130,7 @@ class AirEstimator(SeparableEstimator):
             late = delayed(thin, delay)
             for share in np.linspace(0.0, 0.8, 8):
                 theta = np.array([*(lower + share * (upper - lower))[:2], 0.0])
-                command = self.matrix(theta, late)[:, 0]
+                command = self.design_matrix(theta, late)[:, 0]
                 command = command - command.mean()
                 size = float(np.linalg.norm(command))
                 if size > 0:

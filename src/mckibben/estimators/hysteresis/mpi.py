@@ -229,7 +229,7 @@ class MPIEstimator(SeparableEstimator):
         """Return the pieces of the map over the run."""
         return self._pieces(theta, self.operators(self.radii(theta, data), run, data), data)
 
-    def matrix(self, theta: Array, data: TrainingData) -> Array:
+    def design_matrix(self, theta: Array, data: TrainingData) -> Array:
         """Return the basis at the scored samples; operators are computed only once."""
         return self._pieces(theta, self._operators(theta, data), data)
 

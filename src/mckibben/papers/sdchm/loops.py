@@ -11,6 +11,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
+from mckibben.channels import by_name
 from mckibben.control import Controller, Tracked, control_law, track, tune_pid
 from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.fuzzy import Search, printed_swarm
@@ -61,12 +62,6 @@ class Task(NamedTuple):
         return (self.reference.duration or 0.0) / 3
 
 
-def numbered(recording: Recording, what: str) -> list[str]:
-    """Return a recording's numbered channels of a quantity, in order."""
-    names = [n for n in recording.channels if n.startswith(what) and n.rpartition("_")[2].isdigit()]
-    return sorted(names, key=lambda name: int(name.rpartition("_")[2]))
-
-
 def held(
     outputs: Sequence[str], moving: str, time: Array, p0: float, scale: float = 1.0, f: float = F
 ) -> Task:
@@ -79,7 +74,7 @@ def held(
 
 def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
     """Track the paper's references with every controller, and further tasks with some."""
-    outputs = numbered(next(iter(runs.values())), "displacement")
+    outputs = by_name([*runs.values()])[1]
     quick, seed, step = experiment.quick, experiment.seed, 0.1 if experiment.quick else 0.05
     levels = [float(one[EXTENSOR].mean()) for one in runs.values()]
     wanted = [1.0, *(p0 for _, p0 in MOVES), TASK_LEVEL]

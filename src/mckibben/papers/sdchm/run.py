@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.channels import by_name
 from mckibben.metrics import err, loop_width, rmse
 from mckibben.papers.experiment import Cell, Experiment, Fitted, Runs, rms
 from mckibben.papers.sdchm import loops
-from mckibben.papers.sdchm.loops import BALANCE, OURS, PUBLISHED, numbered
+from mckibben.papers.sdchm.loops import BALANCE, OURS, PUBLISHED
 from mckibben.papers.sdchm.protocol import PATTERNS, quick
 from mckibben.recording import Recording
 from mckibben.signals import cycles
@@ -50,7 +51,7 @@ def by_group(runs: Runs, names: Sequence[str]) -> Iterator[tuple[str, str, Array
     """Yield every output of runs by the muscles driven: run, group, pressure, recording, output."""
     for name in sorted(names, key=lambda n: (runs.of(n, "p0"), len(runs.of(n, "driven")), n)):
         recording, driven = runs[name], runs.of(name, "driven")
-        for output in numbered(recording, "displacement"):
+        for output in by_name([recording])[1]:
             k = output.rpartition("_")[2]
             letter = f"({LETTERS[driven, k]}) " if (driven, k) in LETTERS else ""
             group = f"{letter}{' '.join(f'p{i}' for i in driven)}, y{k}"
@@ -165,7 +166,7 @@ def _parts(experiment: Experiment, runs: Runs) -> None:
 
 def _off(experiment: Experiment, name: str, recordings: Sequence[Recording]) -> Array:
     """Return modelled minus measured outputs over all recordings, shape (n, outputs) [mm]."""
-    outputs = numbered(recordings[0], "displacement")
+    outputs = by_name(recordings)[1]
     found = ((experiment.simulate(name, one), one) for one in recordings)
     return np.concatenate([model.matrix(outputs) - one.matrix(outputs) for model, one in found])
 
@@ -183,7 +184,7 @@ def _sets(experiment: Experiment, runs: Runs) -> None:
         test, validation = (runs.select(role, **labels) for role in ("test", "validation"))
         if not test:
             continue
-        outputs = numbered(test[0], "displacement")
+        outputs = by_name(test)[1]
         y = np.concatenate([one.matrix(outputs) for one in test])
         y = y - y.mean(axis=0)
         rows: dict[str, list[Cell]] = {}

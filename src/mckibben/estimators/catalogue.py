@@ -81,18 +81,6 @@ def full_name(model: str) -> str:
     return declared(model).title or model
 
 
-def caution(model: str) -> str | None:
-    """Return why a model is reliable only near its training data, or None.
-
-    A model that interpolates well may lead every ranking on motions like those of its training, and be
-    far off elsewhere: it is shown with its errors.
-
-    >>> caution("gpi") is None, caution("narx")
-    (True, 'a polynomial of past values is unbounded beyond them')
-    """
-    return declared(model).caution
-
-
 def ability(model: str) -> str:
     """Return what a model represents, in one sentence."""
     known = declared(model)

@@ -7,7 +7,7 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property, partial
 from inspect import get_annotations
 from typing import Annotated, Any, ClassVar, Literal, Self, dataclass_transform, get_type_hints
@@ -196,9 +196,10 @@ class Estimator(ABC):
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        own, known = get_annotations(cls), {setting.name for setting in fields(cls)}
-        if changed := known & vars(cls).keys() - own.keys():  # defaults, of the types of the bases
-            hints = get_type_hints(cls, include_extras=True)
+        own, base = get_annotations(cls), next(filter(is_dataclass, cls.__mro__[1:]))
+        known = {setting.name for setting in fields(base)}
+        if changed := known & vars(cls).keys() - own.keys():  # defaults, of the types of the base
+            hints = get_type_hints(base, include_extras=True)
             cls.__annotations__ = own | {name: hints[name] for name in changed}
         dataclass(kw_only=True, repr=False, eq=False)(cls)
 

@@ -6,7 +6,7 @@ They are resolved once, by `channels_of`, and handed down to what fits, compares
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -426,7 +426,8 @@ def _listed(names: Names) -> tuple[str, ...]:
     """Return names as a tuple; what is no list is one name, if a wrong one."""
     if names is None:
         return ()
-    return tuple(names) if isinstance(names, list | tuple) else (cast(str, names),)
+    single = isinstance(names, str) or not isinstance(names, Iterable)
+    return (cast(str, names),) if single else tuple(names)
 
 
 def _schedules(recordings: Sequence[Recording]) -> tuple[str, ...]:

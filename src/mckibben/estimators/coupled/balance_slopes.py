@@ -436,21 +436,9 @@ def follow(
             ahead = 2.0 * q[j] - last[j] if t > 0 else q[j]
             last[j] = q[j]
             q[j] = measured[now, j] if held else ahead
-        move(
-            c,
-            state,
-            way,
-            held,
-            q,
-            x[now],
-            p,
-            dp[now + 1 if acts else 0],
-            past,
-            rows,
-            found[place],
-            slopes[place],
-            work,
-        )
+        by_front = dp[now + 1 if acts else 0]
+        to, by = found[place], slopes[place]
+        move(c, state, way, held, q, x[now], p, by_front, past, rows, to, by, work)
         if held or c[16] == 0.0:
             continue
         for j in range(m):

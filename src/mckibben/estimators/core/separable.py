@@ -181,20 +181,14 @@ class SeparableEstimator(Estimator):
         return list(qmc.scale(points, lower, upper))
 
     def _polish(self, theta: Array, data: TrainingData, tracker: Tracker) -> Array:
-        lower, upper = self.bounds(data)
-        if lower.size == 0:
-            return theta
-        own = tracker.part(0.9, 1.0)
-        best = multi_start(
+        return multi_start(
             self._errors(data.thinned(POLISH_SAMPLES)),
             [theta],
-            (lower, upper),
-            own,
+            self.bounds(data),
+            tracker.part(0.9, 1.0),
             n_refined=1,
             max_evaluations=self.polish_evaluations,
         )
-        tracker.update_from(own)
-        return best
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:
         """Return the regressors at the scored samples of all runs, shape (samples, k)."""
@@ -249,7 +243,6 @@ class SeparableEstimator(Estimator):
             own = tracker.part(place / len(values), (place + 1) / len(values))
             settings = self.get_params() | {setting: value}
             found.append((type(self)(**settings).identify(data, own), own))
-            tracker.update_from(own)
         block, best = min(found, key=lambda item: item[1].best_cost)
         tracker.best_cost, tracker.best = best.best_cost, best.best
         return block

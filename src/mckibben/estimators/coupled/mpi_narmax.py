@@ -317,5 +317,4 @@ class RecurrentProblem:
 
         own = tracker.part(0.1, 0.9)
         found = particle_swarm(costs, lower, upper, SWARM, own, rng, start=start)
-        tracker.update_from(own)
         return split(found)

@@ -364,8 +364,7 @@ def minimise(
 
     starting = (theta for theta in starts if admissible(theta, orders))
     follow_best(starting, first_steps, followed, FOLLOWED, SAME)
-    assert tracker.best is not None
-    return tracker.best
+    return tracker.found
 
 
 def arx(runs: Sequence[Run], orders: Orders) -> Array:

@@ -207,8 +207,7 @@ class StateNetworkEstimator(SearchEstimator):
                 channel=data.input,
                 remedy="choose another seed, or record at a higher rate",
             )
-        assert tracker.best is not None
-        return template.unpack(tracker.best), data
+        return template.unpack(tracker.found), data
 
     def start(self, linear: ProcessModel, data: TrainingData, substeps: int) -> StateNetwork:
         """Return the initial network of the descent."""

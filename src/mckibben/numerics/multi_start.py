@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,11 +51,9 @@ def multi_start(
         inside = np.clip(start, *bounds)
         return inside, rms(tracked(inside)[0])
 
-    def refine(start: Array) -> None:
-        trust_region(
-            tracked, start, bounds=bounds, least_gain=LEAST_GAIN, max_evaluations=max_evaluations
-        )
-
+    refine = partial(
+        trust_region, tracked, bounds=bounds, least_gain=LEAST_GAIN, max_evaluations=max_evaluations
+    )
     follow_best(starts, evaluated, refine, n_refined)
     for _ in range(EXCHANGES if choices else 0):
         least = tracker.best_cost

@@ -79,9 +79,8 @@ def descended(start: Array, sides: Array, least: Array) -> tuple[Array, list[flo
 
     def step(triangle: Array, point: Array, damping: float) -> Array:
         by, left = triangle[:, :-1], triangle[:, -1]
-        held = np.sqrt(damping) * np.diag(np.linalg.norm(by, axis=0))
-        system, right = np.vstack([by, held]), np.append(by @ point - left, held @ point)
-        return solve_constrained(system, right, sides, least)[0]
+        target = by @ point - left
+        return solve_constrained(by, target, sides, least, ridge=damping, near=point)
 
     costs: list[float] = []
     found = levenberg_marquardt(errors, step, start, 60, lambda _, cost: costs.append(cost))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.optimize import lsq_linear
+from scipy.optimize import LinearConstraint, lsq_linear, minimize, nnls
 
 from mckibben.errors import ModelError
 from mckibben.numerics.least_squares import solve_bounded, solve_constrained, solve_products
@@ -73,17 +73,29 @@ def test_products_without_an_effect_have_no_weight() -> None:
     np.testing.assert_allclose(found, [2.0, 0.0], atol=1e-9)
 
 
-def test_constrained_solutions_satisfy_the_conditions_of_an_optimum() -> None:
+def test_constrained_solutions_are_those_of_scipy() -> None:
     rng = np.random.default_rng(0)
     columns, target = rng.standard_normal((40, 6)), rng.standard_normal(40)
     sides, least = rng.standard_normal((9, 6)), 0.3 * rng.standard_normal(9)
-    x, pressed = solve_constrained(columns, target, sides, least)
-    assert (sides @ x - least > -1e-12).all()
-    assert (pressed >= 0).all()
-    np.testing.assert_allclose(pressed * (sides @ x - least), 0.0, atol=1e-9)
-    np.testing.assert_allclose(columns.T @ (columns @ x - target), sides.T @ pressed, atol=1e-9)
-    x, pressed = solve_constrained(columns, target, np.eye(6), np.zeros(6))
-    assert (pressed > 0).any()
-    assert (x[pressed > 0] == 0.0).all()
+    sides[4], least[4] = 0.0, 1.0  # asks for nothing
+    near, effects = rng.standard_normal(6), (columns**2).sum(axis=0)
+
+    def cost(x: np.ndarray) -> float:
+        return float(((columns @ x - target) ** 2).sum() + 0.1 * effects @ (x - near) ** 2)
+
+    asked = LinearConstraint(np.delete(sides, 4, axis=0), np.delete(least, 4))
+    reference = minimize(cost, near, method="SLSQP", constraints=asked, tol=1e-14).x
+    x = solve_constrained(columns, target, sides, least, ridge=0.1, near=near)
+    assert (np.delete(sides @ x - least, 4) > -1e-12).all()
+    np.testing.assert_allclose(x, reference, atol=1e-6)
+    assert cost(x) == pytest.approx(cost(reference), rel=1e-9)
+
+
+def test_bounds_hold_to_the_bit_and_contradictions_are_refused() -> None:
+    rng = np.random.default_rng(0)
+    columns, target = rng.standard_normal((40, 6)), rng.standard_normal(40)
+    x = solve_constrained(columns, target, np.eye(6), np.zeros(6))
+    np.testing.assert_allclose(x, nnls(columns, target)[0], atol=1e-12)
+    assert (x[nnls(columns, target)[0] == 0.0] == 0.0).all()
     with pytest.raises(ModelError):
         solve_constrained(columns, target, np.eye(6)[[0, 0]] * [[1.0], [-1.0]], np.ones(2))

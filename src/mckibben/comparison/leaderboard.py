@@ -475,7 +475,8 @@ def doubts_of(
     second = next((row for row in sound if row.validation_rmse is not None), None)
     if second is not None and best.validation_rmse is not None and errors.size >= FEWEST_PARTS:
         ratios = np.log(_counted(second)) - np.log(_counted(best))
-        low, high = _interval(ratios)
+        half = half_interval(ratios, LEVEL)
+        low, high = ratios.mean() - half, ratios.mean() + half
         if low <= 0:
             places = int(np.argmax(np.abs(ratios)))
             ends = float(np.exp(low)), float(np.exp(high))
@@ -488,9 +489,3 @@ def _counted(row: Row) -> Array:
     """Return the errors on all parts as they count in the choice."""
     least = np.finfo(float).tiny
     return np.asarray(np.maximum(row.validation_by_part, least) * (CAUTION if row.doubted else 1.0))
-
-
-def _interval(values: Array) -> tuple[float, float]:
-    """Return the interval of the mean of independent values, by Student's t."""
-    mean, half = float(values.mean()), half_interval(values, LEVEL)
-    return mean - half, mean + half

@@ -118,11 +118,8 @@ def branch_gaps(u: Array, y: Array) -> Array:
         piece = slice(start, stop)
         order = np.argsort(u[piece], kind="stable")
         along, values = u[piece][order], y[piece][order]
-        inside = (levels >= along[0]) & (levels <= along[-1])
-        at = np.full((LEVELS, y.shape[1]), np.nan)
-        for column in range(y.shape[1]):
-            at[inside, column] = np.interp(levels[inside], along, values[:, column])
-        crossings.append((direction, at))
+        at = [np.interp(levels, along, column, np.nan, np.nan) for column in values.T]
+        crossings.append((direction, np.column_stack(at)))
     gaps = [
         (after - before) if first > 0 else (before - after)
         for (first, before), (second, after) in pairwise(crossings)

@@ -8,7 +8,6 @@ Source: Marquardt, "An algorithm for least-squares estimation of nonlinear param
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Literal
 
 import numpy as np
 
@@ -20,9 +19,6 @@ Errors = Callable[[Array], tuple[Array, Callable[[], Array]]]
 """From parameters, shape (p,), to errors, shape (n,), and a function to their derivatives there, shape
 (n, p). That is called for points from which a search goes on, right after their errors.
 """
-
-Path = list[tuple[Array, float]]
-"""Parameters and their sums of squares, which decrease."""
 
 MARGIN = 1e-9
 """Smallest distance of a start from the bounds, relative to their width."""
@@ -46,9 +42,9 @@ def trust_region(
     *,
     least_gain: float,
     max_evaluations: int,
-    scale: Array | Literal["jac"] = "jac",
+    scale: Array | None = None,
     bounds: tuple[Array, Array] | None = None,
-) -> Path:
+) -> list[tuple[Array, float]]:
     """Return the start, then the points of decreasing cost of the search.
 
     Parameters
@@ -60,22 +56,22 @@ def trust_region(
         Share of the sum of squares that a step has to gain for another to follow.
     max_evaluations : int
         Of the errors.
-    scale : array, shape (p,), or "jac"
-        How far each parameter may move at first; or by the sizes of the derivatives. Within bounds, it
-        is their width.
+    scale : array, shape (p,), optional
+        How far each parameter may move at first; within bounds it is their width. Default: by the sizes
+        of the derivatives.
     bounds : (array, array), shapes (p,), optional
         Of the parameters.
 
     Returns
     -------
     list of (array of shape (p,), float)
-        The start alone where its errors are zero or not finite.
+        Parameters and their sums of squares: the start alone where its errors are zero or not finite.
     """
     from scipy.optimize import least_squares
 
     # relative errors of relative parameters, so that nothing depends on a unit
     origin, limits = np.zeros(start.size), (-np.inf, np.inf)
-    sizes = np.ones(start.size) if isinstance(scale, str) else scale
+    sizes = np.ones(start.size) if scale is None else scale
     if bounds is not None:
         origin, sizes, limits = bounds[0], bounds[1] - bounds[0], (0.0, 1.0)
         start = origin + sizes * np.clip((start - origin) / sizes, MARGIN, 1.0 - MARGIN)
@@ -84,7 +80,7 @@ def trust_region(
     if not 0.0 < first < np.inf:
         return [(start, first)]
     unit, known = np.sqrt(first / last[0].size), True
-    path: Path = []
+    path: list[tuple[Array, float]] = []
 
     def errors_at(z: Array) -> Array:
         nonlocal last, known
@@ -102,7 +98,7 @@ def trust_region(
         (start - origin) / sizes,
         slopes_at,
         bounds=limits,
-        x_scale=scale if bounds is None and isinstance(scale, str) else 1.0,
+        x_scale="jac" if bounds is None and scale is None else 1.0,
         ftol=least_gain,
         xtol=SHORTEST,
         gtol=None,

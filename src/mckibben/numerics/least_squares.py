@@ -80,7 +80,7 @@ def solve_products(
     Parameters
     ----------
     products : array, shape (k, width + m, width + m)
-        Of the columns, and of the m targets behind them.
+        Of the columns, and of the m targets behind them; those of the targets are not needed.
     width : int
         Number of columns.
     ridge : float or array, shape (width,)
@@ -110,11 +110,13 @@ def solve_products(
     b = products[:, order, width:] / size
     if near is not None:
         b += damping[:, np.newaxis] * size * near[order, np.newaxis]
+    if first == width:
+        return np.asarray(np.linalg.solve(a, b) / size)
     lower = np.linalg.cholesky(a)
     upper = lower.transpose(0, 2, 1)
     found = np.linalg.solve(lower, b)
     for one, root in zip(found, upper, strict=True):
-        for x in one.T if first < width else ():
+        for x in one.T:
             x[first:] = nnls(root[first:, first:], x[first:], maxiter=100 * width)[0]
     rest = found[:, :first] - upper[:, :first, first:] @ found[:, first:]
     found[:, :first] = np.linalg.solve(upper[:, :first, :first], rest)
@@ -122,8 +124,14 @@ def solve_products(
 
 
 def solve_constrained(
-    columns: Array, target: Array, sides: Array, least: Array
-) -> tuple[Array, Array]:
+    columns: Array,
+    target: Array,
+    sides: Array,
+    least: Array,
+    *,
+    ridge: float = 0.0,
+    near: Array | None = None,
+) -> Array:
     """Return x with the least |columns x - target| of those with sides x >= least.
 
     By least-distance programming.
@@ -131,15 +139,18 @@ def solve_constrained(
     Parameters
     ----------
     columns : array, shape (n, p)
-        Of full column rank: a ridge sees to that.
+        Of full column rank, unless there is a ridge.
     target : array, shape (n,)
     sides, least : arrays, shapes (m, p) and (m,)
+        Sides that are 0 ask for nothing.
+    ridge : float
+        Damping by each coefficient's own effect.
+    near : array, shape (p,), optional
+        Towards what coefficients are damped; default 0.
 
     Returns
     -------
-    x : array, shape (p,)
-    pressed : array, shape (m,)
-        Multipliers: positive for inequalities that hold the solution back.
+    array, shape (p,)
 
     Raises
     ------
@@ -149,19 +160,21 @@ def solve_constrained(
     from scipy.linalg import solve_triangular
     from scipy.optimize import nnls
 
-    p = columns.shape[1]
-    size = _sizes(columns)
-    triangle: Array = np.linalg.qr(np.column_stack([columns / size, target]), mode="r")  # type: ignore[assignment]
+    p, asks = columns.shape[1], sides.any(axis=1)
+    size = np.sqrt((columns**2).sum(axis=0))
+    size[~(size > 0.0)] = 1.0
+    damping = np.sqrt(ridge) * np.eye(p)
+    right = np.append(target, np.zeros(p) if near is None else damping @ (size * near))
+    table = np.column_stack([np.vstack([columns / size, damping]), right])
+    triangle: Array = np.linalg.qr(table, mode="r")  # type: ignore[assignment]
     upper, right = triangle[:p, :p], triangle[:p, p]
-    free = solve_triangular(upper, right)
-    if not len(sides):
-        return free / size, np.zeros(0)
-    turned = solve_triangular(upper, (sides / size).T, trans="T").T
+    sides, least = sides[asks] / size, least[asks]
+    turned = solve_triangular(upper, sides.T, trans="T").T
     lengths = _sizes(turned.T)
     turned = turned / lengths[:, np.newaxis]
     lacking = least / lengths - turned @ right
     if (lacking <= 0).all():
-        return free / size, np.zeros(len(sides))
+        return np.asarray(solve_triangular(upper, right) / size)
     unit = float(np.abs(lacking).max())
     dual = np.vstack([turned.T, lacking / unit])
     goal = np.zeros(p + 1)
@@ -173,12 +186,11 @@ def solve_constrained(
             "no parameters satisfy all that physics asks of them",
             remedy="give recordings of a wider range",
         )
-    shift = -residual[:p] / residual[p] * unit
-    x = solve_triangular(upper, right + shift) / size
+    x: Array = solve_triangular(upper, right - residual[:p] / residual[p] * unit)
     bounds = np.flatnonzero((np.count_nonzero(sides, axis=1) == 1) & (pressed > 0))
     bounded = np.abs(sides[bounds]).argmax(axis=1)
     x[bounded] = least[bounds] / sides[bounds, bounded]  # to the bit: 0, where rounding left 1e-17
-    return x, pressed / residual[p] * unit / lengths
+    return x / size
 
 
 def _sizes(columns: Array) -> Array:

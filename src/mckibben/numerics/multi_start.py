@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,22 +29,6 @@ class Choice:
     values: Array
 
 
-def exchange(cost: Callable[[Array], float], start: Array, choices: Sequence[Choice]) -> Array:
-    """Return the best point after exchanging group after group, or the start if none is better.
-
-    It leaves local minima from which no small step leads on.
-    """
-    best, least = start, cost(start)
-    for choice in choices:
-        held = best
-        for values in choice.values:
-            tried = held.copy()
-            tried[choice.places] = values
-            if (found := cost(tried)) < least:
-                best, least = tried, found
-    return best
-
-
 def multi_start(
     errors: Errors,
     starts: Sequence[Array],
@@ -57,32 +42,31 @@ def multi_start(
     """Return the best point after refining the most promising of many starts within bounds.
 
     Every start is evaluated once; the best ``n_refined`` are refined in a trust region. Where there are
-    choices, the best is then improved by exchange, and refined again.
+    choices, they are tried group after group, which leaves local minima from which no small step leads
+    on, and the best is refined again.
     """
     tracked = tracker.watched(errors)
 
-    def cost(point: Array) -> float:
-        return rms(tracked(point)[0])
-
     def evaluated(start: Array) -> tuple[Array, float]:
         inside = np.clip(start, *bounds)
-        return inside, cost(inside)
+        return inside, rms(tracked(inside)[0])
 
-    def refine(start: Array) -> None:
-        trust_region(
-            tracked, start, bounds=bounds, least_gain=LEAST_GAIN, max_evaluations=max_evaluations
-        )
-
+    refine = partial(
+        trust_region, tracked, bounds=bounds, least_gain=LEAST_GAIN, max_evaluations=max_evaluations
+    )
     follow_best(starts, evaluated, refine, n_refined)
     for _ in range(EXCHANGES if choices else 0):
-        assert tracker.best is not None
-        best = tracker.best
-        better = exchange(cost, best, choices)
-        if better is best:
+        least = tracker.best_cost
+        for choice in choices:
+            held = tracker.found
+            for values in choice.values:
+                tried = held.copy()
+                tried[choice.places] = values
+                tracked(tried)
+        if not tracker.best_cost < least:
             break
-        refine(better)
-    assert tracker.best is not None
-    return tracker.best
+        refine(tracker.found)
+    return tracker.found
 
 
 def follow_best(

@@ -81,5 +81,4 @@ def particle_swarm(
         )
         velocity = np.clip(velocity, -swarm.fastest * span, swarm.fastest * span)
         position = np.clip(position + velocity, lower, upper)
-    assert tracker.best is not None
-    return tracker.best
+    return tracker.found

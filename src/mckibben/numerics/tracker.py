@@ -29,8 +29,17 @@ class Tracker:
     near: Array | None = None
     """Result of a search on nearly the same data, from which the next one goes on."""
 
+    whole: Tracker | None = None
+    """That of which this one is a part."""
+
     notes: list[str] = field(default_factory=list)
     """Notes for the user on the result."""
+
+    @property
+    def found(self) -> Array:
+        """The best point; there has been one."""
+        assert self.best is not None
+        return self.best
 
     def reached(self, share: float) -> None:
         """Report the share of the work done."""
@@ -40,32 +49,30 @@ class Tracker:
     def part(self, first: float, last: float) -> Tracker:
         """Return a tracker of a part of the work, between two shares of it.
 
-        It keeps a best of its own.
+        It keeps a best of its own; its evaluations are those of the whole, too.
         """
 
         def report(share: float, best: float) -> None:
             if self.progress is not None:
                 self.progress(first + (last - first) * share, best)
 
-        return Tracker(progress=report, budget=self.budget)
-
-    def update_from(self, part: Tracker) -> None:
-        """Register a finished part, without its best point."""
-        self.evaluations += part.evaluations
+        return Tracker(progress=report, budget=self.budget, whole=self)
 
     def watched(self, errors: Errors, unit: float = 1.0) -> Errors:
         """Return the same function, which registers every evaluation, its errors in a unit."""
 
-        def found(point: Array) -> tuple[Array, Callable[[], Array]]:
-            given = errors(point)
-            self.update(point, unit * rms(given[0]))
-            return given
+        def watched(point: Array) -> tuple[Array, Callable[[], Array]]:
+            found = errors(point)
+            self.update(point, unit * rms(found[0]))
+            return found
 
-        return found
+        return watched
 
     def update(self, point: Array, cost: float) -> None:
         """Register one evaluation."""
-        self.evaluations += 1
+        one: Tracker | None = self
+        while one is not None:
+            one.evaluations, one = one.evaluations + 1, one.whole
         if cost < self.best_cost:
             self.best_cost, self.best = cost, np.array(point)
         if self.progress is not None and self.evaluations % 16 == 0:

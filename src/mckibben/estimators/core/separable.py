@@ -174,17 +174,14 @@ class SeparableEstimator(Estimator):
                 max_evaluations=most,
                 choices=self.choices(data),
             )
-        own, whole = tracker.part(0.9, 1.0), data.thinned(POLISH_SAMPLES)
-        start = np.clip(theta, lower, upper)
         tracker.near = multi_start(
-            self._errors(whole),
-            [start],
+            self._errors(data.thinned(POLISH_SAMPLES)),
+            [theta],
             ends,
-            own,
+            tracker.part(0.9, 1.0),
             n_refined=1,
             max_evaluations=self.polish_evaluations,
         )
-        tracker.update_from(own)
         return tracker.near
 
     def _scattered(self, lower: Array, upper: Array) -> list[Array]:
@@ -247,7 +244,6 @@ class SeparableEstimator(Estimator):
             own = tracker.part(place / len(values), (place + 1) / len(values))
             settings = self.get_params() | {setting: value}
             found.append((type(self)(**settings).identify(data, own), own))
-            tracker.update_from(own)
         block, best = min(found, key=lambda item: item[1].best_cost)
         tracker.best_cost, tracker.best = best.best_cost, best.best
         return block

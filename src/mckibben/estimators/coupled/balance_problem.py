@@ -324,24 +324,19 @@ class Problem:
         scaling[narrowing] = means
         flat = (table * weight[..., np.newaxis]).reshape(-1, table.shape[2])
         triangle: Array = np.linalg.qr(flat, mode="r")  # type: ignore[assignment]
-        size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
-        system = np.vstack(
-            [triangle[:, :-1], np.sqrt(RIDGE) * np.diag(np.where(size > 0.0, size, 1.0))]
-        )
-        right = np.append(triangle[:, -1], np.zeros(size.size))
         sides, bounds = structure.constraints(structure.expanded(start[: len(terms)]))
         mix = structure.mix[:, chosen] + np.outer(structure.base, scaling)
 
         def asked(side: Array, bound: Array) -> tuple[Array, Array]:
             on = side @ mix - np.outer(bound, scaling)
             return np.hstack(
-                [on, np.zeros((len(on), size.size - chosen.size))]
+                [on, np.zeros((len(on), bounded.size - chosen.size))]
             ), bound - side @ structure.base
 
         sides, bounds = asked(sides, bounds)
+        by, right = triangle[:, :-1], triangle[:, -1]
         for _ in range(MOST_CUTS):
-            asks = (sides != 0).any(axis=1)
-            put(solve_constrained(system, right, sides[asks], bounds[asks])[0])
+            put(solve_constrained(by, right, sides, bounds, ridge=RIDGE))
             side, softest = structure.softest(structure.base + structure.mix @ start[:n])
             if softest >= 0.5 * structure.least_stiffness:
                 break

@@ -142,19 +142,16 @@ class Search:
         n = structure.mix.shape[1]
         size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
         known = self._known(free, size)
-        free, size, reduced = free[known], size[known], triangle[:, np.append(known, True)]
-        held = np.sqrt(max(damping, LIGHTEST)) * size
-        reduced[:, -1] = reduced[:, :-1] @ z[free] - reduced[:, -1]
-        system = np.vstack([reduced[:, :-1], np.diag(held)])
-        right = np.append(reduced[:, -1], held * z[free])
+        free, reduced = free[known], triangle[:, np.append(known, True)]
+        target = reduced[:, :-1] @ z[free] - reduced[:, -1]
+        others = np.ones(z.size, dtype=bool)
+        others[free] = False
+        solve = partial(solve_constrained, ridge=max(damping, LIGHTEST), near=z[free])
         sides, least = self._conditions(z)
         tried = z.copy()
         for _ in range(MOST_CUTS):
-            others = np.ones(z.size, dtype=bool)
-            others[free] = False
             missing = least - sides[:, others] @ z[others]
-            asks = (sides[:, free] != 0).any(axis=1)  # not only of what stays
-            tried[free] = solve_constrained(system, right, sides[asks][:, free], missing[asks])[0]
+            tried[free] = solve(reduced[:, :-1], target, sides[:, free], missing)
             linear = structure.base + structure.mix @ tried[:n]
             side, softest = structure.softest(linear)
             if softest >= 0.5 * structure.least_stiffness:

@@ -303,6 +303,4 @@ class RecurrentProblem:
             return np.array([cost(place) for place in places])
 
         own = tracker.part(0.1, 0.9)
-        found = particle_swarm(costs, lower, upper, SWARM, own, rng, start=start)
-        tracker.update_from(own)
-        return split(found)
+        return split(particle_swarm(costs, lower, upper, SWARM, own, rng, start=start))

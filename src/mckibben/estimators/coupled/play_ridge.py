@@ -154,11 +154,8 @@ def readout_of(sums: Array, width: int, penalties: Sequence[float]) -> Array:
     penalties : sequence of m float
         Relative to the diagonal of ``sums``.
     """
-    readout = [
-        solve_products(sums[np.newaxis], width, _damping(width, one))[0, :, k]
-        for k, one in enumerate(penalties)
-    ]
-    return np.array(readout)
+    found = [solve_products(sums[np.newaxis], width, _damping(width, one))[0] for one in penalties]
+    return np.array([readout[:, k] for k, readout in enumerate(found)])
 
 
 def _damping(width: int, penalty: float) -> Array:

@@ -163,7 +163,6 @@ class SDCHMEstimator(CoupledEstimator):
         for number in range(rounds):
             own = tracker.part(*(0.25 + 0.75 * (number + end) / rounds for end in (0, 1)))
             network = self.network(x, np.concatenate(target), driven, data, own)
-            tracker.update_from(own)
             parts = (*front, network)
             if not self.n_friction:
                 break

@@ -101,7 +101,6 @@ class AirEstimator(SeparableEstimator):
                 # the number of fits is unknown: each is 30 % of the work that is left
                 part = tracker.part(1 - 0.7 ** len(fits), 1 - 0.7 ** (len(fits) + 1))
                 fits[delay] = self._fit_delay(delay, data, part)
-                tracker.update_from(part)
             best = min(fits, key=lambda delay: fits[delay][0])
             nearest = (best - 1, best + 1, best - 2, best + 2)
             candidates = [d for d in nearest if 0 <= d <= longest and d not in fits][:2]
@@ -190,7 +189,6 @@ class AirEstimator(SeparableEstimator):
         part = tracker.part(0.9, 1.0)
         errors = by_differences(residuals, DIFFERENCE * (upper - lower))
         best = multi_start(errors, [start], (lower, upper), part, n_refined=1, max_evaluations=40)
-        tracker.update_from(part)
         without = best.copy()
         without[2] = 0.0
         error, error_without = (np.sqrt(np.mean(residuals(p) ** 2)) for p in (best, without))

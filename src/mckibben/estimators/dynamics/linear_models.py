@@ -163,7 +163,6 @@ class PredictionErrorEstimator(Estimator):
             runs = tuple(replace(run, outputs=run.outputs[:, [place]]) for run in data.runs)
             own = tracker.part(place * share, (place + 1) * share)
             parts += self._of_output(replace(data, runs=runs, outputs=(output,)), own)
-            tracker.update_from(own)
         return parts[0] if self.single else Parallel(tuple(parts))
 
     def _of_output(self, data: TrainingData, tracker: Tracker) -> tuple[TransferFunction, ...]:
@@ -206,7 +205,6 @@ class PredictionErrorEstimator(Estimator):
             if plant != orders:
                 own = tracker.part(0.5, 1.0)
                 theta = minimise(runs, orders, [with_noise(theta, orders, runs)], own, start)
-                tracker.update_from(own)
                 tracker.best, tracker.best_cost = own.best, own.best_cost
         deviation = wanted * evaluate(theta, orders, runs, start)[2]
         theta[: orders.zeros] *= np.repeat(wanted / given, orders.b)

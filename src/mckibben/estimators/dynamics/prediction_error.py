@@ -359,13 +359,9 @@ def minimise(
         found, squares = search(theta, max_evaluations=FIRST_STEPS)[-1]
         return found, float(np.sqrt(squares))
 
-    def followed(theta: Array) -> None:
-        search(theta, max_evaluations=STEPS)
-
     starting = (theta for theta in starts if admissible(theta, orders))
-    follow_best(starting, first_steps, followed, FOLLOWED, SAME)
-    assert tracker.best is not None
-    return tracker.best
+    follow_best(starting, first_steps, partial(search, max_evaluations=STEPS), FOLLOWED, SAME)
+    return tracker.found
 
 
 def arx(runs: Sequence[Run], orders: Orders) -> Array:

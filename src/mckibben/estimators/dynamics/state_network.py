@@ -206,8 +206,7 @@ class StateNetworkEstimator(SearchEstimator):
                 channel=data.inputs[0].name,
                 remedy="choose another seed, or record at a higher rate",
             )
-        assert tracker.best is not None
-        return template.unpack(tracker.best)
+        return template.unpack(tracker.found)
 
     def start(self, linear: ProcessModel, data: TrainingData, substeps: int) -> StateNetwork:
         """Return the initial network of the descent."""

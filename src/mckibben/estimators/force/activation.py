@@ -23,6 +23,7 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators, SearchEstimator
 from mckibben.estimators.core.separable import DIFFERENCE, SeparableEstimator
 from mckibben.numerics.descent import Errors, by_differences, trust_region
+from mckibben.numerics.least_squares import solve_bounded
 from mckibben.numerics.tracker import Tracker
 from mckibben.signals.reversals import reversals
 
@@ -121,9 +122,7 @@ class ActivationMemoryEstimator(SeparableEstimator):
             [np.full(y.size, 1.0 / max(float(np.ptp(y)), 1e-9)) for y in parts]
         )
         columns = np.column_stack([np.ones(len(matrix)), matrix]) * weights[:, np.newaxis]
-        size = np.linalg.norm(columns, axis=0)
-        size[size == 0] = 1.0
-        found = np.linalg.lstsq(columns / size, data.target * weights, rcond=1e-10)[0] / size
+        found, _ = solve_bounded(columns, data.target * weights, with_offset=False)
         return found[1:], float(found[0])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:

@@ -14,13 +14,14 @@ from mckibben.channels import Channels
 from mckibben.comparison.choosing import CAUTION
 from mckibben.comparison.doubts import Span, doubts_of
 from mckibben.comparison.leaderboard import Row
-from mckibben.comparison.parts import N_PARTS, parts_of, spans_of
+from mckibben.comparison.planning import spans_of
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.leaving_out import MOST_FREE, held_out
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.metrics import Scores
 from mckibben.registry import load
 from mckibben.signals import irregular_triangle, triangle
+from mckibben.splits import N_PARTS, parts_of
 
 CHANNELS = Channels(("pressure",), ("displacement",))
 STEP = 0.02

@@ -15,7 +15,7 @@ SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
     {"errors", "arrays", "registry", "presets", "numerals", "version", "system"},
-    {"recording", "signals", "channels", "metrics", "statistics"},
+    {"recording", "signals", "channels", "metrics", "statistics", "splits"},
     {"files"},
     {"rigs"},
     {"blocks"},
@@ -23,7 +23,8 @@ LAYERS = (
     {"estimators", "export", "stream", "link", "outputs", "checkpoints", "example"},
     {"control"},
     {"environments"},
-    {"comparison", "diagnosis"},
+    {"diagnosis"},
+    {"comparison"},
     {"planning"},
     {"options"},
     {"reading"},

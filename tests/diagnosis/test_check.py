@@ -11,9 +11,9 @@ from scipy.signal import lfilter
 
 from mckibben import PI, DataError, Recording
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.comparison.choosing import USEFUL
 from mckibben.diagnosis.check import check, check_runs
 from mckibben.diagnosis.free_runs import Run
+from mckibben.metrics import USEFUL
 from mckibben.signals import staircase
 from tests.diagnosis.runs import LINE, STEP, TRUE, Array, cycles, noise, recording, run
 

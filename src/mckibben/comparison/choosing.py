@@ -8,6 +8,7 @@ from typing import Literal, Protocol, TypeVar
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.metrics import useful
 from mckibben.statistics import RESAMPLES
 
 CONSTANT = "constant"
@@ -17,9 +18,6 @@ CAUTION = 2.0
 """Factor on the ranking error of a model that is reliable only near its training data, or whose error is
 that of the fit.
 """
-
-USEFUL = 0.9
-"""Test error, relative to that of the constant, above which no model is recommended."""
 
 Against = Literal["validation", "test"]
 """The data on which no model is clearly better than the constant, so that none is recommended."""
@@ -105,11 +103,6 @@ def acceptable(row: Ranked, constant: Ranked | None) -> bool:
 
 def _beats(row: Ranked, constant: Ranked) -> bool:
     return useful(row.test_error, constant.test_error)
-
-
-def useful(error: float, constant: float) -> bool:
-    """Return whether an error is clearly smaller than that of the constant on the same samples."""
-    return error < USEFUL * constant
 
 
 def skill_of(squares: Array, constant: Array, seed: int) -> tuple[float, float]:

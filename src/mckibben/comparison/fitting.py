@@ -17,8 +17,6 @@ from mckibben.blocks.free_run import run_free
 from mckibben.channels import Channels
 from mckibben.comparison.choosing import CONSTANT, skill_of
 from mckibben.comparison.leaderboard import Row, Validated
-from mckibben.comparison.parts import Part
-from mckibben.comparison.splits import Split
 from mckibben.diagnosis.bands import Held
 from mckibben.diagnosis.branch_gaps import Memory, memory_test
 from mckibben.errors import MckibbenError, unforeseen
@@ -26,6 +24,7 @@ from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.leaving_out import held_out
 from mckibben.metrics import Scores, mean_scores, score
 from mckibben.recording import Recording
+from mckibben.splits import Part, Split
 from mckibben.system import workers
 from mckibben.system.threads import cores
 from mckibben.system.workers import Outcome

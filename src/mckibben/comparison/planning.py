@@ -14,10 +14,9 @@ from mckibben import registry
 from mckibben.channels import Channels, Names, channels_of
 from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.choosing import CONSTANT
+from mckibben.comparison.doubts import Span
 from mckibben.comparison.fitting import Candidate, Constant, Data, constant_of
 from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.comparison.parts import parts_of, spans_of
-from mckibben.comparison.splits import Split, split_of
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.catalogue import declared, settings_of_all
 from mckibben.estimators.core.estimator import Estimator
@@ -25,6 +24,7 @@ from mckibben.numerals import counted
 from mckibben.recording import Recording, listed, reading_notes
 from mckibben.signals import made_manageable
 from mckibben.signals.shared_rows import check_shared
+from mckibben.splits import Part, Split, parts_of, split_of
 
 Models = str | Sequence[str] | Mapping[str, str | Estimator]
 """Models of a comparison: "all", "quick", short names, or labels with short names or estimators."""
@@ -240,3 +240,13 @@ def _timeless(estimator: type[Estimator], recordings: Sequence[Recording]) -> st
         return None
     more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
     return f"it needs time, and {missing[0]}{more} has none: give a rate, or a column of times"
+
+
+def spans_of(part: Part, recordings: Sequence[Recording]) -> tuple[Span, ...]:
+    """Return what a part has of each recording."""
+    found = []
+    for recording, rows in zip(recordings, part, strict=True):
+        times, unit = recording.time[rows], "" if recording.sample_time is None else "s"
+        if times.size:
+            found.append(Span(recording.name, float(times[0]), float(times[-1]), unit))
+    return tuple(found)

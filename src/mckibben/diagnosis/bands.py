@@ -30,7 +30,7 @@ from mckibben.statistics import block_length, correlation_length
 from mckibben.system.progress import Tell, one_by_one, telling
 
 if TYPE_CHECKING:
-    from mckibben.comparison.splits import Split
+    from mckibben.splits import Split
 
 Unit = Literal["auto", "run", "block"]
 

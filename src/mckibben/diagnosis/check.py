@@ -11,10 +11,10 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
-from mckibben.comparison.choosing import useful
 from mckibben.diagnosis.causes import Cause, averaged, block_length, causes
 from mckibben.diagnosis.description import ModelDescription
 from mckibben.diagnosis.free_runs import Run, runs_of
+from mckibben.metrics import useful
 from mckibben.recording import Recording, listed
 from mckibben.statistics import NORMAL_95, correlation_length
 from mckibben.system.progress import Tell, one_by_one, telling
@@ -143,7 +143,7 @@ class OutputCheck:
 
     @property
     def useless(self) -> bool:
-        """Whether the mean predicts about as well; see `mckibben.comparison.choosing.useful`."""
+        """Whether the mean predicts about as well; see `mckibben.metrics.useful`."""
         return not useful(self.rmse, self.mean_error)
 
     @property

@@ -16,11 +16,11 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.free_run import run_free
 from mckibben.blocks.inverse import Inverse
 from mckibben.channels import Channels
-from mckibben.comparison.parts import parts_of
 from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.estimators.catalogue import declared
 from mckibben.estimators.core.leaving_out import held_out
 from mckibben.recording import Recording
+from mckibben.splits import parts_of
 from mckibben.statistics import BlockBootstrap, correlation_length, interval
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.comparison.splits import Split
 from mckibben.diagnosis.check import Validation, check_runs
 from mckibben.diagnosis.free_runs import Run, check_usable
 from mckibben.errors import DataError
+from mckibben.splits import Split
 
 
 def check_on_test(

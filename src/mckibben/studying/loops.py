@@ -11,8 +11,7 @@ from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.control import UNCOMPENSATED, Tracked, before, control_law, track, tune_pid
 from mckibben.errors import DataError, MckibbenError
 from mckibben.recording import Recording
-from mckibben.rigs import Rig
-from mckibben.rigs.files import changes, recorded_on
+from mckibben.rigs.rig import Rig, changes, recorded_on
 
 LONGEST = 200.0
 """Longest motion that is tracked [s]."""

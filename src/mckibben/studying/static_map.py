@@ -9,8 +9,8 @@ from math import comb
 import numpy as np
 
 from mckibben.arrays import Array, Mask
-from mckibben.comparison.splits import Split
 from mckibben.recording import Recording
+from mckibben.splits import Split
 
 LARGEST_DEGREE, MOST_TERMS = 5, 60
 """Of the polynomial."""

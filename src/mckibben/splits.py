@@ -1,4 +1,4 @@
-"""Splits of data into fit and test."""
+"""Splits of data into fit and test, and parts of the training data left out in turn."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from mckibben.numerals import counted
 from mckibben.recording import Recording
 from mckibben.signals.reversals import reversals
 
-FEWEST = 10
-"""Smallest number of samples on either side of a split."""
+FEWEST_SAMPLES = 10
+"""Smallest number of samples on either side of a split, and of a part of a recording."""
 
 HELD_OUT = 0.25
 """Share of the input's travel that is held out by default."""
@@ -28,6 +28,12 @@ HARDLY = 0.2
 """Standard deviation of an output in a part, relative to the whole, below which the part counts as
 at rest.
 """
+
+N_PARTS = 8
+"""Number of parts; a few more where recordings are cut equally."""
+
+Part = tuple[Mask, ...]
+"""For every recording, the samples that a part has."""
 
 
 @dataclass(frozen=True)
@@ -180,9 +186,11 @@ def _cut(
         after.insert(0, before.pop())
     run, gone = before[-1], travels[-1]
     start = int(np.searchsorted(gone, gone[-1] - travel))
-    if start < FEWEST and len(before) > 1:  # nearly all of it, as of recordings equally long
+    if (
+        start < FEWEST_SAMPLES and len(before) > 1
+    ):  # nearly all of it, as of recordings equally long
         return before[:-1], None, [run, *after]
-    if min(start, len(run) - start) < FEWEST:
+    if min(start, len(run) - start) < FEWEST_SAMPLES:
         return before, None, after
     return before[:-1], (run, start), after
 
@@ -204,3 +212,42 @@ def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]
     repeat = [levels[:place].count(level) for place, level in enumerate(levels)]
     groups = [[place for place, k in enumerate(repeat) if k % n == one] for one in range(n)]
     return [group for group in groups if group] if min(map(levels.count, levels)) > 1 else []
+
+
+# -- parts of the training data that are left out in turn, to choose a model -------------------
+
+
+def parts_of(recordings: Sequence[Recording], channels: Channels) -> tuple[Part, ...]:
+    """Return the parts: blocks of time of fewer than `N_PARTS` recordings, else whole recordings.
+
+    These are dealt to the parts in the order of what is held in each of them, such as a load or a
+    length, so that every part has several levels, and repeats are in different parts. Samples bridged in
+    reading belong to none. There are none of too little data.
+    """
+    each = -(-N_PARTS // len(recordings))
+    pieces = [
+        (place, piece)
+        for place in _by_level(recordings, channels)
+        for piece in np.array_split(
+            np.arange(len(recordings[place])),
+            np.clip(len(recordings[place]) // FEWEST_SAMPLES, 1, each),
+        )
+    ]
+    count = len(pieces) if each > 1 else N_PARTS
+    measured = [~recording.bridged for recording in recordings]
+    parts = []
+    for first in range(count if count > 1 else 0):
+        rows = [np.zeros(len(recording), dtype=bool) for recording in recordings]
+        for place, piece in pieces[first::count]:
+            rows[place][piece] = measured[place][piece]
+        if any(kept.any() for kept in rows):
+            parts.append(tuple(rows))
+    return tuple(parts)
+
+
+def _by_level(recordings: Sequence[Recording], channels: Channels) -> list[int]:
+    """Return the indices of recordings, in the order of the channels that each of them holds."""
+    names = [name for name in channels.known(recordings) if all(name in r for r in recordings)]
+    held = [name for name in names if len(recordings) > 1 and held_at_levels(recordings, name)]
+    levels = [tuple(float(f"{r[name].mean():.3g}") for name in held) for r in recordings]
+    return sorted(range(len(recordings)), key=lambda place: levels[place])

@@ -23,10 +23,11 @@ import numpy as np
 
 import fuzzing
 from mckibben import Block, check_block
+from mckibben.blocks.base import run_many
 from mckibben.blocks.compose import Series
 from mckibben.blocks.laws import examples, input_limits, wander
-from mckibben.blocks.running import run_many
-from mckibben.blocks.saving import load, part_to_dict
+from mckibben.blocks.parameters import plain
+from mckibben.blocks.saving import load
 from mckibben.errors import MckibbenError
 from mckibben.export.c.project import c_files
 from mckibben.export.fmu.unit import fmu_files
@@ -220,7 +221,7 @@ def inverted(block: Block, inputs: Any, step: float) -> None:
     n = len(block.inputs) - len(block.scheduling)
     inverse.simulate(np.column_stack([outputs, inputs[:, n:]]), sample_time=step)
     inverse.reachable()
-    part_to_dict(inverse)
+    plain(inverse)
 
 
 SEED = [0]

@@ -18,9 +18,9 @@ import numpy as np
 from mckibben import Block
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive import Adaptive
+from mckibben.blocks.base import Stream
 from mckibben.blocks.laws import examples, input_limits, wander
 from mckibben.blocks.ranges import LARGEST
-from mckibben.blocks.running import Stream
 
 SAMPLE_TIME, SECOND, SAMPLES = 0.01, 100, 600
 GLITCHES, TIMES = (1e6, 1e30, np.nan, np.inf), (37, 211, 398)

@@ -14,7 +14,6 @@ from mckibben.blocks.dynamics.narx import NarxPolynomial
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.free_run import run_free
-from mckibben.blocks.starts import history, start_state
 from mckibben.recording import PERIODIC
 
 T = np.linspace(0, 1, 800)
@@ -35,9 +34,9 @@ def recorded(block: Block, u: np.ndarray) -> Recording:
 @pytest.mark.parametrize("block", [*MEMORY, *LINEAR], ids=lambda block: block.kind)
 def test_a_run_from_rest_begins_at_rest(block: Block) -> None:
     recording = recorded(block, U)
-    assert len(history(block, recording)) == 0
+    assert len(block.past(recording)) == 0
     np.testing.assert_array_equal(
-        start_state(block, recording), block.initial_state(U[:1], sample_time=0.01)
+        block.start_on(recording), block.initial_state(U[:1], sample_time=0.01)
     )
     np.testing.assert_array_equal(
         block.simulate(recording)["displacement"], recording["displacement"]
@@ -68,7 +67,7 @@ def test_a_model_of_past_outputs_has_had_the_first_one() -> None:
     block = NarxPolynomial.example()
     recording = recorded(block, U).with_channels(displacement=np.full(U.size, 3.0))
     centre, half = block.output_scale
-    state = start_state(block, recording)
+    state = block.start_on(recording)
     np.testing.assert_allclose(state[: block.output_lags], (3.0 - centre) / half)
 
 

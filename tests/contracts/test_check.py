@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import PI, Block, RateDependentPI, check_block
+from mckibben.blocks.base import Stream
 from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.laws import LAWS
-from mckibben.blocks.running import Stream
 from mckibben.errors import ContractError
 
 Array = NDArray[np.float64]

@@ -23,12 +23,11 @@ from mckibben import (
     load_rig,
     registry,
 )
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.feedback import FeedforwardFeedback, PIDFeedback
 from mckibben.blocks.fields import MEASURED
 from mckibben.blocks.laws import examples
-from mckibben.blocks.running import Stream
 from mckibben.control import (
     BlockController,
     DisturbanceObserver,

@@ -327,15 +327,16 @@ def read_run(workspace: Workspace, file: str) -> Recording:
 
 def plant_of(workspace: Workspace, plant: str) -> Any:
     """Return ``rig NAME``, or ``model NAME``; unknown limits are those recorded."""
+    from mckibben.blocks.ranges import known_ranges
     from mckibben.control import Twin
-    from mckibben.control.identified import known_ranges
     from mckibben.rigs import load_rig
 
     kind, _, name = plant.partition(" ")
     if kind == "rig":
         return load_rig(name)
     model, limits = workspace.model(name), {}
-    for channel in {c.name for c in model.inputs}.difference(known_ranges(model)):
+    known = known_ranges(model.inputs, model.known_inputs)
+    for channel in {channel.name for channel in model.inputs}.difference(known):
         values = recorded(workspace, channel)
         if np.ptp(values):
             limits[channel] = float(values.min()), float(values.max())

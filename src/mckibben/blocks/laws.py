@@ -413,9 +413,7 @@ def _late(trial: Trial, inverse: Block) -> int:
 
 
 def _state_after(block: Block, inputs: Array, sample_time: float) -> list[float]:
-    state = block.initial_state(inputs[0], sample_time=sample_time)
-    block.bind(sample_time, state, inputs, np.empty((len(inputs), len(block.outputs))))()
-    return list(map(float, state))
+    return [*map(float, block.run(inputs, sample_time, None)[1])]
 
 
 LAWS: tuple[Callable[[Trial], None], ...] = (

@@ -27,20 +27,15 @@ noise does not cause chatter.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block, Start
 from mckibben.blocks.hysteresis.play_operators import follow
 from mckibben.blocks.kernels import Step, fill, kernel, step
-
-if TYPE_CHECKING:
-    from mckibben.blocks.base import Block, Start
-    from mckibben.blocks.hysteresis.gpi import GPI
-    from mckibben.blocks.hysteresis.pi import PI
 
 
 @dataclass(frozen=True)
@@ -449,7 +444,9 @@ def take_over(aim: Array, used: Array, s: Array, y: float, travel: float, band: 
 
 
 def learnable_operators(
-    model: PI | GPI,
+    model: Block,
+    thresholds: Sequence[float],
+    weights: Sequence[float],
     limits: tuple[float, float],
     offset: float,
     step: Step,
@@ -461,17 +458,16 @@ def learnable_operators(
     Gain and friction are expected to change by 30 %, each weight by itself by 10 %, the offset by 30 %
     of the span; ``limits`` are the lowest and highest input of the operators.
     """
-    r, w = np.array(model.thresholds), np.array(model.weights)
+    r, w = np.array(thresholds), np.array(weights)
     n, size, width = len(w), np.abs(w), limits[1] - limits[0]
     span = float(np.sum(w) * (width if np.isfinite(width) else r.max() or 1.0))
-    weights, sliding = np.append(np.ones(n), 0.0), np.array([0.0, *np.ones(n - 1), 0.0])
-    together = 0.3**2 * np.outer(weights, weights) + 0.3**2 * np.outer(sliding, sliding)
+    all_weights, sliding = np.append(np.ones(n), 0.0), np.array([0.0, *np.ones(n - 1), 0.0])
+    together = 0.3**2 * np.outer(all_weights, all_weights) + 0.3**2 * np.outer(sliding, sliding)
     lowest = np.where(w >= 0, 0.0, -np.inf)
     least = np.concatenate([lowest, LEAST * np.cumsum(w)])  # of weights, then of partial sums
 
     def numbers(sample_time: float | None) -> Array:
-        own = model.inverse_numbers(model.coefficients(sample_time))
-        return np.concatenate([limits, least, own])
+        return np.concatenate([limits, least, model.inverse().coefficients(sample_time)])
 
     return Learnable(
         step,

@@ -22,7 +22,7 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Run, Start, explicit_state, needs_sample_time
+from mckibben.blocks.base import Block, Run, Start
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.fields import STRICT, Initial, drives
@@ -33,7 +33,9 @@ from mckibben.blocks.kernels import Step, fill, in_scratch, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.planning import clip_path, plan_path, plan_scratch
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
+from mckibben.blocks.starts import stated
 from mckibben.errors import ModelError
 
 NUDGE = 1e-3
@@ -427,7 +429,7 @@ class Predictive(Block):
     ) -> Array:
         """Return the initial state: as if its reference had always been applied."""
         if initial is not None and not isinstance(initial, str):
-            return explicit_state(self, initial)
+            return stated(self.kind, self.n_states, initial)
         own = model_state(self._inverse, self._inverse.initial_state(first, initial, sample_time))
         return np.concatenate([own, np.zeros(self.n_states - own.size)])
 

@@ -35,7 +35,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import Channel, vector
-from mckibben.blocks.ranges import input_bounds
 from mckibben.blocks.repetition import Repetition
 from mckibben.control.connecting import find
 from mckibben.errors import DataError, require
@@ -187,7 +186,7 @@ def learned(
     desired, measured = (_outputs(compensator, runs, prefix) for prefix in (DESIRED, ""))
     if not np.array_equal(desired, np.broadcast_to(desired[0], desired.shape)):
         raise DataError("repetitions have different references", remedy="repeat one motion")
-    bounds = input_bounds(compensator)
+    bounds = compensator.input_bounds
     lessons = [
         _Lesson.of(desired[0, :, k], measured[:, :, k], bounds[k], settle, repeats)
         for k in range(len(channels))

@@ -10,11 +10,10 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.fields import drives
 from mckibben.blocks.inverse import commands
-from mckibben.blocks.running import Stream
-from mckibben.control.identified import known_ranges
+from mckibben.blocks.ranges import known_ranges
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 
@@ -121,7 +120,9 @@ class Twin:
                     f"limits are {low:g} to {high:g}", channel=channel, remedy="give low, then high"
                 )
         self._given = given
-        known = {plain(n): Ends(*e) for n, e in known_ranges(model).items()}
+        known = {
+            plain(n): Ends(*e) for n, e in known_ranges(model.inputs, model.known_inputs).items()
+        }
         self._limits = known | given
         self._rest = np.empty(0)
         self._stream: Stream | None = None

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands import Band, Banded, inside
-from mckibben.blocks.base import Block, check_units
-from mckibben.blocks.fields import rows, vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import check_units, rows, vector
 from mckibben.blocks.free_run import refuse_runaway, run_free
 from mckibben.blocks.inverse import commands
 from mckibben.errors import DataError, ModelError

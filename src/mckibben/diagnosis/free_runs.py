@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, check_units
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import check_units
 from mckibben.blocks.free_run import refuse_runaway, run_free
 from mckibben.errors import DataError
 from mckibben.recording import Recording

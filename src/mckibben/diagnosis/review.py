@@ -19,7 +19,6 @@ from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import FeedforwardFeedback
 from mckibben.blocks.fields import MEASURED, Channel
-from mckibben.blocks.starts import start_state
 from mckibben.control.twin import COMMAND
 from mckibben.diagnosis.refit import Refit, refitted
 from mckibben.errors import DataError, ModelError, ModelWarning
@@ -253,7 +252,7 @@ def _link(log: Recording, model: Block, compensator: Block | None, inputs: Seque
     measured = [name for name in inputs if name in log]
     blind = {name: _shifted(log[COMMAND + name], 1.0) for name in inputs if name not in log}
     log = log.with_channels(**blind)
-    start = start_state(model, log).tolist()
+    start = model.start_on(log).tolist()
     modelled = model.simulate(log, initial=start)
     # all counts from time zero on; `track` begins before it
     scored = slice(int(np.argmax(log.time >= -ROUNDING)), len(log))

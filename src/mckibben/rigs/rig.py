@@ -1,7 +1,7 @@
 """A virtual rig: a validated set of physical parameters that can be run and stepped like hardware.
 
-Its parameters are in a file, one of the package's or the user's; a recording of it has in its ``meta`` how it
-differs from the published rig of its name, from which it can be rebuilt.
+Its parameters are in a file, one of the package's or the user's; a recording of it has in its ``meta``
+how it differs from the published rig of its name, from which it can be rebuilt.
 """
 
 from __future__ import annotations

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.fields import drives
 from mckibben.blocks.force.feedforward import compensator
-from mckibben.blocks.running import Stream
 from mckibben.comparison.choosing import acceptable
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.control.twin import COMMAND

@@ -12,7 +12,8 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import balance_in
 from mckibben.blocks.laws import wander
-from mckibben.control.identified import BEYOND, known_ranges
+from mckibben.blocks.ranges import known_ranges
+from mckibben.control.identified import BEYOND
 from mckibben.recording import Recording
 
 FAST = 0.99
@@ -108,7 +109,7 @@ class RecordedInputs:
         is not known are 0. The fastest motion runs through the range in 100 samples; they are 20 ms
         apart unless the model has a sample time of its own, or one is given [s].
         """
-        ranges = known_ranges(block)
+        ranges = known_ranges(block.inputs, block.known_inputs)
         if not any(channel.name in ranges for channel in block.inputs):
             return None
         names = tuple(channel.name for channel in block.inputs)

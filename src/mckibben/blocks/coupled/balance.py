@@ -31,7 +31,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Ports, Start, needs_sample_time
+from mckibben.blocks.base import SEVERAL, Block, Ports, Start
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.balance_adaptive import learnable_balance
 from mckibben.blocks.coupled.balance_law import (
@@ -52,6 +52,7 @@ from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.learning import Learnable
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.ranges import unknown
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError, ModelWarning
 
 

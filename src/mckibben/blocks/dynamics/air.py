@@ -28,10 +28,10 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import needs_sample_time
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, remember, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError, ModelWarning
 
 LONGEST_LAG = 1e6

@@ -25,10 +25,11 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, Start, own_sample_time
+from mckibben.blocks.base import Block, Start
 from mckibben.blocks.hysteresis.play_operators import check_order, start_operators
 from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.sample_times import own_sample_time
 from mckibben.errors import ModelError
 
 HEAD = 7

@@ -22,10 +22,12 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, needs_sample_time, one_per
+from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
 HEAD = 9

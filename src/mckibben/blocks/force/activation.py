@@ -18,10 +18,11 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, Ports, needs_sample_time, rate_filter
+from mckibben.blocks.base import Block, Ports
 from mckibben.blocks.hysteresis.play_operators import check_order
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.sample_times import needs_sample_time, rate_filter
 from mckibben.errors import ModelError
 
 PORTS: Ports = ("input",), ("force",), ("output",)

@@ -31,9 +31,11 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, needs_sample_time, one_per
+from mckibben.blocks.base import Block
 from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
 Direction = Literal["shared", "both", "lengthening", "shortening"]

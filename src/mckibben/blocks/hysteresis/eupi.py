@@ -20,11 +20,11 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import one_per
 from mckibben.blocks.hysteresis.play_operators import check_thresholds, start_operators
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import inlined, kernel
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
 from mckibben.blocks.solving import solved_kernels
 from mckibben.errors import ModelError
 

@@ -18,12 +18,12 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import one_per
 from mckibben.blocks.hysteresis.play_operators import check_thresholds
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.memoryless import least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
 from mckibben.blocks.solving import solve_input, solved_start
 
 

@@ -34,11 +34,12 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, Start, needs_sample_time
+from mckibben.blocks.base import Block, Start
 from mckibben.blocks.dynamics.repeating import Hold, Substeps
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import gathered
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
 HEAD = 7

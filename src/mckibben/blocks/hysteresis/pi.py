@@ -25,7 +25,6 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import needs_sample_time, one_per, rate_filter
 from mckibben.blocks.hysteresis.play_operators import (
     check_invertible_sum,
     check_thresholds,
@@ -43,6 +42,8 @@ from mckibben.blocks.learning import (
     start_learning,
 )
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
+from mckibben.blocks.sample_times import needs_sample_time, rate_filter
 from mckibben.blocks.solving import solved_kernels
 
 
@@ -182,6 +183,8 @@ class PI(Invertible):
         """Adaptive parameters: weights and offset."""
         return learnable_operators(
             self,
+            self.thresholds,
+            self.weights,
             self.input_limits,
             self.offset,
             pi_adaptive_step,

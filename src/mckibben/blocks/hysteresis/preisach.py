@@ -32,11 +32,10 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import one_per
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.parameters import Parametrised
+from mckibben.blocks.parameters import Parametrised, one_per
 from mckibben.blocks.solving import solved_kernels, solved_start
 from mckibben.errors import ModelError
 

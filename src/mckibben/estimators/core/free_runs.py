@@ -9,10 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from mckibben.arrays import Array, Mask
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, run_many
 from mckibben.blocks.free_run import run_free
-from mckibben.blocks.running import run_many
-from mckibben.blocks.starts import history, known_state
 from mckibben.metrics import rmse
 from mckibben.recording import Recording
 
@@ -78,8 +76,7 @@ class FreeRuns:
     def pasts(self) -> list[Array]:
         """Inputs before the first sample of every recording, shape (k, inputs) each."""
         return [
-            history(self.changed(self.block, place), known)
-            for place, known in enumerate(self.known)
+            self.changed(self.block, place).past(known) for place, known in enumerate(self.known)
         ]
 
     @cached_property
@@ -159,7 +156,7 @@ class FreeRuns:
                 continue
             inputs = recording.matrix(channel.name for channel in self.block.inputs)
             whole = np.ascontiguousarray(np.vstack([before, inputs]))
-            states = [known_state(block, self.known[place]) for block in own]
+            states = [block.known_state(self.known[place]) for block in own]
             if states[0] is None:
                 many = run_many(own, whole, sample_time=recording.sample_time)
             else:  # each from its own past outputs

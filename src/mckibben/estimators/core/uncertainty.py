@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
-from mckibben.blocks.running import run_many
+from mckibben.blocks.base import Block, run_many
 from mckibben.estimators.core.data import TrainingData, stretches
 from mckibben.estimators.core.free_runs import FreeRuns, relative_sizes
 from mckibben.statistics import Autoregression, autoregression

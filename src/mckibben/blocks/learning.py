@@ -89,6 +89,11 @@ relative to that, last measurement, and the prediction when that changed.
 
 READY, USUAL, SURPRISE, LAST, THEN = range(SENSES)
 
+N_LEARNED, SHARE, NOISE, SCALES = range(4)
+"""Places of the first coefficients of a learner: number of parameters, sample time / time, scatter of
+errors, and what `family_at` describes.
+"""
+
 GATE = 3.0
 """Innovation, in usual errors, beyond which a measurement counts as one of that size."""
 CORRELATED = 10.0
@@ -143,8 +148,9 @@ def learn(
     measured, predicted, asked : float
         The output, its prediction by ``theta``, and by the parameters that the inverse uses.
     """
-    p, share, noise = int(c[0]), c[1], c[2]
-    scales, widest, fresh = c[3 : 3 + p], c[3 + p : 3 + 2 * p], c[3 + 3 * p : family_at(c)]
+    p, share, noise = int(c[N_LEARNED]), c[SHARE], c[NOISE]
+    scales, widest = c[SCALES : SCALES + p], c[SCALES + p : SCALES + 2 * p]
+    fresh = c[SCALES + 3 * p : family_at(c)]
     theta, root = adapted[:p], adapted[2 * p : 2 * p + fresh.size]
     first = 2 * p + fresh.size + place * SENSES
     sense = adapted[first : first + SENSES]
@@ -186,12 +192,12 @@ def learn(
     lacks = r < settled  # as where errors have grown: then it adapts within the time
     excess = 1.0 / settled - 1.0 / r
     r *= weight
-    _spread(root, f, g, excess if lacks else weight * (1.0 - share - share / r))
+    update_root(root, f, g, excess if lacks else weight * (1.0 - share - share / r))
     gain = weight * error / scatter / (1.0 + r)
     for i in range(p):
         theta[i] += scales[i] * g[i] * gain
     turn = int(sense[READY]) % p
-    _bound(root, widest, turn)
+    bound_variance(root, widest, turn)
     sense[READY] = turn + 1.0
     return True
 
@@ -207,7 +213,7 @@ def update_size(share: float, noise: float, relative: float, sense: Array) -> No
 
 
 @kernel
-def _spread(root: Array, f: Array, g: Array, excited: float) -> None:
+def update_root(root: Array, f: Array, g: Array, excited: float) -> None:
     """Update the factored covariance; ``g`` becomes P phi."""
     p = f.size
     still = abs(excited) < STILL
@@ -228,7 +234,7 @@ def _spread(root: Array, f: Array, g: Array, excited: float) -> None:
 
 
 @kernel
-def _bound(root: Array, widest: Array, i: int) -> None:
+def bound_variance(root: Array, widest: Array, i: int) -> None:
     """Bound the variance of one parameter, each in turn."""
     p = widest.size
     variance = root[i]
@@ -258,10 +264,12 @@ def pull_back(c: Array, adapted: Array, along: Array, work: Array) -> None:
     """
     p = along.size
     for i in range(p):
-        work[i] = c[1] * (c[3 + 2 * p + i] - adapted[i]) / (c[3 + i] * c[3 + p + i])
+        work[i] = (
+            c[SHARE] * (c[SCALES + 2 * p + i] - adapted[i]) / (c[SCALES + i] * c[SCALES + p + i])
+        )
     covariant(adapted, work, along)
     for i in range(p):
-        adapted[i] += c[3 + i] * along[i]
+        adapted[i] += c[SCALES + i] * along[i]
 
 
 @kernel
@@ -309,15 +317,15 @@ def family_at(c: Array) -> int:
     parameters (p), covariance at the start as root], then the family's. A root is [D, columns of U above
     its diagonal of ones], p (p + 1) / 2 numbers.
     """
-    p = int(c[0])
-    return 3 + 3 * p + root_size(p)
+    p = int(c[N_LEARNED])
+    return SCALES + 3 * p + root_size(p)
 
 
 @kernel
 def start_learning(c: Array, adapted: Array) -> None:
     """Start adaptation, [theta, used, root, senses], with the fitted parameters."""
-    p, noise = int(c[0]), c[2]
-    fitted, fresh = c[3 + 2 * p : 3 + 3 * p], c[3 + 3 * p : family_at(c)]
+    p, noise = int(c[N_LEARNED]), c[NOISE]
+    fitted, fresh = c[SCALES + 2 * p : SCALES + 3 * p], c[SCALES + 3 * p : family_at(c)]
     fill(adapted[:p], fitted)
     fill(adapted[p : 2 * p], fitted)
     fill(adapted[2 * p : 2 * p + fresh.size], fresh)
@@ -336,7 +344,7 @@ LEAST = 0.1
 @kernel
 def inverse_at(c: Array) -> int:
     """Return the index of the inverse's coefficients, after [limits, least]."""
-    return family_at(c) + 2 * int(c[0])
+    return family_at(c) + 2 * int(c[N_LEARNED])
 
 
 @kernel
@@ -358,7 +366,7 @@ def follow_learning(
     n, p, family = r.size, r.size + 1, family_at(c)
     limits, least = c[family : family + 2], c[family + 2 : inverse_at(c)]
     theta, used = adapted[:p], adapted[p : 2 * p]
-    sense = adapted[family - 3 - p :]
+    sense = adapted[family - SCALES - p :]
     work, slopes = scratch[: 2 * p], scratch[2 * p : 3 * p]
     predicted, asked = theta[n], used[n]
     for i in range(n):
@@ -397,7 +405,7 @@ def learning_kernels(
         coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
     ) -> None:
         """Advance the inverse, and adapt weights and offset to measurements."""
-        n = int(coefficients[0]) - 1
+        n = int(coefficients[N_LEARNED]) - 1
         own = coefficients[inverse_at(coefficients) :]
         last, adapted = state[n + before : n + before + 3], state[n + before + 3 :]
         way = follow_learning(
@@ -407,7 +415,7 @@ def learning_kernels(
 
     def adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
         """Start as the inverse does, with the fitted weights."""
-        last = int(coefficients[0]) - 1 + before
+        last = int(coefficients[N_LEARNED]) - 1 + before
         own = coefficients[inverse_at(coefficients) :]
         inverse_start(own, state[: last + 2], inputs, virgin)
         state[last + 2] = 0.0

@@ -45,7 +45,8 @@ MOST = 1e6
 """Largest limit [bar/s]."""
 
 HEAD = 7
-"""Number of coefficients before the pressure steps."""
+N_PRESSURES, HORIZON, STATES, INVERSE_STATES, NUMBERS, INVERSE_NUMBERS, N_REFERENCES = range(HEAD)
+"""Places of the coefficients before the pressure steps: all are sizes."""
 
 PASSES = 2
 """Number of optimisations per sample, each linearised about the result of the last."""
@@ -208,11 +209,11 @@ def predictive_kernels(
     ) -> None:
         """Start as the inverse does: as if its first reference had always been applied."""
         c = coefficients
-        inverse_state = scratch[: int(c[3])]
-        numbers = c[HEAD + 1 + 3 * int(c[0]) + int(c[4]) :]
-        start_inverse(numbers, inverse_state, scratch[int(c[3]) :], inputs, virgin)
+        inverse_state = scratch[: int(c[INVERSE_STATES])]
+        numbers = c[HEAD + 1 + 3 * int(c[N_PRESSURES]) + int(c[NUMBERS]) :]
+        start_inverse(numbers, inverse_state, scratch[inverse_state.size :], inputs, virgin)
         state[:] = 0.0
-        fill(state[: int(c[2])], inverse_state)
+        fill(state[: int(c[STATES])], inverse_state)
 
     return step(predictive_step), predictive_start
 
@@ -276,11 +277,12 @@ def step_of(
     ) -> None:
         """Compute the first pressures of a horizon within all limits, and take that step."""
         c = coefficients
-        n, m, length, size, n_inverse = int(c[0]), int(c[6]), int(c[1]), int(c[2]), int(c[3])
+        n, m, length = int(c[N_PRESSURES]), int(c[N_REFERENCES]), int(c[HORIZON])
+        size, n_inverse, own_size = int(c[STATES]), int(c[INVERSE_STATES]), int(c[NUMBERS])
         planned, count = length * n, length * m
         nudges, limits = c[HEAD : HEAD + n], c[HEAD + n : HEAD + 3 * n + 1]
         own = c[HEAD + 3 * n + 1 :]
-        model, inverse = own[: int(c[4])], own[int(c[4]) : int(c[4]) + int(c[5])]
+        model, inverse = own[:own_size], own[own_size : own_size + int(c[INVERSE_NUMBERS])]
         memory, desired, last = state[:size], state[size : size + count], state[size + count :]
         states, inverse_state = scratch[: 3 * size], scratch[3 * size : 3 * size + n_inverse]
         more = scratch[3 * size + n_inverse :]

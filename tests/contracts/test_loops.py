@@ -277,7 +277,7 @@ def test_feedback_is_in_the_unit_of_its_compensator(behind: bool) -> None:
         block = named(PI.example(), "pressure", measure)
         scaled = {"weights": tuple(scale * np.array(block.weights)), "offset": scale * block.offset}
         block = replace(block, **scaled).inverse()
-        pid = tune_pid(plant, hold=2.0, references=block.inputs)
+        pid = tune_pid(plant, sample_time=0.02, hold=2.0, references=block.inputs)
         assert pid.driven == block.inputs
         controller = control_law(
             "feedforward-pid" if behind else "pid", block, partial(replace, pid)
@@ -286,7 +286,7 @@ def test_feedback_is_in_the_unit_of_its_compensator(behind: bool) -> None:
     np.testing.assert_allclose(results[0], results[1], rtol=1e-9)
     contraction = named(PI.example(), "pressure", "contraction").inverse()
     with pytest.raises(MckibbenError, match="references=compensator"):
-        FeedforwardFeedback.of(contraction, tune_pid(plant, hold=2.0))
+        FeedforwardFeedback.of(contraction, tune_pid(plant, sample_time=0.02, hold=2.0))
 
 
 @pytest.mark.parametrize("order", [(1, 2), (2, 1)])

@@ -50,7 +50,8 @@ class Twin:
         Constant inputs, such as a load [N], a length [mm] or an extensor's pressure [bar]. Channels of
         a reference take precedence.
     sample_time : float, optional
-        Time that a command is held [s]; default the model's own, or 0.02 s.
+        Time that a command is held [s]; default the model's own. A model of any sample time that depends
+        on rate needs it in `reset`; `track` gives it that of the reference.
     name : str
         In tables and recordings.
     rest_length : float, optional
@@ -98,8 +99,8 @@ class Twin:
         ends = (*self.forward.inputs, *self.forward.outputs)
         self.units = {plain(channel.name): channel.unit for channel in ends}
         own = self.forward.sample_time
-        self.sample_time = float(sample_time or own or 0.02)
-        if own is not None and abs(self.sample_time - own) > 1e-9 * own:
+        self.sample_time = own if sample_time is None else float(sample_time)
+        if own and self.sample_time and abs(self.sample_time - own) > 1e-9 * own:
             raise ModelError(
                 f"{self.forward.title!r} is a model of steps of {own:g} s, and a loop of "
                 f"{self.sample_time:g} s is closed on it",

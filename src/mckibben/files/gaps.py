@@ -88,8 +88,9 @@ def pieces(
             else np.interp(grid, time[~mask], channels[name][~mask])
             for name, mask in missing.items()
         }
-        begin = start + (step or 1.0) * first if times is None else times.seconds(t[0])
-        marked = begin + (step or 1.0) * (true_runs(bridged) - [0, 1])
+        pitch = 1.0 if step is None else step  # without time, samples are numbered
+        begin = start + pitch * first if times is None else times.seconds(t[0])
+        marked = begin + pitch * (true_runs(bridged) - [0, 1])
         found.append(Piece(samples, step, float(begin), marked.tolist()))
     return found
 

@@ -230,7 +230,7 @@ def made(block: Block, sample_time: float | None = None) -> Block:
     ----------
     block : Block
     sample_time : float, optional
-        At which it is tested [s]; default the model's own, or 20 ms.
+        At which it is tested [s]; default the model's own. One that depends on rate needs it.
 
     Raises
     ------

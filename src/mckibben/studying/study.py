@@ -237,8 +237,11 @@ def study(
                 raise
             plant, so_far = None, replace(so_far, not_looped=str(error))
         if plant is not None:
-            loops = closed_loops(board, undone.model, plant, so_far.test, seed)
-            so_far = replace(so_far, loops=loops, plant=named(plant))
+            try:
+                loops = closed_loops(board, undone.model, plant, so_far.test, seed)
+                so_far = replace(so_far, loops=loops, plant=named(plant))
+            except DataError as error:
+                so_far = replace(so_far, not_looped=str(error))
     if found is not None:
         found(so_far)
     if clear:

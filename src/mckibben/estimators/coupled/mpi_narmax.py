@@ -133,7 +133,7 @@ class MPINarmaxEstimator(CoupledEstimator):
         ]
         settings = {"input": u.name, "output": free, "seed": self.seed}
         if self.memory == "rdpi":
-            settings["rate_time_constant"] = 5.0 * (data.runs[0].sample_time or 0.0)
+            settings["rate_time_constant"] = 5.0 * data.timed(instead=", or use another memory")
         estimator = registry.load("estimators", self.memory)(**settings)
         counted = [run.counts for run in data.runs]
         block: Block = estimator.find(estimator.data(recordings, counted), Tracker())[0]

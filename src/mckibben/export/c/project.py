@@ -202,7 +202,7 @@ def described(
         "bytes": size,
         "sample_time": step,
         "step_words": f"{step!r} s" if step else "sample",
-        "period": round(1e6 * (step or 0.01)),
+        "period": round(1e6 * step) if step else 0,
         "inputs": inputs,
         "outputs": outputs,
         "constants": _constants(inputs, outputs, step),

@@ -26,7 +26,6 @@ from mckibben import (
 from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.feedback import FeedforwardFeedback, PIDFeedback
-from mckibben.blocks.fields import MEASURED
 from mckibben.blocks.laws import examples
 from mckibben.control import (
     BlockController,
@@ -38,6 +37,7 @@ from mckibben.control import (
 )
 from mckibben.control.roles import rest_length_of
 from mckibben.control.tuning import tune_pid, untuned_pid
+from mckibben.recording import MEASURED
 from mckibben.rigs import Rig
 from mckibben.rigs.files import rig_names
 

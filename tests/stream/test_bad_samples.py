@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mckibben import Block, DataError, ModelWarning
 from mckibben.blocks.base import Stream
-from mckibben.blocks.laws import examples, input_limits, wander
+from mckibben.blocks.laws import examples, trial_limits, wander
 from mckibben.registry import load
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ BAD = (np.nan, np.inf, -np.inf, 1e6, -1e6, 1e30, 1e308)
 
 def path_for(block: Block, seed: int, n: int = 120) -> Array:
     """Return inputs over the block's range, shape (n, n_inputs)."""
-    inputs = wander(*input_limits(block), np.random.default_rng(seed), 10, 14)
+    inputs = wander(*trial_limits(block), np.random.default_rng(seed), 10, 14)
     return np.resize(inputs, (n, inputs.shape[1]))
 
 
@@ -100,7 +100,7 @@ def test_sizes_just_within_bounds_give_finite_outputs(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_motions_within_the_range_and_a_fifth_beyond_pass(kind: str) -> None:
     block = EXAMPLES[kind]
-    low, high = input_limits(block)
+    low, high = trial_limits(block)
     ends = np.array([low - 0.2 * (high - low), high + 0.2 * (high - low)])
     bounds = block.input_bounds
     assert (bounds[:, 0] <= ends[0]).all()
@@ -111,7 +111,7 @@ def test_motions_within_the_range_and_a_fifth_beyond_pass(kind: str) -> None:
 def test_every_clipped_sample_has_the_status(kind: str) -> None:
     """The statuses of a stream are as many as `Block.n_clipped` of a run counts."""
     block = EXAMPLES[kind]
-    low, high = input_limits(block)
+    low, high = trial_limits(block)
     inputs = low + (path_for(block, 9) - low) * 1.4 - 0.2 * (high - low)
     stream = block.stream(SAMPLE_TIME)
     _, _, statuses = streamed(stream, inputs)

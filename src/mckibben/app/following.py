@@ -23,7 +23,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.ranges import known_ranges
 from mckibben.errors import DataError, MckibbenError, ModelError
-from mckibben.recording import Recording
+from mckibben.recording import REFERENCE, Recording
 
 if TYPE_CHECKING:
     from mckibben.studying.simulating import Simulation
@@ -330,7 +330,7 @@ def of_file(run: Recording, wanted: Collection[str]) -> dict[str, Points]:
         raise DataError("it has no time", remedy="add a column time_s")
     found, times = {}, (run.time - run.time[0]).tolist()
     for name in wanted:
-        column = next((own for own in (f"reference_{name}", name) if own in run), None)
+        column = next((own for own in (REFERENCE + name, name) if own in run), None)
         if column is None:
             problem = "the compensator is asked for it, and the file has no such column"
             raise DataError(problem, channel=name, remedy=f"name a column {name}")

@@ -29,7 +29,6 @@ from mckibben.blocks.base import Block, Board, Ports, Run, Start
 from mckibben.blocks.compose import Layout, Series
 from mckibben.blocks.fields import (
     LONGEST_DELAY,
-    MEASURED,
     STRICT,
     Channel,
     ChannelField,
@@ -46,6 +45,7 @@ from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
 from mckibben.blocks.starts import stated
 from mckibben.errors import ModelError, require
+from mckibben.recording import MEASURED
 
 INITIAL_SPREAD = 1 / 3
 """Initial standard deviations of the fitted parameters, relative to those of the expected changes.

@@ -26,7 +26,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.fields import Channel, Initial, check_units, drives
 from mckibben.blocks.kernels import Step, scratch_of
 from mckibben.blocks.parameters import Parametrised, gathered, plain
-from mckibben.blocks.ranges import AT_REST, by_name, range_over, unknown, widened
+from mckibben.blocks.ranges import AT_REST, first_known, range_over, unknown, widened
 from mckibben.blocks.sample_times import refuse_time
 from mckibben.blocks.starts import explaining_past, stated
 from mckibben.errors import DataError, ModelError
@@ -215,8 +215,8 @@ class Block(DrawsItself, Parametrised):
         Infinite where none is known. Those of a compensator are outputs of the model that it inverts.
         """
         if self._of_model is not None:
-            return by_name(self.inputs, self._of_model.known_channels)
-        found = by_name(self.inputs, self._known_of_parts())
+            return first_known(self.inputs, self._of_model.known_channels)
+        found = first_known(self.inputs, self._known_of_parts())
         driven = found[: self.n_driven]
         if hasattr(self, "input_range"):
             driven[:] = self.input_limits
@@ -242,7 +242,7 @@ class Block(DrawsItself, Parametrised):
         Those of a compensator are identified inputs of the model that it inverts.
         """
         if self._of_model is not None:
-            return by_name(self.outputs, self._of_model.known_channels)
+            return first_known(self.outputs, self._of_model.known_channels)
         timeless = self.rate_dependent and self.sample_time is None
         run = partial(self._run, AT_REST if timeless else self.sample_time)
         found = range_over(run, self.known_inputs, moving=not timeless)

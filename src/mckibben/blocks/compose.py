@@ -22,7 +22,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Board, Run
 from mckibben.blocks.fields import STRICT, Channel, Initial
-from mckibben.blocks.ranges import by_name
+from mckibben.blocks.ranges import first_known
 from mckibben.blocks.saving import nested
 from mckibben.blocks.starts import stated
 from mckibben.errors import ModelError
@@ -286,7 +286,7 @@ class Series(Composition):
             (part.inputs[part.n_driven :], part.known_inputs[part.n_driven :]) for part in others
         ]
         for curve in first.parts if isinstance(first, PerChannel) else (first,):
-            behind = by_name(
+            behind = first_known(
                 curve.outputs, [(part.inputs, part.known_inputs) for part in others[:1]]
             )
             bare = not (curve.path_dependent or curve.rate_dependent)
@@ -297,7 +297,7 @@ class Series(Composition):
         return found
 
     def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
-        by_name = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
+        signal_of = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
         signals = list(taken)
         for number, part in enumerate(self.parts):
             at_rest = not part.rate_dependent or part.start == "first_sample"
@@ -308,7 +308,7 @@ class Series(Composition):
                     remedy="start it from 'first_sample'",
                 )
             driven = signals[: part.n_driven]
-            signals = part.wired(board, [*driven, *(by_name[name] for name in part.scheduling)])
+            signals = part.wired(board, [*driven, *(signal_of[name] for name in part.scheduling)])
         return signals
 
     def inverse(self) -> Series:

@@ -133,9 +133,6 @@ class Channel:
     unit: str
 
 
-MEASURED = "_measured"
-"""Suffix of the name of a measured channel."""
-
 COMMANDS = ("pressure", "voltage")
 """Names of channels that drive a muscle."""
 

@@ -436,6 +436,11 @@ class Predictive(Block):
         return np.concatenate([own, np.zeros(self.n_states - own.size)])
 
     @property
+    def clip_counts(self) -> tuple[int, ...]:
+        """Place of the count of plans: samples in which a limit acts within the horizon."""
+        return (self.n_states - 1,)
+
+    @property
     def start(self) -> Initial:
         return self.compensator.start if isinstance(self.compensator.start, str) else "first_sample"
 

@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.fields import MEASURED, Channel, Initial
-from mckibben.recording import PLAUSIBLE, standard_unit
+from mckibben.blocks.fields import Channel, Initial
+from mckibben.recording import MEASURED, PLAUSIBLE, standard_unit
 
 LARGEST = float(np.finfo(np.float64).max)
 
@@ -29,7 +29,7 @@ def unknown(count: int) -> Array:
     return np.tile([-np.inf, np.inf], (count, 1))
 
 
-def by_name(
+def first_known(
     channels: Sequence[Channel], sources: Iterable[tuple[Sequence[Channel], Array]]
 ) -> Array:
     """Return the first finite range of every channel among sources, shape (n, 2).

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.feedback import BASE, FeedforwardFeedback
-from mckibben.blocks.fields import MEASURED, Channel
+from mckibben.blocks.fields import Channel
 from mckibben.control.connecting import Offer
 from mckibben.control.preview import preview_time
+from mckibben.recording import MEASURED
 
 Ahead = tuple[Array, Array]
 
@@ -25,6 +26,9 @@ class Controller(ABC):
 
     forward_model: Block | None = None
     """The model that the compensator inverts, if there is one."""
+
+    stream: Stream | None = None
+    """Its running compensator, if that is a block."""
 
     samples_ahead: int = 0
     """Further preview of the reference for prediction [samples]."""
@@ -53,11 +57,6 @@ class Controller(ABC):
             Reference and schedule, `preview` and `samples_ahead` later, for compensators.
         """
 
-    @property
-    def n_clipped(self) -> int:
-        """Number of samples that its compensator has clipped since the start."""
-        return 0
-
     def applied(self, pressures: Array) -> None:
         """Receive the commands applied after limits."""
         del pressures
@@ -80,11 +79,6 @@ class BlockController(Controller):
         self.preview, self.forward_model = preview_time(self.block), self.block.forward_model
         self.samples_ahead = self.block.samples_ahead
 
-    @property
-    def n_clipped(self) -> int:
-        """Number of samples clipped by the compensator."""
-        return self._stream.block.n_clipped(self._stream.state)
-
     def connect(self, offer: Offer) -> None:
         whole = self.block
         self._compensator, self._pid = whole, None
@@ -98,7 +92,7 @@ class BlockController(Controller):
             self._pid_inputs = offer.inputs(self._pid, bases)
 
     def reset(self, sample_time: float) -> None:
-        self._stream = self._compensator.stream(sample_time)
+        self.stream = self._compensator.stream(sample_time)
         self._feedback = None if self._pid is None else self._pid.stream(sample_time)
         measures = any(channel.name.endswith(MEASURED) for channel in self._compensator.inputs)
         # measurements belong to the reference of the last step, or a dead time before it; predictive
@@ -109,7 +103,8 @@ class BlockController(Controller):
     def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
         reference_ahead, schedule = ahead if self._uses_preview else (reference, scheduled)
         schedule = scheduled if self._predicts else schedule
-        found = self._stream.step(
+        assert self.stream is not None
+        found = self.stream.step(
             self._inputs(np.concatenate((reference_ahead, schedule, measured)))
         )
         if self._feedback is not None:

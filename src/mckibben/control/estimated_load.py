@@ -37,11 +37,6 @@ class EstimatedLoad(Controller):
         self.preview, self.forward_model = inner.preview, inner.forward_model
         self.samples_ahead = inner.samples_ahead
 
-    @property
-    def n_clipped(self) -> int:
-        """Number of samples clipped by the controller's compensator."""
-        return self.controller.n_clipped
-
     def connect(self, offer: Offer) -> None:
         title, loads = self.estimate.title, self.estimate.outputs
         self._inputs = offer.selected(self.estimate.inputs, offer.measured, title, offer.plant)
@@ -49,13 +44,14 @@ class EstimatedLoad(Controller):
 
     def reset(self, sample_time: float) -> None:
         self.controller.reset(sample_time)
-        self._stream = self.estimate.stream(sample_time)
+        self.stream = self.controller.stream
+        self._estimate = self.estimate.stream(sample_time)
         self._share = 1.0 - np.exp(-sample_time / self.filter_time)
         self._load = np.zeros(len(self.estimate.outputs))
 
     def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
         """Return the controller's commands, with the current load estimate for the next step."""
-        found = self._stream.step(self._inputs(measured))
+        found = self._estimate.step(self._inputs(measured))
         self._load = self._load + self._share * (found - self._load)
         now, then = (np.concatenate((self._load, others)) for others in (scheduled, ahead[1]))
         return self.controller.step(reference, measured, now, (ahead[0], then))

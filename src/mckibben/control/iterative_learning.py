@@ -38,10 +38,7 @@ from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.repetition import Repetition
 from mckibben.control.connecting import find
 from mckibben.errors import DataError, require
-from mckibben.recording import Recording, sample_time_of
-
-DESIRED = "reference_"
-"""Prefix of the desired motion in recordings of a loop."""
+from mckibben.recording import REFERENCE, Recording, sample_time_of
 
 SEGMENTS = 8
 """Half-overlapping parts of the motion over which its spectrum is averaged."""
@@ -183,7 +180,7 @@ def learned(
     require(0 <= ahead < length, "ahead", ahead, f"0 to {length - 1} samples")
     require(0 <= settle < length, "settle", settle, f"0 to {length - 1} samples")
     channels = compensator.inputs[: compensator.n_driven]
-    desired, measured = (_outputs(compensator, runs, prefix) for prefix in (DESIRED, ""))
+    desired, measured = (_outputs(compensator, runs, prefix) for prefix in (REFERENCE, ""))
     if not np.array_equal(desired, np.broadcast_to(desired[0], desired.shape)):
         raise DataError("repetitions have different references", remedy="repeat one motion")
     bounds = compensator.input_bounds

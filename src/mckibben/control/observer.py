@@ -40,11 +40,6 @@ class DisturbanceObserver(Controller):
         self.forward_model = self._model
         self.preview = self._model.dead_time
 
-    @property
-    def n_clipped(self) -> int:
-        """That of the compensator."""
-        return self.compensator.n_clipped(self._ahead.state)
-
     def connect(self, offer: Offer) -> None:
         block, model = self.compensator, self._model
         references = block.inputs[: block.n_driven]
@@ -55,7 +50,7 @@ class DisturbanceObserver(Controller):
         self._modelled = offer.selected(references, model.outputs, block.title, model.title)
 
     def reset(self, sample_time: float) -> None:
-        self._ahead = self.compensator.stream(sample_time)
+        self.stream = self.compensator.stream(sample_time)
         self._model_stream = self._model.stream(sample_time)
         self._share = 1.0 - np.exp(-sample_time / self.filter_time)
         self._disturbance = np.zeros(self.compensator.n_driven)
@@ -70,7 +65,8 @@ class DisturbanceObserver(Controller):
         self._scheduled = scheduled
         wanted = self._inputs(np.concatenate((*ahead, measured)))
         wanted[: self._disturbance.size] -= self._disturbance
-        return self._commands(self._ahead.step(wanted))
+        assert self.stream is not None
+        return self._commands(self.stream.step(wanted))
 
     def applied(self, pressures: Array) -> None:
         """Advance the model by the applied commands."""

@@ -15,10 +15,7 @@ from mckibben.blocks.fields import drives
 from mckibben.blocks.inverse import commands
 from mckibben.blocks.ranges import known_ranges
 from mckibben.errors import DataError, ModelError
-from mckibben.recording import Recording
-
-COMMAND = "command_"
-"""Prefix of commands in recordings, which plants do not use."""
+from mckibben.recording import COMMAND, Recording
 
 
 def plain(name: str) -> str:
@@ -221,7 +218,8 @@ class Twin:
 
     def run(self, inputs: Recording) -> Recording:
         """Run it over a recording of its inputs, as ``model.simulate`` does; absent inputs are held."""
-        twin = self.changed({"sample_time": inputs.sample_time or self.sample_time})
+        step = inputs.sample_time
+        twin = self.changed({} if step is None else {"sample_time": step})
         twin._begin()
         columns = [
             inputs[name] if name in inputs else np.full(len(inputs), twin._resting(name))

@@ -18,17 +18,13 @@ from mckibben.arrays import Array, true_runs
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import FeedforwardFeedback
-from mckibben.blocks.fields import MEASURED, Channel
-from mckibben.control.twin import COMMAND
+from mckibben.blocks.fields import Channel
 from mckibben.diagnosis.refit import Refit, refitted
 from mckibben.errors import DataError, ModelError, ModelWarning
-from mckibben.recording import Recording, listed, sample_time_of
+from mckibben.recording import COMMAND, MEASURED, REFERENCE, Recording, listed, sample_time_of
 from mckibben.signals.shared_rows import check_shared
 from mckibben.statistics import NORMAL_95, block_length, correlation_length
 from mckibben.system.showing import DrawsItself
-
-REFERENCE = "reference_"
-"""Prefixes of the names of references."""
 
 LONGEST, HELD = 1.0, 3
 """Longest delay searched [s], at most an eighth of the log; number of successive samples at an

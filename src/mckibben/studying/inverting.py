@@ -20,10 +20,9 @@ from mckibben.blocks.fields import drives
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.comparison.choosing import acceptable
 from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.control.twin import COMMAND
 from mckibben.errors import MckibbenError, ModelError, ModelWarning
 from mckibben.metrics import useful
-from mckibben.recording import Recording
+from mckibben.recording import COMMAND, Recording
 from mckibben.splits import Split
 from mckibben.studying.recorded_inputs import RecordedInputs
 from mckibben.studying.static_map import static_error

@@ -16,14 +16,13 @@ from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.planning import plan_of
 from mckibben.comparison.ranking import Standing, ranked
 from mckibben.control import Tracked
-from mckibben.control.twin import COMMAND
 from mckibben.diagnosis import Characterization, characterize
 from mckibben.diagnosis.check import Validation
 from mckibben.diagnosis.data_gaps import Gap, data_gaps
 from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.diagnosis.review import Review, review
 from mckibben.errors import DataError
-from mckibben.recording import Recording, listed
+from mckibben.recording import COMMAND, Recording, listed
 from mckibben.rigs import load_rig
 from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import Compensation, compensation

@@ -12,11 +12,8 @@ from mckibben.arrays import Array, Mask
 from mckibben.channels import Channels, held_at_levels
 from mckibben.errors import DataError
 from mckibben.numerals import counted
-from mckibben.recording import Recording
+from mckibben.recording import FEWEST_SAMPLES, Recording
 from mckibben.signals.reversals import reversals
-
-FEWEST_SAMPLES = 10
-"""Smallest number of samples on either side of a split, and of a part of a recording."""
 
 HELD_OUT = 0.25
 """Share of the input's travel that is held out by default."""

@@ -100,17 +100,17 @@ CORRELATED = 10.0
 """Square root of how many errors, each like the last, count as one independent error."""
 QUARTILE = 0.6745
 """Median absolute error of a unit-variance normal distribution."""
-SINGLE = {"ABSURD": 1e-6, "STILL": 1e-9, "UNMOVED": 1e-12}
+SINGLE = {"LEAST_WEIGHT": 1e-6, "LEAST_INFORMATION": 1e-9, "LEAST_SLOPE": 1e-12}
 """Constants with a different value in single precision."""
 NEAR = 0.1
 """Width of the transition at the gate, so that single and double precision decide alike."""
-ABSURD = 1e-6
+LEAST_WEIGHT = 1e-6
 """Weight of an error too large to be plausible."""
-LARGEST = 1e9
+LARGEST_ERROR = 1e9
 """Largest usual error, relative to the noise."""
 NEVER = 1e30
 """Value that no output takes."""
-STILL, UNMOVED = 1e-9, 1e-12
+LEAST_INFORMATION, LEAST_SLOPE = 1e-9, 1e-12
 """Smallest information, and squared slope relative to the noise, below which parameters do not
 change.
 """
@@ -186,7 +186,7 @@ def learn(
     if abs(error) > GATE * expected:
         weight = GATE * expected / abs(error)
     update_size(share, noise, weight * error / expected, sense)
-    if not UNMOVED < r < np.inf or weight < ABSURD:
+    if not LEAST_SLOPE < r < np.inf or weight < LEAST_WEIGHT:
         return False
     settled = share / (1.0 - share)
     lacks = r < settled  # as where errors have grown: then it adapts within the time
@@ -208,7 +208,7 @@ def update_size(share: float, noise: float, relative: float, sense: Array) -> No
     usual = sense[USUAL]
     quick = min(20.0 * share, 0.5)
     side = min(max((abs(relative) - QUARTILE) / NEAR, -1.0), 1.0)
-    sense[USUAL] = min(max(usual * (1.0 + 0.5 * quick * side), noise), LARGEST * noise)
+    sense[USUAL] = min(max(usual * (1.0 + 0.5 * quick * side), noise), LARGEST_ERROR * noise)
     sense[SURPRISE] += quick * (relative * relative - sense[SURPRISE])
 
 
@@ -216,7 +216,7 @@ def update_size(share: float, noise: float, relative: float, sense: Array) -> No
 def update_root(root: Array, f: Array, g: Array, excited: float) -> None:
     """Update the factored covariance; ``g`` becomes P phi."""
     p = f.size
-    still = abs(excited) < STILL
+    still = abs(excited) < LEAST_INFORMATION
     before = 0.0 if still else 1.0 / excited
     first = p
     for j in range(p):
@@ -337,7 +337,7 @@ def start_learning(c: Array, adapted: Array) -> None:
 
 # -- of weighted sums of play operators ---------------------------------------------------------------
 
-LEAST = 0.1
+LEAST_SHARE = 0.1
 """Smallest share of a fitted partial sum of weights that adaptation leaves."""
 
 
@@ -472,7 +472,7 @@ def learnable_operators(
     all_weights, sliding = np.append(np.ones(n), 0.0), np.array([0.0, *np.ones(n - 1), 0.0])
     together = 0.3**2 * np.outer(all_weights, all_weights) + 0.3**2 * np.outer(sliding, sliding)
     lowest = np.where(w >= 0, 0.0, -np.inf)
-    least = np.concatenate([lowest, LEAST * np.cumsum(w)])  # of weights, then of partial sums
+    least = np.concatenate([lowest, LEAST_SHARE * np.cumsum(w)])  # of weights, then of partial sums
 
     def numbers(sample_time: float | None) -> Array:
         return np.concatenate([limits, least, model.inverse().coefficients(sample_time)])

@@ -41,7 +41,7 @@ from mckibben.errors import ModelError
 NUDGE = 1e-3
 """Step of pressure for slopes of the model, relative to the pressure range."""
 
-MOST = 1e6
+FASTEST = 1e6
 """Largest limit [bar/s]."""
 
 HEAD = 7
@@ -51,10 +51,10 @@ N_PRESSURES, HORIZON, STATES, INVERSE_STATES, NUMBERS, INVERSE_NUMBERS, N_REFERE
 PASSES = 2
 """Number of optimisations per sample, each linearised about the result of the last."""
 
-STILL = 0.1
+UNCHANGED = 0.1
 """Motion, relative to the pressure step, that counts as unchanged."""
 
-Limit = Annotated[FiniteFloat, Gt(0), Le(MOST)]
+Limit = Annotated[FiniteFloat, Gt(0), Le(FASTEST)]
 
 
 # -- the memory that a model and its inverse share -------------------------------------------------
@@ -255,7 +255,7 @@ def step_of(
             for k in range(n):
                 p = path[(t + 1) * n + k]
                 moved = p - path[t * n + k]
-                if abs(moved) > STILL * nudges[k]:
+                if abs(moved) > UNCHANGED * nudges[k]:
                     way[k] = 1.0 if moved > 0.0 else -1.0
                 given[k] = p
             fill(trial, kept)

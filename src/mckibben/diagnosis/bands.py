@@ -42,7 +42,7 @@ LEVEL, LEVELS = 0.9, np.linspace(0.0, 1.0, 1001)
 table of half widths.
 """
 
-FEWEST = 9
+FEWEST_UNITS = 9
 """Smallest number of units for a level of 0.9: with fewer runs, blocks of runs are the exchangeable
 units.
 """
@@ -237,7 +237,7 @@ def find_band(
     runs = [run for run in runs if run.counts.any()]
     errors = [run.errors for run in runs]
     memory = max(correlation_length(one) for one in zip(*(e.T for e in errors), strict=True))
-    by_run = unit == "run" or (unit == "auto" and len(runs) >= FEWEST)
+    by_run = unit == "run" or (unit == "auto" and len(runs) >= FEWEST_UNITS)
     which: Literal["run", "block"] = "run" if by_run else "block"
     units: list[NDArray[np.intp]] = []
     n = 0
@@ -360,7 +360,7 @@ class TestedBand:
     """
 
     __test__ = False  # it is no test
-    needed: ClassVar[int] = FEWEST
+    needed: ClassVar[int] = FEWEST_UNITS
 
     unknown: Unknown | None
     level: float
@@ -415,8 +415,8 @@ def tested_band(
     lowest, highest = float(by_run.min()), float(by_run.max())
     branches = n_branches([recording.matrix(names) for recording in held_out])
     reasons: dict[Unknown, bool] = {
-        "blocks": band.units < FEWEST,
-        "branches": branches < FEWEST,
+        "blocks": band.units < FEWEST_UNITS,
+        "branches": branches < FEWEST_UNITS,
         "narrow": lowest < SHARES[0],
         "wide": highest > SHARES[1],
     }

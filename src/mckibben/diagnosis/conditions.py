@@ -8,8 +8,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.channels import schedules
-from mckibben.diagnosis.tracks import FEWEST
-from mckibben.recording import Recording
+from mckibben.recording import FEWEST_SAMPLES, Recording
 from mckibben.signals.holds import STILL, holds, moves
 from mckibben.statistics import hats
 
@@ -58,7 +57,9 @@ def constant_segments(
     for place, one in enumerate(recordings):
         columns = one.matrix(others)
         whole = bool(np.all(np.ptp(columns, axis=0) <= STILL * ranges))
-        for hold in [slice(0, len(one))] if whole else holds(columns, ranges.tolist(), FEWEST):
+        for hold in (
+            [slice(0, len(one))] if whole else holds(columns, ranges.tolist(), FEWEST_SAMPLES)
+        ):
             part = one.slice(hold.start, hold.stop)
             if np.ptp(part[given]) > COVERS * span:
                 found.append((columns[hold].mean(axis=0), place, part))

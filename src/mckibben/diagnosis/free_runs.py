@@ -16,7 +16,7 @@ from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.signals.shared_rows import check_shared
 
-FEWEST, SHORTEST = 60, 10
+FEWEST_IN_ALL, FEWEST_IN_EACH = 60, 10
 """Smallest number of samples that can be tested, in total and per recording."""
 
 SAME_TIME = 1e-3
@@ -81,11 +81,11 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
     for recording in recordings:
         _refuse(recording, block, recordings[0].sample_time)
     total, source = sum(map(len, recordings)), recordings[0].source
-    if total < FEWEST:
+    if total < FEWEST_IN_ALL:
         raise DataError(
             f"{total} samples are too few to distinguish a wrong model from noise",
             file=source,
-            remedy=f"record at least {FEWEST}, better ten cycles with 50 or more each",
+            remedy=f"record at least {FEWEST_IN_ALL}, better ten cycles with 50 or more each",
         )
     driven = [c.name for c in block.inputs if c.name not in block.scheduling]
     still = [driven[0]] if all(_constant(recordings, name) for name in driven) else []
@@ -101,11 +101,11 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
 
 def _refuse(recording: Recording, block: Block, step: float | None) -> None:
     check_units(recording, (*block.inputs, *block.outputs))
-    if len(recording) < SHORTEST:
+    if len(recording) < FEWEST_IN_EACH:
         raise DataError(
             f"{len(recording)} samples are too few: the residual is correlated over longer times",
             file=recording.source,
-            remedy=f"leave this recording out, or record at least {SHORTEST} samples",
+            remedy=f"leave this recording out, or record at least {FEWEST_IN_EACH} samples",
         )
     own = recording.sample_time
     if abs((own or 0.0) - (step or 0.0)) > SAME_TIME * (step or 0.0):

@@ -26,7 +26,7 @@ from mckibben.signals.shared_rows import check_shared
 from mckibben.statistics import NORMAL_95, block_length, correlation_length
 from mckibben.system.showing import DrawsItself
 
-LONGEST, HELD = 1.0, 3
+LONGEST_DELAY, SAMPLES_AT_LIMIT = 1.0, 3
 """Longest delay searched [s], at most an eighth of the log; number of successive samples at an
 extreme, while the reference moves, above which a command is at a limit.
 """
@@ -315,7 +315,7 @@ def _at_limit(command: Array, references: Sequence[Array]) -> Array:
         flat = np.abs(command - extreme) <= near
         for begin, end in true_runs(flat):
             moves = any(np.ptp(r[begin:end]) > ROUNDING * np.ptp(r) for r in references)
-            found[begin:end] |= end - begin >= HELD and moves
+            found[begin:end] |= end - begin >= SAMPLES_AT_LIMIT and moves
     return found
 
 
@@ -367,7 +367,7 @@ def _delay(where: str, first: Array, then: Array, step: float) -> Delay | None:
 
     The standard error is that of sums over blocks that are long against the correlation of errors.
     """
-    most = min(round(LONGEST / step), len(first) // 8)
+    most = min(round(LONGEST_DELAY / step), len(first) // 8)
     if most < 1 or np.ptp(first) == 0 or np.ptp(then) == 0:
         return None
     inner = slice(most, len(first) - most)

@@ -19,9 +19,8 @@ from mckibben.files import read
 from mckibben.files.channels import NAME, Folder, describing, description
 from mckibben.files.formats import SOUGHT
 from mckibben.files.sources import inside, is_bag
-from mckibben.recording import PERIODIC, Recording
+from mckibben.recording import FEWEST_SAMPLES, PERIODIC, Recording
 from mckibben.signals import resample
-from mckibben.splits import FEWEST_SAMPLES
 from mckibben.system.validation import reason
 
 KNOWN = Path(str(resources.files("mckibben.measured"))) / "known"

@@ -42,7 +42,7 @@ APPROACHED = 0.05
 reachable.
 """
 
-WHOLE = 1e-6
+WHOLE_WITHIN = 1e-6
 """Share of a sample by which a dead time may differ from a whole number of samples."""
 
 
@@ -231,7 +231,7 @@ class Air(Invertible):
         """Warn if the dead time is not a whole number of samples."""
         late = self.coefficients(sample_time)[LATE]
         assert sample_time is not None
-        if abs(self.dead_time / sample_time - late) > WHOLE:
+        if abs(self.dead_time / sample_time - late) > WHOLE_WITHIN:
             warnings.warn(
                 f"the dead time of {self.kind!r}, {self.dead_time:g} s, is no whole number of samples "
                 f"of {sample_time:g} s: {late * sample_time:g} s is taken",

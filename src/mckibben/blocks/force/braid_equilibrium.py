@@ -26,17 +26,17 @@ from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton
 
-SHARE = 0.995
+LARGEST_SHARE = 0.995
 """Largest contraction of the muscle, relative to the contraction at which the braid's pull is zero.
 """
 
-LEAST = -0.1
+LEAST_CONTRACTION = -0.1
 """Smallest contraction modelled."""
 
-STILL = 1e-16
+CONVERGED = 1e-16
 """Change of the contraction at which the iteration has converged."""
 
-SINGLE = {"STILL": 1e-8}
+SINGLE = {"CONVERGED": 1e-8}
 
 
 LOAD, STIFFNESS, HARDENING, PER_BAR, A, B, LOW, HIGH, REST_LENGTH, OFFSET = range(10)
@@ -70,7 +70,7 @@ def braid_step(coefficients: Array, state: Array, inputs: Array, outputs: Array)
         e = high
     else:
         start = min(max(0.0, low), high)
-        e = newton(balance, balance_slope, p, low, high, start, STILL, c)
+        e = newton(balance, balance_slope, p, low, high, start, CONVERGED, c)
         if DERIVED:
             e = improved(balance, p, e, c)
     outputs[0] = c[REST_LENGTH] * e + c[OFFSET]
@@ -157,9 +157,9 @@ class BraidEquilibrium(Invertible):
 
     def coefficients(self, sample_time: float | None) -> Array:
         area, a, b = braid(self.braid_angle, self.diameter)
-        largest = SHARE * (1.0 - math.sqrt(b / a))
+        largest = LARGEST_SHARE * (1.0 - math.sqrt(b / a))
         # below, the bladder would have to pull harder than the load
-        least = LEAST
+        least = LEAST_CONTRACTION
         if self.stiffness > 0:
             least = max(least, -0.9 * self.load / (self.stiffness + 0.01 * self.hardening))
         head = [self.load, self.stiffness, self.hardening, area, a, b, least, largest]

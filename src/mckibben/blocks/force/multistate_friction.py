@@ -108,7 +108,8 @@ def multistate_friction_step(
     step = coefficients[STEP]
     v = (inputs[0] - state[n]) / step
     state[n] = inputs[0]
-    first, other = (LENGTHENING, SHORTENING) if v >= 0.0 else (SHORTENING, LENGTHENING)
+    first = LENGTHENING if v >= 0.0 else SHORTENING
+    other = SHORTENING if v >= 0.0 else LENGTHENING
     sign = 1.0 if v >= 0.0 else -1.0
     force = 0.0
     for i in range(n):

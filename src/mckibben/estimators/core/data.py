@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array, true_runs
 from mckibben.blocks.fields import Channel
 from mckibben.errors import DataError
-from mckibben.recording import Recording, listed
+from mckibben.recording import FEWEST_SAMPLES, Recording, listed
 
 Mask = NDArray[np.bool_]
 Made = TypeVar("Made")
@@ -24,9 +24,6 @@ SLOWEST = 1 / 3
 """Largest time constant of a linear model, relative to the longest recording: in a slower one the gain
 and the time constant are not determined separately.
 """
-
-FEWEST_SAMPLES = 10
-"""Smallest number of samples for identification."""
 
 
 def stretches(mask: Mask) -> list[tuple[int, int]]:

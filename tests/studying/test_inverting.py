@@ -52,9 +52,9 @@ def test_the_check_keeps_names_and_units() -> None:
 def test_an_inverse_that_is_wrong_at_speed_is_refused() -> None:
     slow = replace(RateDependentPI.example(), rate_time_constant=0.0)
     fast = replace(slow, rate_weights=(-2.0, *slow.rate_weights[1:]))
-    assert made(slow, 0.02) == slow.inverse()
+    assert made(slow) == slow.inverse()
     with pytest.raises(ModelError):
-        made(fast, 0.02)
+        made(fast)
 
 
 def test_what_is_expected_is_the_error_on_the_test() -> None:
@@ -108,13 +108,13 @@ def test_a_model_is_inverted_along_the_line_on_which_it_was_driven() -> None:
     driven = replace(CROWDED, pressure_range=(0.0, 5.0), drive=drive)
     gauges = tuple(Affine(2.0, 1.0, c, Channel(f"gauge_{c.name}", "V")) for c in driven.driven)
     model = Series((driven.inverse(), PerChannel(gauges)))
-    space = RecordedInputs.known(model, 0.02)
+    space = RecordedInputs.known(model)
     assert space is not None
     away = space.motion(1.0, 0).matrix(space.names)[:, :3] - 2.5
     ways = np.array(drive)[:, 1:]
     np.testing.assert_allclose(away @ np.linalg.svd(ways)[0][:, 2], 0.0, atol=1e-12)
     assert (np.ptp(away, axis=0) > np.sqrt(3.0) * np.abs(ways).max(axis=1)).all()
-    assert made(model, 0.02) == model.inverse()
+    assert made(model) == model.inverse()
 
 
 def test_few_lengths_determine_no_high_degree() -> None:

@@ -229,7 +229,7 @@ def made(block: Block, sample_time: float | None = None) -> Block:
     ----------
     block : Block
     sample_time : float, optional
-        At which it is tested [s]; default the model's own. One that depends on rate needs it.
+        At which it is tested [s]; default the model's own, or 20 ms.
 
     Raises
     ------

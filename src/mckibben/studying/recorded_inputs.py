@@ -13,7 +13,6 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import balance_in
 from mckibben.blocks.laws import wander
 from mckibben.blocks.ranges import known_ranges
-from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.control.identified import BEYOND
 from mckibben.recording import Recording
 
@@ -23,8 +22,10 @@ FAST = 0.99
 STRIDES = (4, 1000)
 """Fewest and most samples from one turning point of a random motion to the next."""
 
-SAMPLES = 100
-"""Samples in which a model whose recordings are not at hand goes through its range."""
+SAMPLES, STEP = 100, 0.02
+"""Of the test motion of a model whose recordings are not at hand: samples in which it goes through the
+range, and the time between them [s].
+"""
 
 EVEN = 3.0**0.5
 """Reach of an even distribution, in standard deviations."""
@@ -107,13 +108,8 @@ class RecordedInputs:
         """Return the inputs that a model was identified for; None if it says none.
 
         They are in any combination, but along the drive of a balance that has one. Inputs whose range
-        is not known are 0. The fastest motion runs through the range in 100 samples, which are
-        ``sample_time`` [s] apart, by default that of the model.
-
-        Raises
-        ------
-        ModelError
-            If the model depends on rate, and neither is known.
+        is not known are 0. The fastest motion runs through the range in 100 samples; they are 20 ms
+        apart unless the model has a sample time of its own, or one is given [s].
         """
         ranges = known_ranges(block.inputs, block.known_inputs)
         if not any(channel.name in ranges for channel in block.inputs):
@@ -121,9 +117,7 @@ class RecordedInputs:
         names = tuple(channel.name for channel in block.inputs)
         units = {channel.name: channel.unit for channel in block.inputs}
         ends = np.array([ranges.get(name, (0.0, 0.0)) for name in names]).T
-        step = sample_time or block.sample_time
-        if block.rate_dependent:
-            step = needs_sample_time(block.title, step)
+        step = sample_time or block.sample_time or STEP
         middle, scale = ends.mean(axis=0), np.where(ends[1] > ends[0], ends[1] - ends[0], 1.0)
         directions, extent = np.eye(len(names)), (ends - middle) / scale
         placed = balance_in(block)

@@ -10,7 +10,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.coupled.balance import balance_in
+from mckibben.blocks.coupled.balance import drive_of
 from mckibben.blocks.laws import wander
 from mckibben.blocks.ranges import known_ranges
 from mckibben.control.identified import BEYOND
@@ -120,14 +120,13 @@ class RecordedInputs:
         step = sample_time or block.sample_time or STEP
         middle, scale = ends.mean(axis=0), np.where(ends[1] > ends[0], ends[1] - ends[0], 1.0)
         directions, extent = np.eye(len(names)), (ends - middle) / scale
-        placed = balance_in(block)
-        if placed is not None and placed.solved and placed.balance.drive:
-            drive, n = np.array(placed.balance.drive), len(placed.balance.given)
-            ways = drive[:, 1:] / scale[:n, np.newaxis]
+        if (drive := drive_of(block)) is not None:
+            centre, n = drive[0], len(drive[0])
+            ways = drive[1] / scale[:n, np.newaxis]
             own = np.linalg.qr(ways, mode="complete").Q
             reach = EVEN * np.sqrt(((own.T @ ways) ** 2).sum(axis=1))
             directions[:n, :n] = own
-            extent[:, :n] = (drive[:, 0] - middle[:n]) / scale[:n] @ own + [-reach, reach]
+            extent[:, :n] = (centre - middle[:n]) / scale[:n] @ own + [-reach, reach]
         return cls(names, units, middle, scale, directions, extent, ends, SAMPLES, step)
 
     def motion(self, slowness: float, seed: int) -> Recording:

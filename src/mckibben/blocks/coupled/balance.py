@@ -680,3 +680,15 @@ def balance_in(model: Block) -> Placed | None:
         if isinstance(balance, Balance):
             return Placed(balance, solved, parts[:place], parts[place + 1 :])
     return None
+
+
+def drive_of(model: Block) -> tuple[Array, Array] | None:
+    """Return the middle of the pressures at which a model was driven, (n,), and ways from there, (n, r).
+
+    None if all pressures were driven freely, or the model does not begin with them.
+    """
+    placed = balance_in(model)
+    if placed is None or not placed.solved or not placed.balance.drive:
+        return None
+    drive = np.array(placed.balance.drive)
+    return drive[:, 0], drive[:, 1:]

@@ -23,10 +23,11 @@ import numpy as np
 
 import fuzzing
 from mckibben import Block, check_block
+from mckibben.blocks.base import run_many
 from mckibben.blocks.compose import Series
-from mckibben.blocks.laws import examples, input_limits, wander
-from mckibben.blocks.running import run_many
-from mckibben.blocks.saving import load, part_to_dict
+from mckibben.blocks.laws import examples, trial_limits, wander
+from mckibben.blocks.parameters import plain
+from mckibben.blocks.saving import load
 from mckibben.errors import MckibbenError
 from mckibben.export.c.project import c_files
 from mckibben.export.fmu.unit import fmu_files
@@ -178,7 +179,7 @@ def uses(block: Block, rng: Rng) -> Iterator[Callable[[], object]]:
     yield lambda: block.passes(np.zeros(n), np.ones(n))
     for initial in (None, "first_sample", "virgin", [0.0] * min(block.n_states, 1000)):
         yield partial(block.simulate, usual, sample_time=step, initial=initial)
-    yield lambda: block.simulate(wander(*input_limits(block), rng, 3, 8), sample_time=step)
+    yield lambda: block.simulate(wander(*trial_limits(block), rng, 3, 8), sample_time=step)
     yield lambda: run_many([block, block], usual, sample_time=step)
     yield lambda: recorded(block, usual, step)
     yield lambda: streamed(block, usual, step, rng)
@@ -220,7 +221,7 @@ def inverted(block: Block, inputs: Any, step: float) -> None:
     n = len(block.inputs) - len(block.scheduling)
     inverse.simulate(np.column_stack([outputs, inputs[:, n:]]), sample_time=step)
     inverse.reachable()
-    part_to_dict(inverse)
+    plain(inverse)
 
 
 SEED = [0]

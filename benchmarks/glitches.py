@@ -18,9 +18,9 @@ import numpy as np
 from mckibben import Block
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive import Adaptive
-from mckibben.blocks.laws import examples, input_limits, wander
+from mckibben.blocks.base import Stream
+from mckibben.blocks.laws import examples, trial_limits, wander
 from mckibben.blocks.ranges import LARGEST
-from mckibben.blocks.running import Stream
 
 SAMPLE_TIME, SECOND, SAMPLES = 0.01, 100, 600
 GLITCHES, TIMES = (1e6, 1e30, np.nan, np.inf), (37, 211, 398)
@@ -29,7 +29,7 @@ GLITCHES, TIMES = (1e6, 1e30, np.nan, np.inf), (37, 211, 398)
 def motion(block: Block) -> Array:
     """Return a motion over the range of a block, with its measurements near the references."""
     rng = np.random.default_rng(3)
-    inputs = np.resize(wander(*input_limits(block), rng, 100, 10), (SAMPLES, len(block.inputs)))
+    inputs = np.resize(wander(*trial_limits(block), rng, 100, 10), (SAMPLES, len(block.inputs)))
     if isinstance(block, Adaptive):
         m = len(block.measured)
         inputs[1:, -m:], inputs[0, -m:] = inputs[:-1, :m], inputs[0, :m]

@@ -39,7 +39,7 @@ CRASH = "no test by name"
 SECONDS = 900
 """Longest run of tests for one change; what does not end by then has caught nothing."""
 
-FILES, SPLITS = "src/mckibben/files", "src/mckibben/comparison/splits.py"
+FILES, SPLITS = "src/mckibben/files", "src/mckibben/splits.py"
 FAULTS = [
     # file, what stands there once, what is planted: readers and units off by ten, other splits
     (f"{FILES}/text.py", "values, flaw = cells.to_numpy(", "values, flaw = 10 * cells.to_numpy("),

@@ -10,7 +10,7 @@ import pytest
 
 import mckibben
 from mckibben import DataError, ModelError
-from mckibben.blocks.running import run_many
+from mckibben.blocks.base import run_many
 
 GPI = mckibben.GPI.example()
 

@@ -65,6 +65,7 @@ def episode(env: Any, act: Callable[[np.ndarray, dict[str, Any]], Any], seed: in
         ({"plant": "absent.json"}, "absent"),
         ({"plant": PI.example().inverse()}, "inverse"),
         ({"plant": Twin(PI.example()), "load": 5.0}, "load"),
+        ({"plant": Twin(PI.example())}, "control_time"),
     ],
 )
 def test_impossible_options_are_refused(options: dict[str, Any], about: str) -> None:
@@ -87,7 +88,7 @@ def test_a_twin_of_ones_own_muscle_is_an_environment() -> None:
     inverse = PI.example().inverse()
 
     def errors(twin: Twin, seed: int) -> Any:
-        env = environments.Tracking(plant=twin, duration=4.0, preview=1)
+        env = environments.Tracking(plant=twin, control_time=0.02, duration=4.0, preview=1)
         stream = inverse.stream()
 
         def act(seen: np.ndarray, info: dict[str, Any]) -> np.ndarray:
@@ -97,7 +98,9 @@ def test_a_twin_of_ones_own_muscle_is_an_environment() -> None:
         return np.array([float(info["error"][0]) for _, _, info in episode(env, act, seed)])
 
     twin = Twin(PI.example())
-    check_env(environments.Tracking(plant=twin, duration=1.0), skip_render_check=True)
+    check_env(
+        environments.Tracking(plant=twin, control_time=0.02, duration=1.0), skip_render_check=True
+    )
     assert np.abs(errors(twin, 1)[20:]).max() < 1e-6  # once the start is forgotten
 
 
@@ -106,7 +109,7 @@ def test_a_model_or_its_file_is_a_plant(tmp_path: Path) -> None:
     model.save(tmp_path / "mine.json")
     found = []
     for plant in (model, tmp_path / "mine.json", str(tmp_path / "mine.json")):
-        env = environments.Tracking(plant=plant, duration=1.0)
+        env = environments.Tracking(plant=plant, control_time=0.02, duration=1.0)
         env.reset(seed=1)
         found.append(env.step(np.array([0.5], dtype=np.float32))[4])
         # which measures no pressure

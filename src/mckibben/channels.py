@@ -14,7 +14,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.recording import Recording
+from mckibben.recording import COMMAND, REFERENCE, Recording
 
 Names = str | Sequence[str] | None
 """One channel, several, or None to choose by the recordings' names."""
@@ -36,9 +36,6 @@ UNITS_DRIVING, UNITS_MOVED = ("bar", "V"), ("mm", "rad")
 
 PLACES = "[a-z]|left|right|top|bottom|upper|lower|front|back|rear|flexor|extensor"
 """Suffixes other than numbers that distinguish channels of one quantity."""
-
-DESIRED = ("reference_", "command_")
-"""Prefixes of references of a loop, which are not measurements."""
 
 SCHEDULES = ("pressure_extensor", "force", "torque")
 """Channels, also numbered, that schedule models unless others are named."""
@@ -402,7 +399,7 @@ def _number(name: str) -> int:
 def _in_units(
     channels: Sequence[str], units: Mapping[str, str], wanted: Sequence[str]
 ) -> tuple[str, ...]:
-    measured = [name for name in channels if not name.startswith(DESIRED)]
+    measured = [name for name in channels if not name.startswith((REFERENCE, COMMAND))]
     for unit in wanted:
         found = tuple(name for name in measured if units[name] == unit)
         if found:

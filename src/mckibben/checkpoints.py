@@ -24,7 +24,7 @@ import numpy as np
 
 import mckibben
 from mckibben.blocks.base import Block
-from mckibben.blocks.saving import LARGEST_FILE, from_dict, to_dict
+from mckibben.blocks.saving import LARGEST_FILE, from_dict
 from mckibben.errors import DataWarning, MckibbenError
 from mckibben.outputs import UNFINISHED
 from mckibben.recording import PROVENANCE, Recording
@@ -155,13 +155,13 @@ def source(plugin: Any) -> str:
 
 def _to_json(value: Any) -> Any:
     if isinstance(value, Block):
-        return to_dict(value)
+        return value.to_dict()
     if not is_dataclass(value) or isinstance(value, type):
         raise TypeError(f"{type(value).__name__} is neither a block nor a dataclass")
     blocks = {f.name: getattr(value, f.name) for f in fields(value)}
     blocks = {name: block for name, block in blocks.items() if isinstance(block, Block)}
     plain = asdict(replace(value, **dict.fromkeys(blocks)))
-    return plain | {name: to_dict(block) for name, block in blocks.items()}
+    return plain | {name: block.to_dict() for name, block in blocks.items()}
 
 
 def _from_json(kind: type[Result], content: Any) -> Result:

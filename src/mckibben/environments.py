@@ -120,11 +120,18 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             system = _twin(plant)
             held = system.held
             control_time = system.sample_time if control_time is None else control_time
+            if control_time is None:
+                raise DataError(
+                    "the plant is a model of any sample time",
+                    parameter="control_time",
+                    remedy="give the time between commands, in seconds",
+                )
         _require(0 < control_time <= 1, "control_time", control_time, "0 to 1 s")
         _require(2 * control_time <= duration <= 1e4, "duration", duration, "2 steps to 10000 s")
         _require(preview in range(1001), "preview", preview, "a whole number from 0 to 1000")
         _require(0 <= effort < np.inf, "effort", effort, "0 or more")
 
+        self._control_time = control_time
         self._plant: Rig | Twin = system.changed({**(settings or {}), "sample_time": control_time})
         outputs = self._plant.outputs
         self._displacements = [
@@ -224,7 +231,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         from mckibben.signals import random_wave
 
         n = len(self._reference)
-        time = np.arange(max(n, 2)) * self._plant.sample_time
+        time = np.arange(max(n, 2)) * self._control_time
         waves = {}
         for name, low, high in zip(self._commands, self._low, self._high, strict=True):
             bottom, top = np.sort(self.np_random.uniform(0.0, 1.0, 2))
@@ -236,7 +243,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
 
     def _measured_stroke(self) -> float:
         """Return the largest range of displacement when all commands rise slowly together [mm]."""
-        time = np.arange(0.0, 10.0, self._plant.sample_time)
+        time = np.arange(0.0, 10.0, self._control_time)
         rise = np.minimum(time / 8.0, 1.0)
         waves = {
             name: low + rise * (high - low)
@@ -253,7 +260,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         if self._load:
             n = len(next(iter(waves.values())))
             channels["force"] = np.full(n, self._load)
-        commands = Recording(channels, self._plant.sample_time)
+        commands = Recording(channels, self._control_time)
         response = (
             self._plant.run(commands, ideal=True)
             if isinstance(self._plant, Rig)

@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike
 from mckibben.arrays import Array, check_finite
 from mckibben.errors import DataError
 
+USEFUL = 0.9
+"""Test error, relative to that of the constant, above which no model is recommended."""
+
 
 @dataclass(frozen=True)
 class Scores:
@@ -126,6 +129,11 @@ def err(measured: ArrayLike, modelled: ArrayLike) -> float:
     if np.ptp(y) == 0:
         return float("nan")
     return float(100 * np.sum(np.abs(y - model)) / np.sum(np.abs(y - y.mean())))
+
+
+def useful(error: float, constant: float) -> bool:
+    """Return whether an error is clearly smaller than that of the constant on the same samples."""
+    return error < USEFUL * constant
 
 
 def loop_width(u: ArrayLike, y: ArrayLike) -> float:

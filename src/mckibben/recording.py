@@ -61,6 +61,12 @@ PLAUSIBLE = {
 }
 """Plausible range, by the package's unit."""
 
+REFERENCE, COMMAND, MEASURED = "reference_", "command_", "_measured"
+"""Affixes of the names of a loop's signals: what was asked for, what was sent, and what was measured."""
+
+FEWEST_SAMPLES = 10
+"""Smallest number of samples of a recording, or of a part of one, that is read, fitted or tested."""
+
 PERIODIC = "periodic"
 """Entry of ``meta`` of a recording that is one period of a motion that repeats."""
 

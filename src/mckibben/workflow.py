@@ -55,7 +55,7 @@ from mckibben.reading import (
     read_files,
     read_sides,
 )
-from mckibben.recording import Recording, sample_time_of
+from mckibben.recording import COMMAND, Recording, sample_time_of
 from mckibben.studying.results import Exported, Fit, Inverse, Price, Tracking
 from mckibben.system.progress import Tell, telling
 
@@ -333,7 +333,6 @@ def track(
     from mckibben.control.identified import beyond_known
     from mckibben.control.preview import samples_ahead
     from mckibben.control.roles import asked, flatters_feedback, kind_of, offered
-    from mckibben.control.twin import COMMAND
     from mckibben.files import write
 
     chosen, reading = _chosen(TrackOptions, options, reading, given)

@@ -8,7 +8,9 @@ import pytest
 
 from mckibben import ModelError
 from mckibben.blocks import saving
+from mckibben.blocks.base import FORMAT, VERSION
 from mckibben.blocks.fields import MOST_COEFFICIENTS, MOST_NUMBERS
+from mckibben.blocks.parameters import plain
 from mckibben.registry import load
 
 
@@ -24,10 +26,10 @@ def refused(content: dict[str, Any]) -> None:
 
 def nested(depth: int, kind: str = "series", twice: bool = False) -> dict[str, Any]:
     """Return a model in so many compositions."""
-    part = saving.part_to_dict(load("blocks", "pi").example())
+    part = plain(load("blocks", "pi").example())
     for _ in range(depth):
         part = {"kind": kind, "parts": [part, part] if twice else [part]}
-    return {"format": saving.FORMAT, "version": saving.VERSION, **part}
+    return {"format": FORMAT, "version": VERSION, **part}
 
 
 def test_nesting_too_deep_is_refused() -> None:

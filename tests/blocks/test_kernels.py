@@ -22,7 +22,7 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.force.multistate_friction import deflected
 from mckibben.blocks.hysteresis.differential import flow
 from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
-from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach, _output, _solve, everett
+from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach, everett, output_at, solved_everett
 from mckibben.blocks.laws import wander
 from mckibben.blocks.solving import eliminate, solve_near
 from mckibben.estimators.coupled.mpi_narmax import remembered
@@ -278,17 +278,19 @@ def test_relays_at_a_corner_and_at_the_ends() -> None:
     n = int(numbers[0])
     levels, table = numbers[1 : 1 + n], numbers[1 + n : 1 + n + n * n]
     state = block.initial_state(np.array([levels[0]]))
-    assert plain(_output)(state[2], state, levels, table) == state[2 + DEPTH]
+    assert plain(output_at)(state[2], state, levels, table) == state[2 + DEPTH]
     for other, rising in ((levels[-1], True), (levels[0], False)):
-        assert plain(_solve)(1.0, other, rising, levels, table) == other
+        assert plain(solved_everett)(1.0, other, rising, levels, table) == other
     middle = levels[n // 2]
     for u in (middle + 0.3, levels[-1]):
         wanted = plain(everett)(u, middle, levels, table)
-        assert plain(_solve)(wanted, middle, True, levels, table) == pytest.approx(u)
+        assert plain(solved_everett)(wanted, middle, True, levels, table) == pytest.approx(u)
     wanted = plain(everett)(middle, levels[0] + 0.1, levels, table)
-    assert plain(_solve)(wanted, middle, False, levels, table) == pytest.approx(levels[0] + 0.1)
+    assert plain(solved_everett)(wanted, middle, False, levels, table) == pytest.approx(
+        levels[0] + 0.1
+    )
     plateau = np.zeros_like(table)
-    assert plain(_solve)(0.0, middle, True, levels, plateau) == levels[n // 2 + 1]
+    assert plain(solved_everett)(0.0, middle, True, levels, plateau) == levels[n // 2 + 1]
 
 
 # -- air -------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ import pytest
 from mckibben import GPI, PI, DataError, ModelError, load
 from mckibben.blocks import saving
 from mckibben.blocks.laws import examples
+from mckibben.blocks.parameters import plain
 
 EXAMPLES = examples()
 GOOD: dict[str, Any] = GPI.example().to_dict()
@@ -70,7 +71,7 @@ def test_damaged_content_is_refused(damage: str, tmp_path: Path) -> None:
     refused(tmp_path / "model.json", json.dumps(content).encode())
 
 
-PART = json.dumps(saving.part_to_dict(PI.example()))
+PART = json.dumps(plain(PI.example()))
 
 RAW: dict[str, bytes] = {
     "nothing": b"",

@@ -13,7 +13,6 @@ from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.dynamics.narx import NarxPolynomial
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.blocks.starts import history, run_on
 from mckibben.recording import PERIODIC
 
 T = np.linspace(0, 1, 800)
@@ -34,7 +33,7 @@ def recorded(block: Block, u: np.ndarray) -> Recording:
 @pytest.mark.parametrize("block", [*MEMORY, *LINEAR], ids=lambda block: block.kind)
 def test_a_run_from_rest_begins_at_rest(block: Block) -> None:
     recording = recorded(block, U)
-    assert len(history(block, run_on(block, recording))) == 0
+    assert len(block.past(block.as_run(recording))) == 0
     np.testing.assert_array_equal(
         block.start_on(recording), block.initial_state(U[:1], sample_time=0.01)
     )

@@ -12,13 +12,13 @@ from mckibben.arrays import Array
 from mckibben.channels import Channels, channels_of
 from mckibben.comparison.choosing import CAUTION
 from mckibben.comparison.leaderboard import Row, doubts_of
-from mckibben.comparison.splits import N_PARTS, Span, parts_of, spans_of
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.leaving_out import MOST_FREE
 from mckibben.metrics import Scores
 from mckibben.numerics.tracker import Tracker
 from mckibben.registry import load
 from mckibben.signals import irregular_triangle, triangle
+from mckibben.splits import N_PARTS, Span, parts_of, spans_of
 
 CHANNELS = Channels(("pressure",), ("displacement",))
 STEP = 0.02

@@ -11,11 +11,12 @@ import pytest
 
 from mckibben import GPI, DataError, ModelError, Recording, compare, registry
 from mckibben.channels import Channels
-from mckibben.comparison.choosing import USEFUL, order, recommended
+from mckibben.comparison.choosing import order, recommended
 from mckibben.comparison.leaderboard import Leaderboard
-from mckibben.comparison.splits import held_out_part
 from mckibben.estimators.core.estimator import Estimator
+from mckibben.metrics import USEFUL
 from mckibben.signals import irregular_triangle, triangle
+from mckibben.splits import held_out_part
 
 CHANNELS = Channels(("pressure",), ("displacement",))
 TIME = np.arange(0, 24, 0.02)

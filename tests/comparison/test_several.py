@@ -8,8 +8,8 @@ import pytest
 from mckibben import GPI, DataError, Recording, compare
 from mckibben.channels import Channels, channels_of, held_at_levels
 from mckibben.comparison.planning import plan_of
-from mckibben.comparison.splits import held_out
 from mckibben.signals import triangle
+from mckibben.splits import held_out
 
 TIME = np.arange(0, 20, 0.05)
 INPUTS, OUTPUTS = ("pressure_1", "pressure_2"), ("displacement_1", "displacement_2")

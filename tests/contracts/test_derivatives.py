@@ -14,7 +14,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.complex_step import twin
 from mckibben.blocks.derivatives import Tangents, derivatives
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.laws import input_limits, wander
+from mckibben.blocks.laws import trial_limits, wander
 from mckibben.registry import load, names
 from mckibben.system.compiling import deferred
 
@@ -40,7 +40,7 @@ def both_ways(kind: str) -> Iterator[Block]:
 
 
 def path(block: Block) -> Array:
-    return wander(*input_limits(block), np.random.default_rng(1), 12, 8)
+    return wander(*trial_limits(block), np.random.default_rng(1), 12, 8)
 
 
 def extrapolated(block: Block, inputs: Array, place: int) -> tuple[Array, Array]:

@@ -23,12 +23,10 @@ from mckibben import (
     load_rig,
     registry,
 )
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.feedback import FeedforwardFeedback, PIDFeedback
-from mckibben.blocks.fields import MEASURED
 from mckibben.blocks.laws import examples
-from mckibben.blocks.running import Stream
 from mckibben.control import (
     BlockController,
     DisturbanceObserver,
@@ -39,6 +37,7 @@ from mckibben.control import (
 )
 from mckibben.control.roles import rest_length_of
 from mckibben.control.tuning import tune_pid, untuned_pid
+from mckibben.recording import MEASURED
 from mckibben.rigs import Rig
 from mckibben.rigs.files import rig_names
 
@@ -278,7 +277,7 @@ def test_feedback_is_in_the_unit_of_its_compensator(behind: bool) -> None:
         block = named(PI.example(), "pressure", measure)
         scaled = {"weights": tuple(scale * np.array(block.weights)), "offset": scale * block.offset}
         block = replace(block, **scaled).inverse()
-        pid = tune_pid(plant, hold=2.0, references=block.inputs)
+        pid = tune_pid(plant, sample_time=0.02, hold=2.0, references=block.inputs)
         assert pid.driven == block.inputs
         controller = control_law(
             "feedforward-pid" if behind else "pid", block, partial(replace, pid)
@@ -287,7 +286,7 @@ def test_feedback_is_in_the_unit_of_its_compensator(behind: bool) -> None:
     np.testing.assert_allclose(results[0], results[1], rtol=1e-9)
     contraction = named(PI.example(), "pressure", "contraction").inverse()
     with pytest.raises(MckibbenError, match="references=compensator"):
-        FeedforwardFeedback.of(contraction, tune_pid(plant, hold=2.0))
+        FeedforwardFeedback.of(contraction, tune_pid(plant, sample_time=0.02, hold=2.0))
 
 
 @pytest.mark.parametrize("order", [(1, 2), (2, 1)])

@@ -62,7 +62,7 @@ def test_without_a_band_a_twin_is_simulate_to_the_bit(block: Block) -> None:
             limits[channel.name] = (0.5, 4.5)
         else:
             held[channel.name] = {"length": 4.0}.get(channel.name, 2.0)
-    twin = Twin(block, limits=limits, held=held, sample_time=block.sample_time)
+    twin = Twin(block, limits=limits, held=held, sample_time=block.sample_time or STEP)
     rest = [0.5 if name in limits else held[name] for name in twin.inputs]
     rng = np.random.default_rng(1)
     rows = np.array(

@@ -14,7 +14,7 @@ from mckibben.blocks.fields import Channel
 from mckibben.blocks.runs import FreeRun, run_of
 from mckibben.blocks.saving import from_dict
 from mckibben.diagnosis.bands import (
-    FEWEST,
+    FEWEST_UNITS,
     LEVEL,
     SHARES,
     TestedBand,
@@ -238,7 +238,7 @@ def test_a_band_of_training_is_known_where_each_test_recording_has_its_share_ins
     band, banded = chosen(train, wave(1), wave(2))
     assert band.unknown is None
     assert band.level == LEVEL
-    assert min(band.units, band.branches) >= FEWEST
+    assert min(band.units, band.branches) >= FEWEST_UNITS
     assert SHARES[0] <= band.lowest <= band.coverage["displacement"] <= band.highest <= SHARES[1]
     assert isinstance(banded, Banded)
     assert banded.band.widening[0] > 0
@@ -251,11 +251,11 @@ def test_a_band_of_few_branches_or_blocks_is_not_known() -> None:
     u = triangle(STEP * np.arange(1200), 10.0, [5.0])
     band, banded = chosen(recorded(u, 0), recorded(u[:600], 1))
     assert (band.unknown, banded) == ("branches", None)
-    assert band.units >= FEWEST > band.branches
+    assert band.units >= FEWEST_UNITS > band.branches
     assert band.coverage["displacement"] == pytest.approx(LEVEL, abs=0.05)
     time = STEP * np.arange(400)
     run = recorded(random_wave(time, 1.0, 5.0, seed=0), 0, 0.1)
     drifting = run.with_channels(displacement=run["displacement"] + np.sin(0.3 * time))
     band, _ = chosen(drifting, recorded(random_wave(time, 1.0, 5.0, seed=1), 1))
     assert band.unknown == "blocks"
-    assert band.units < FEWEST <= band.branches
+    assert band.units < FEWEST_UNITS <= band.branches

@@ -12,8 +12,8 @@ from scipy.signal import lfilter
 from mckibben import PI, DataError, Recording
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.runs import FreeRun, run_of
-from mckibben.comparison.choosing import USEFUL
 from mckibben.diagnosis.check import check, check_runs
+from mckibben.metrics import USEFUL
 from mckibben.signals import staircase
 from tests.diagnosis.runs import LINE, STEP, TRUE, Array, cycles, noise, recording, run
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mckibben import Block
-from mckibben.blocks.running import Stream
+from mckibben.blocks.base import Stream
 from mckibben.export import export_c
 
 Array = NDArray[np.float64]

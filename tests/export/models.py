@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mckibben import Block, ModelError, ModelWarning
 from mckibben.blocks.adaptive import Adaptive
-from mckibben.blocks.laws import examples, input_limits, wander
+from mckibben.blocks.laws import examples, trial_limits, wander
 from mckibben.registry import load
 from tests.export.building import SAMPLE_TIME
 from tests.golden.models import all_models, registered
@@ -40,7 +40,7 @@ def path_for(block: Block, seed: int, n: int) -> Array:
     """Return inputs with minor loops and holds over the block's range, shape (n, n_inputs)."""
     rng = np.random.default_rng(seed)
     pace = 200 if block.rate_dependent else 12
-    inputs = wander(*input_limits(block), rng, pace, max(n // pace, 3) + 2)
+    inputs = wander(*trial_limits(block), rng, pace, max(n // pace, 3) + 2)
     inputs = np.resize(inputs, (n, inputs.shape[1]))
     if isinstance(block, Adaptive):
         # measured as on a plant that is 5 % off: of nonsense, rounding decides what is believed

@@ -16,8 +16,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import Block, DataError, ModelError
+from mckibben.blocks.base import Stream
 from mckibben.blocks.laws import examples
-from mckibben.blocks.running import Stream
 from mckibben.export import export_fmu
 from mckibben.export.fmu.unit import own_platform
 from tests.export.building import SAMPLE_TIME

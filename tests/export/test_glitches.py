@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import Block
-from mckibben.blocks.running import Stream
+from mckibben.blocks.base import Stream
 from tests.export.building import SAMPLE_TIME, Compiled, Precision, build
 from tests.export.models import MODELS, path_for
 from tests.tools import needs

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, ModelError, muscles
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.laws import examples
-from mckibben.blocks.running import Stream
 from mckibben.export import export_ros2
 from mckibben.export.ros2.package import ros2_files
 from tests.tools import needs

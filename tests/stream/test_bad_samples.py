@@ -10,9 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import Block, DataError, ModelWarning
-from mckibben.blocks.laws import examples, input_limits, wander
-from mckibben.blocks.ranges import input_bounds
-from mckibben.blocks.running import Stream
+from mckibben.blocks.base import Stream
+from mckibben.blocks.laws import examples, trial_limits, wander
 from mckibben.registry import load
 
 Array = NDArray[np.float64]
@@ -25,7 +24,7 @@ BAD = (np.nan, np.inf, -np.inf, 1e6, -1e6, 1e30, 1e308)
 
 def path_for(block: Block, seed: int, n: int = 120) -> Array:
     """Return inputs over the block's range, shape (n, n_inputs)."""
-    inputs = wander(*input_limits(block), np.random.default_rng(seed), 10, 14)
+    inputs = wander(*trial_limits(block), np.random.default_rng(seed), 10, 14)
     return np.resize(inputs, (n, inputs.shape[1]))
 
 
@@ -86,7 +85,7 @@ def test_nothing_happens_before_the_first_good_sample(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_sizes_just_within_bounds_give_finite_outputs(kind: str) -> None:
     block = EXAMPLES[kind]
-    bounds = input_bounds(block)
+    bounds = block.input_bounds
     rng, inputs = np.random.default_rng(6), path_for(block, 5, 60).copy()
     for row in range(0, len(inputs), 4):  # the first sample too
         column = rng.integers(inputs.shape[1])
@@ -101,9 +100,9 @@ def test_sizes_just_within_bounds_give_finite_outputs(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_motions_within_the_range_and_a_fifth_beyond_pass(kind: str) -> None:
     block = EXAMPLES[kind]
-    low, high = input_limits(block)
+    low, high = trial_limits(block)
     ends = np.array([low - 0.2 * (high - low), high + 0.2 * (high - low)])
-    bounds = input_bounds(block)
+    bounds = block.input_bounds
     assert (bounds[:, 0] <= ends[0]).all()
     assert (ends[1] <= bounds[:, 1]).all()
 
@@ -112,7 +111,7 @@ def test_motions_within_the_range_and_a_fifth_beyond_pass(kind: str) -> None:
 def test_every_clipped_sample_has_the_status(kind: str) -> None:
     """The statuses of a stream are as many as `Block.n_clipped` of a run counts."""
     block = EXAMPLES[kind]
-    low, high = input_limits(block)
+    low, high = trial_limits(block)
     inputs = low + (path_for(block, 9) - low) * 1.4 - 0.2 * (high - low)
     stream = block.stream(SAMPLE_TIME)
     _, _, statuses = streamed(stream, inputs)

@@ -12,9 +12,9 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Affine
-from mckibben.comparison.splits import given_split
 from mckibben.registry import load
 from mckibben.signals import triangle
+from mckibben.splits import given_split
 from mckibben.studying.inverting import checked, made
 from mckibben.studying.recorded_inputs import RecordedInputs
 from mckibben.studying.static_map import static_error, static_map

@@ -30,7 +30,9 @@ WORK: dict[str, Callable[[Recording, Any], object]] = {
     "tracking": lambda run, p: track(
         model(run).inverse(), mckibben.load_rig("mas20-hanging"), run.slice(0, 50), progress=p
     ),
-    "tuning": lambda run, p: tune_pid(mckibben.load_rig("mas20-hanging"), hold=1.0, progress=p),
+    "tuning": lambda run, p: tune_pid(
+        mckibben.load_rig("mas20-hanging"), sample_time=0.02, hold=1.0, progress=p
+    ),
     "calibrating": lambda run, p: mckibben.calibrate(
         model(run), [run.slice(0, 700), run.slice(700, 1500)], progress=p
     ),

@@ -21,8 +21,9 @@ from mckibben.app.workspace import Workspace
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
+from mckibben.blocks.ranges import known_ranges
 from mckibben.errors import DataError, MckibbenError, ModelError
-from mckibben.recording import Recording
+from mckibben.recording import REFERENCE, Recording
 
 if TYPE_CHECKING:
     from mckibben.studying.simulating import Simulation
@@ -52,9 +53,6 @@ SETTINGS = {
     "predictive": ("horizon", "rate_limit", "pressures"),
 }
 """Fields of `InvertOptions`, by the compensator that they are of."""
-
-STEP = 0.02
-"""Time between steps, where neither a model nor a recording has one [s]."""
 
 MOST_SAMPLES = 1_000_000
 """Of a reference."""
@@ -139,30 +137,65 @@ def asked_for(workspace: Workspace, name: str) -> tuple[dict[str, Channel], dict
 
 
 def pace(workspace: Workspace, name: str) -> tuple[float, float]:
-    """Return time between steps, and of a cycle over the range at the speed of the recordings [s]."""
+    """Return time between steps, and of a cycle over the range at the speed of the recordings [s].
+
+    Where these have no whole cycle, that is the time of the longest.
+
+    Raises
+    ------
+    DataError
+        If neither the model nor a recording in use has a sample time.
+    """
     from mckibben.signals import cycles
 
     block = workspace.model(name)
     steps: list[float] = []
     seconds: list[float] = []
     strokes: list[float] = []
-    ranges = {channel.name: np.ptp(recorded(workspace, channel.name)) for channel in block.outputs}
+    ranges = {c.name: np.ptp(levels(workspace, block, c.name)) for c in block.outputs}
+    longest = 0.0
     for run in workspace.used().values():
         if run.sample_time:
+            longest = max(longest, run.sample_time * len(run))
             steps.append(run.sample_time)
             for key in ranges.keys() & run.channels:
                 with suppress(DataError):
                     for cycle in cycles(run[key]):
                         seconds.append(run.sample_time * (cycle.stop - cycle.start - 1))
                         strokes.append(float(np.ptp(run[key][cycle]) / ranges[key]))
-    step = block.sample_time or float(f"{np.median(steps or [STEP]):.3g}")
-    return step, sum(seconds) / sum(strokes) if seconds else 10.0
+    if not steps and block.sample_time is None:
+        remedy = "import one with time, or choose it among the data in use"
+        raise DataError("no recording in use has a time", remedy=remedy)
+    step = block.sample_time or float(f"{np.median(steps):.3g}")
+    return step, sum(seconds) / sum(strokes) if seconds else longest
 
 
 def recorded(workspace: Workspace, name: str) -> Array:
-    """Return a channel of all recordings in use, one after the other; 0 and 1 where none has it."""
+    """Return a channel of all recordings in use, one after the other; empty where none has it."""
     runs = [run[name] for run in workspace.used().values() if name in run]
-    return np.concatenate(runs) if runs else np.array([0.0, 1.0])
+    return np.concatenate(runs) if runs else np.empty(0)
+
+
+def levels(workspace: Workspace, block: Block, name: str) -> Array:
+    """Return a channel as recorded, or the ends of what a model was identified for.
+
+    Raises
+    ------
+    DataError
+        If neither is known.
+    """
+    values = recorded(workspace, name)
+    if values.size:
+        return values
+    known = known_ranges(block.inputs, block.known_inputs)
+    known |= known_ranges(block.outputs, block.known_outputs)
+    if name not in known:
+        raise DataError(
+            "neither a recording in use nor the model has a range of it",
+            channel=name,
+            remedy="import a recording of it, or choose one among the data in use",
+        )
+    return np.array(known[name])
 
 
 def reach(
@@ -184,7 +217,7 @@ def reach(
             recorded_inputs = RecordedInputs.of(runs, driven)
             found = recorded_inputs.reached(block, others, pace(workspace, name)[1])
         for channel in asked_for(workspace, name)[0]:
-            values = recorded(workspace, channel)
+            values = levels(workspace, block, channel)
             low, high = found.get(channel, (-np.inf, np.inf))
             low, high = max(low, float(values.min())), min(high, float(values.max()))
             found[channel] = low, high if high > low else low + 1.0
@@ -203,14 +236,15 @@ def wish(workspace: Workspace, name: str) -> Json:
     """
     step, cycle = pace(workspace, name)
     channels, held = asked_for(workspace, name)
+    block = workspace.model(name)
     found: Json = {"seconds": float(f"{max(2 * cycle, 40 * step):.2g}"), "cycles": 2, "step": step}
     found |= {"stored": "", "now": next(iter(channels)), "channels": {}}
-    found["held"] = {key: float(f"{np.median(recorded(workspace, key)):.4g}") for key in held}
+    found["held"] = {key: float(f"{np.median(levels(workspace, block, key)):.4g}") for key in held}
     inverse, units = made(workspace, name, "inverse", {}), units_of(channels | held)
     for margin in (0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4):
         for channel, (low, high) in reach(workspace, name, found["held"]).items():
             digits, least = 2 - math.floor(math.log10(high - low)), margin * (high - low)
-            first = float(np.clip(recorded(workspace, channel)[0], low + least, high - least))
+            first = float(np.clip(levels(workspace, block, channel)[0], low + least, high - least))
             other = high - least if high - first >= first - low else low + least
             kind = "sine" if channel == found["now"] else "hold"
             ends = {"first": round(first, digits), "other": round(other, digits)}
@@ -296,7 +330,7 @@ def of_file(run: Recording, wanted: Collection[str]) -> dict[str, Points]:
         raise DataError("it has no time", remedy="add a column time_s")
     found, times = {}, (run.time - run.time[0]).tolist()
     for name in wanted:
-        column = next((own for own in (f"reference_{name}", name) if own in run), None)
+        column = next((own for own in (REFERENCE + name, name) if own in run), None)
         if column is None:
             problem = "the compensator is asked for it, and the file has no such column"
             raise DataError(problem, channel=name, remedy=f"name a column {name}")
@@ -328,16 +362,16 @@ def read_run(workspace: Workspace, file: str) -> Recording:
 def plant_of(workspace: Workspace, plant: str) -> Any:
     """Return ``rig NAME``, or ``model NAME``; unknown limits are those recorded."""
     from mckibben.control import Twin
-    from mckibben.control.identified import known_ranges
     from mckibben.rigs import load_rig
 
     kind, _, name = plant.partition(" ")
     if kind == "rig":
         return load_rig(name)
     model, limits = workspace.model(name), {}
-    for channel in {c.name for c in model.inputs}.difference(known_ranges(model)):
+    known = known_ranges(model.inputs, model.known_inputs)
+    for channel in {channel.name for channel in model.inputs}.difference(known):
         values = recorded(workspace, channel)
-        if np.ptp(values):
+        if values.size and np.ptp(values):
             limits[channel] = float(values.min()), float(values.max())
     return Twin(model, limits=limits, name=name)
 

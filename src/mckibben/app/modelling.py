@@ -16,7 +16,6 @@ from mckibben.channels import Channels, channels_of
 from mckibben.comparison.choosing import recommended
 from mckibben.comparison.planning import Candidate, objections, plan_of
 from mckibben.comparison.ranking import ranked
-from mckibben.comparison.splits import split_of, tested_from
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.catalogue import Need, declared, full_name, needs
 from mckibben.estimators.core.data import training_data
@@ -24,6 +23,7 @@ from mckibben.numerals import numeral
 from mckibben.recording import Recording
 from mckibben.report import results, words
 from mckibben.report.builder import Figure, Item, Table, Text
+from mckibben.splits import split_of, tested_from
 from mckibben.studying.inverting import compensation
 
 VALIDATED = 1.2

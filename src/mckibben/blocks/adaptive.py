@@ -25,18 +25,10 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import (
-    Block,
-    Ports,
-    Run,
-    Start,
-    explicit_state,
-    needs_sample_time,
-)
+from mckibben.blocks.base import Advance, Block, Board, Ports, Start
 from mckibben.blocks.compose import Layout, Series
 from mckibben.blocks.fields import (
     LONGEST_DELAY,
-    MEASURED,
     STRICT,
     Channel,
     ChannelField,
@@ -49,8 +41,11 @@ from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.learning import READY, SENSES, USUAL, Learnable, start_root
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
+from mckibben.blocks.starts import stated
 from mckibben.errors import ModelError, require
+from mckibben.recording import MEASURED
 
 INITIAL_SPREAD = 1 / 3
 """Initial standard deviations of the fitted parameters, relative to those of the expected changes.
@@ -352,7 +347,7 @@ class Adaptive(Block):
             return super().initial_state(first, start, sample_time)
         asked = first[: len(first) - len(self.measured)]
         if len(start) == self.n_states:
-            return explicit_state(self, start)
+            return stated(self.kind, self.n_states, start)
         if len(start) == self.n_adapted:
             adapted = np.array(start)
             self._split(adapted)[4][READY::SENSES] = 0.0  # the next measurement has no prediction
@@ -409,11 +404,13 @@ class Adaptive(Block):
             ]
         )
 
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+    def bind(
+        self, sample_time: float | None, state: Array, inputs: Array, outputs: Array
+    ) -> Advance:
         run = Layout(self).bind if self.parts else super().bind
         return run(sample_time, state, inputs, outputs)
 
-    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         """Lay out the parts; those after the core twice."""
         if not self.parts:
             return super().wired(board, taken)

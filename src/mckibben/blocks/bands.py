@@ -17,12 +17,13 @@ from pydantic import BeforeValidator, Field, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Ports, Start, needs_sample_time
-from mckibben.blocks.compose import Composition, Layout
+from mckibben.blocks.base import Block, Board, Ports, Start
+from mckibben.blocks.compose import Composition
 from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Rows, Vector
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError, require
 from mckibben.numerals import numeral
@@ -245,7 +246,7 @@ class Banded(Composition):
         own = self.forward.start_on(recording)
         return np.concatenate([own, np.zeros(self.band.n_states)])
 
-    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         return self.band.wired(board, self.forward.wired(board, taken))
 
     def joined(self, parts: Sequence[str]) -> str:

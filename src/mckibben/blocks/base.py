@@ -8,37 +8,40 @@ else here is built on that.
 from __future__ import annotations
 
 import dataclasses
-import math
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, partial
+from math import isfinite, nan
 from operator import attrgetter
 from pathlib import Path
 from reprlib import Repr
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
+from typing import Any, ClassVar, Protocol, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mckibben.arrays import Array
-from mckibben.blocks import saving
-from mckibben.blocks.fields import Channel, Initial, drives
-from mckibben.blocks.kernels import Step, in_scratch
-from mckibben.blocks.parameters import Parametrised, gathered
-from mckibben.blocks.ranges import SLOW_STEP, both_sides, by_name, over_inputs
-from mckibben.blocks.running import Stream, refuse_time, run_many
-from mckibben.blocks.starts import run_on, start_state
+from mckibben.arrays import Array, Mask
+from mckibben.blocks.fields import Channel, Initial, check_units, drives
+from mckibben.blocks.kernels import Step, scratch_of
+from mckibben.blocks.parameters import Parametrised, gathered, plain
+from mckibben.blocks.ranges import AT_REST, first_known, range_over, unknown, widened
+from mckibben.blocks.runs import Run, run_of
+from mckibben.blocks.sample_times import refuse_time
+from mckibben.blocks.starts import explaining_past, stated
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
+from mckibben.system.atomic import write_text
 from mckibben.system.compiling import bound
 from mckibben.system.showing import DrawsItself
+from mckibben.system.threads import on_all_cores
 
-if TYPE_CHECKING:
-    from mckibben.blocks.compose import Layout
-
-Run = Callable[[], None]
+Advance = Callable[[], None]
 Start = Callable[..., None]
+
+FORMAT, VERSION = "mckibben-model", 1
+"""First fields of a saved block; see `mckibben.blocks.saving`."""
 
 VIRGIN = {"first_sample": False, "virgin": True}
 """Named start states, and whether a start kernel computes them without past inputs."""
@@ -51,6 +54,21 @@ Ports = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
 
 SEVERAL: Ports = ("driven",), ("scheduled",), ("given",)
 """Channel fields of blocks with several channels."""
+
+
+class Board(Protocol):
+    """Signals on which a composition calls blocks; see `mckibben.blocks.compose.Layout`."""
+
+    from_rest: bool
+
+    def call(self, block: Block, taken: Sequence[int]) -> list[int]:
+        """Append a block, and return its output signals."""
+
+    def add(self, terms: Sequence[int]) -> int:
+        """Append a sum, and return its output signal."""
+
+    def resume(self, state: Sequence[float] | Array) -> None:
+        """Set the start state of the blocks called last from their joint state."""
 
 
 class Block(DrawsItself, Parametrised):
@@ -198,8 +216,8 @@ class Block(DrawsItself, Parametrised):
         Infinite where none is known. Those of a compensator are outputs of the model that it inverts.
         """
         if self._of_model is not None:
-            return by_name(self.inputs, both_sides(self._of_model))
-        found = by_name(self.inputs, self._known_of_parts())
+            return first_known(self.inputs, self._of_model.known_channels)
+        found = first_known(self.inputs, self._known_of_parts())
         driven = found[: self.n_driven]
         if hasattr(self, "input_range"):
             driven[:] = self.input_limits
@@ -225,8 +243,30 @@ class Block(DrawsItself, Parametrised):
         Those of a compensator are identified inputs of the model that it inverts.
         """
         if self._of_model is not None:
-            return by_name(self.outputs, both_sides(self._of_model))
-        return over_inputs(self, self.sample_time or SLOW_STEP)
+            return first_known(self.outputs, self._of_model.known_channels)
+        timeless = self.rate_dependent and self.sample_time is None
+        run = partial(self._run, AT_REST if timeless else self.sample_time)
+        found = range_over(run, self.known_inputs, moving=not timeless)
+        return unknown(len(self.outputs)) if found is None else found
+
+    @property
+    def known_channels(self) -> list[tuple[tuple[Channel, ...], Array]]:
+        """The outputs and the inputs with their identified ranges."""
+        return [(self.outputs, self.known_outputs), (self.inputs, self.known_inputs)]
+
+    @cached_property
+    def input_bounds(self) -> Array:
+        """Lowest and highest value of every input that is no fault, shape (n_inputs, 2).
+
+        See `mckibben.blocks.ranges.widened`.
+
+        Examples
+        --------
+        >>> from mckibben import PI
+        >>> PI.example().input_bounds.tolist()
+        [[-5.0, 10.0]]
+        """
+        return widened(self.inputs, self.known_inputs)
 
     @property
     def n_missable(self) -> int:
@@ -273,7 +313,7 @@ class Block(DrawsItself, Parametrised):
         """
         start = self.start if initial is None else initial
         if not isinstance(start, str) or start not in VIRGIN:
-            return explicit_state(self, start)
+            return stated(self.kind, self.n_states, start)
         state = np.zeros(self.n_states)
         kernel = self.start_kernel
         if kernel is not None:
@@ -286,9 +326,88 @@ class Block(DrawsItself, Parametrised):
         """Return the equilibrium state for a first input and output; None if outputs do not matter."""
         return None
 
+    def as_run(self, recording: Recording, rows: Mask | None = None, index: int = 0) -> Run:
+        """Return a recording as a run of this block, without outputs if it lacks one of them.
+
+        ``rows`` are the samples that count, shape (n,); those bridged in reading never do.
+        """
+        inputs, outputs = ([c.name for c in some] for some in (self.inputs, self.outputs))
+        whole = recording.with_derived([*inputs, *outputs])
+        measured = all(whole.units.get(channel.name) == channel.unit for channel in self.outputs)
+        return run_of(
+            whole,
+            inputs[: self.n_driven],
+            outputs if measured else (),
+            inputs[self.n_driven :],
+            ~whole.bridged if rows is None else rows & ~whole.bridged,
+            index=index,
+        )
+
     def start_on(self, recording: Recording) -> Array:
         """Return the state before the first sample of a recording; see `mckibben.blocks.starts`."""
-        return start_state(self, run_on(self, recording))
+        run = self.as_run(recording)
+        return self.state_after(self.past(run), run)
+
+    def state_after(self, past: Array, run: Run) -> Array:
+        """Return the state after inputs before a run, shape (k, n_inputs).
+
+        That of a block of past outputs is given by the first outputs instead.
+        """
+        known = self.known_state(run)
+        if known is not None:
+            return known
+        if len(past):
+            return self.run(past, run.sample_time, "first_sample")[1]
+        return self.initial_state(run.first, sample_time=run.sample_time)
+
+    def known_state(self, run: Run) -> Array | None:
+        """Return the state that the first outputs of a run give; None of most blocks."""
+        outputs = self._first_outputs(run)
+        return None if outputs is None else self.state_at(run.first, outputs)
+
+    def past(self, run: Run) -> Array:
+        """Return the inputs before a run that explain its first outputs, shape (k, n_inputs).
+
+        Empty (k = 0) where the block begins at rest at the first input, or as it states.
+        """
+        outputs = self._first_outputs(run)
+        if outputs is None or self.n_driven != 1 or self.state_at(run.first, outputs) is not None:
+            return np.empty((0, run.first.size))
+        driven = self
+        while parts := getattr(driven, "parts", ()):
+            driven = parts[0]
+        return explaining_past(
+            partial(self._from_rest, sample_time=run.sample_time),
+            run.inputs,
+            outputs,
+            linear=self.is_linear,
+            rate_dependent=self.rate_dependent,
+            ends=getattr(driven, "input_range", None),
+        )
+
+    def _first_outputs(self, run: Run) -> Array | None:
+        """Return the first outputs of a run, from which the block begins; None where they have no say.
+
+        That is where they are not known, or also an input, where the block has no state or states its
+        start, and where it is a compensator, whose outputs are commands.
+        """
+        commands = drives(self.outputs[0]) and not drives(self.inputs[0])
+        given = {channel.name for channel in self.inputs}
+        again = any(channel.name in given for channel in self.outputs)
+        if commands or again or self.n_states == 0 or not self._starts_at_rest():
+            return None
+        return run.start
+
+    def _starts_at_rest(self) -> bool:
+        """Return whether no part states another start than rest at the first input."""
+        parts = getattr(self, "parts", ())
+        return self.start == "first_sample" and all(part._starts_at_rest() for part in parts)
+
+    def _from_rest(self, inputs: Array, sample_time: float | None) -> Array:
+        outputs, state = self.run(inputs, sample_time, "first_sample")
+        if self.n_clipped(state):  # a past that the model itself warns of is none
+            outputs[:] = np.inf
+        return outputs
 
     # -- its kernel --------------------------------------------------------------------------
 
@@ -308,7 +427,9 @@ class Block(DrawsItself, Parametrised):
             )
         return gathered(self, self.layout) if self.layout else self.pack()
 
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+    def bind(
+        self, sample_time: float | None, state: Array, inputs: Array, outputs: Array
+    ) -> Advance:
         """Return a function that runs the block over ``inputs`` into ``outputs``, changing ``state``.
 
         ``inputs`` has shape (n, n_inputs) and ``outputs`` (n, n_outputs), both C-contiguous; all
@@ -336,7 +457,7 @@ class Block(DrawsItself, Parametrised):
         for name in self.increasing:
             yield name, getattr(self, name)
 
-    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         """Add the block to a layout of signals, and return its output signals."""
         return board.call(self, taken)
 
@@ -426,7 +547,7 @@ class Block(DrawsItself, Parametrised):
                 return self.steady_state(data)
             if initial is None:
                 initial = self.start_on(data).tolist()
-            outputs = self._run(inputs, data.sample_time, initial)
+            outputs = self._run(data.sample_time, inputs, initial)
             return self._modelled(data, outputs)
         try:
             array = np.asarray(data, dtype=np.float64)
@@ -435,13 +556,13 @@ class Block(DrawsItself, Parametrised):
                 f"the inputs cannot be used ({error})",
                 remedy="give a recording or an array of numbers",
             ) from None
-        outputs = self._run(self._inputs_from_array(array), sample_time, initial)
+        outputs = self._run(sample_time, self._inputs_from_array(array), initial)
         return outputs[:, 0] if array.ndim == 1 and outputs.shape[1] == 1 else outputs
 
     def steady_state(self, recording: Recording) -> Recording:
         """Return the response to one period of a motion that repeats: at least the second."""
         inputs = self._inputs_from(recording)
-        twice = self._run(np.tile(inputs, (2, 1)), recording.sample_time, None)
+        twice = self._run(recording.sample_time, np.tile(inputs, (2, 1)), None)
         return self._modelled(recording, twice[len(inputs) :])
 
     def stream(self, sample_time: float | None = None, *, initial: Initial | None = None) -> Stream:
@@ -478,21 +599,22 @@ class Block(DrawsItself, Parametrised):
 
     def final_state(self, data: Recording, *, initial: Initial | None = None) -> Array:
         """Return the state after a recording, shape (n_states,), to start the next one from."""
-        inputs = self._inputs_from(data)
-        state = (
-            self.start_on(data)
-            if initial is None
-            else self.initial_state(inputs[0], initial, data.sample_time)
-        )
-        self.bind(data.sample_time, state, inputs, np.empty((len(inputs), len(self.outputs))))()
-        return state
+        start = self.start_on(data).tolist() if initial is None else initial
+        return self.run(self._inputs_from(data), data.sample_time, start)[1]
 
-    def _run(self, inputs: Array, sample_time: float | None, initial: Initial | None) -> Array:
+    def run(
+        self, inputs: Array, sample_time: float | None, initial: Initial | None
+    ) -> tuple[Array, Array]:
+        """Return the outputs over inputs, (n, n_inputs), and the final state, without any checks."""
         state = self.initial_state(inputs[0], initial, sample_time)
-        outputs = np.empty((inputs.shape[0], len(self.outputs)))
+        outputs = np.empty((len(inputs), len(self.outputs)))
+        self.bind(sample_time, state, np.ascontiguousarray(inputs), outputs)()
+        return outputs, state
+
+    def _run(self, sample_time: float | None, inputs: Array, initial: Initial | None) -> Array:
         refuse_time(sample_time)
         self.check_time(sample_time)
-        self.bind(sample_time, state, inputs, outputs)()
+        outputs, state = self.run(inputs, sample_time, initial)
         self.report(state)
         return outputs
 
@@ -557,80 +679,151 @@ class Block(DrawsItself, Parametrised):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the block as a JSON-ready dict, exact to the last bit."""
-        return saving.to_dict(self)
+        return {"format": FORMAT, "version": VERSION, **plain(self)}
+
+    def to_text(self) -> str:
+        """Return the block as the text of its file."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
 
     def save(self, path: str | Path) -> None:
-        """Save the block as readable JSON; see `mckibben.load`."""
-        saving.save(self, path)
+        """Save the block as readable JSON, written as a whole; see `mckibben.load`."""
+        write_text(path, self.to_text())
 
 
-def one_per(field: str, more: int = 0) -> Any:
-    """Return a property: the number of entries of a field, plus ``more``."""
+class Stream:
+    """A block running sample by sample.
 
-    def size(block: Block) -> int:
-        return len(getattr(block, field)) + more
+    An input that is NaN, infinite, or beyond what it was identified for with a margin
+    (`Block.input_bounds`) is a fault: the last good value of that input is held, and
+    the block steps on with it, so that the fault never reaches memory. A measurement that may be
+    missing is then missing. Before every input has had a good value, nothing happens and outputs are 0.
+    Outputs are always finite: where one would not be, they are those of the last good step, and memory
+    that is lost starts afresh at the next. Exported C does the same.
 
-    return property(size)
+    Parameters
+    ----------
+    block : Block
+        What runs.
+    sample_time : float, optional
+        Time between steps [s]; needed by rate-dependent blocks.
+    initial : {"first_sample", "virgin"} or sequence of float, optional
+        Memory before the first step; default is the block's own.
 
+    Attributes
+    ----------
+    state : array, shape (n_states,)
+        Memory; of no meaning before the first step.
+    status : int
+        Of the last step: `GOOD`, or a sum of `BAD_INPUT`, an input was held; `BAD_OUTPUT`, the outputs
+        were; and `CLIPPED`, what was asked for is out of reach.
+    """
 
-def check_units(recording: Recording, channels: Sequence[Channel]) -> None:
-    """Raise an error if a channel of a model is missing in a recording, or has another unit."""
-    for channel in channels:
-        recording[channel.name]  # refuses what is absent
-        if (unit := recording.units[channel.name]) != channel.unit:
-            raise DataError(
-                f"the model has it in {channel.unit or 'no unit'}, the recording in "
-                f"{unit or 'no unit'}",
-                file=recording.source,
-                channel=channel.name,
-                remedy=f"convert the recording, or read it with `units[{channel.name}]=UNIT`",
-            )
+    GOOD, BAD_INPUT, BAD_OUTPUT, CLIPPED = 0, 1, 2, 4
 
+    def __init__(
+        self, block: Block, sample_time: float | None = None, initial: Initial | None = None
+    ) -> None:
+        self.block, self.sample_time, self.initial = block, sample_time, initial
+        inputs, outputs = np.zeros((1, len(block.inputs))), np.zeros((1, len(block.outputs)))
+        self.state = np.zeros(block.n_states)
+        refuse_time(sample_time)
+        block.check_time(sample_time)
+        self._run = block.bind(sample_time, self.state, inputs, outputs)
+        self._input, self._output = inputs[0], outputs[0]
+        # Python's own numbers are faster than arrays so small
+        self._given, self._gives = _scalars(self._input), _scalars(self._output)
+        self._needed = self._input.size - block.n_missable
+        self._one_given, self._one_gives = self._input.size == 1, self._output.size == 1
+        self._bounds: list[tuple[float, float]] = [(a, b) for a, b in block.input_bounds.tolist()]
+        self._counts, self._counted = block.clip_counts, _scalars(self.state)
+        self.reset()
 
-def explicit_state(block: Block, initial: Initial) -> Array:
-    """Return an explicit initial state after checking its length."""
-    if isinstance(initial, str):
-        raise ModelError(
-            f"{block.kind!r} has no start {initial!r}",
-            remedy=f"give 'first_sample', 'virgin', or {block.n_states} numbers",
+    def reset(self) -> None:
+        """Reset to the initial state."""
+        self._started, self._clipped = False, 0.0
+        self._last = [nan] * self._input.size
+        self._kept: float | list[float] = 0.0
+        self.status = self.GOOD
+
+    def step(self, inputs: float | ArrayLike) -> Array:
+        """Take one sample of every input and return the outputs, shape (n_outputs,).
+
+        The array returned is reused by the next step: copy what you keep.
+        """
+        given, gives = self._given, self._gives
+        if self._one_given and isinstance(inputs, float):  # also NumPy's
+            given[0] = inputs
+        else:
+            try:
+                self._input[...] = inputs
+            except (TypeError, ValueError, OverflowError) as error:
+                raise self._misfit(error) from None
+            if not self._one_given and np.size(inputs) != self._input.size:  # spread, not given
+                raise self._misfit(ValueError(f"{np.size(inputs)} number(s)"))
+        status, last = self.GOOD, self._last
+        for place, (low, high) in enumerate(self._bounds):
+            value = given[place]
+            if low <= value <= high:
+                last[place] = value
+            elif place >= self._needed:  # missing
+                status |= self.BAD_INPUT * (value == value)
+                given[place] = nan
+            else:
+                status |= self.BAD_INPUT
+                given[place] = last[place]
+        if status and not all(map(isfinite, last[: self._needed])):
+            return self._held(status)
+        if not self._started:
+            self.state[:] = self.block.initial_state(self._input, self.initial, self.sample_time)
+            self._clipped = sum(map(self._counted.__getitem__, self._counts))
+            self._started = True
+        self._run()
+        if self._counts:
+            clipped = sum(map(self._counted.__getitem__, self._counts))
+            if clipped > self._clipped:
+                status |= self.CLIPPED
+            self._clipped = clipped
+        kept: Any = gives[0] if self._one_gives else gives.tolist()
+        # a sum is finite only if all terms are; it may overflow, and infinity less itself is NaN
+        total = kept if self._one_gives else sum(kept)
+        if total - total and not all(map(isfinite, gives)):
+            if not np.isfinite(self.state).all():
+                self._started = False
+            return self._held(status | self.BAD_OUTPUT)
+        self._kept = kept
+        self.status = status
+        return self._output
+
+    def _held(self, status: int) -> Array:
+        self.status = status
+        self._output[...] = self._kept
+        return self._output
+
+    def _misfit(self, error: Exception) -> DataError:
+        names = ", ".join(channel.name for channel in self.block.inputs)
+        return DataError(
+            f"a step cannot take these inputs ({error})", remedy=f"give one number each: {names}"
         )
-    state = np.array(initial, dtype=np.float64)
-    if state.shape != (block.n_states,) or not np.isfinite(state).all():
-        raise ModelError(
-            f"{block.kind!r} has {block.n_states} states, the initial state given has "
-            f"shape {state.shape}",
-            remedy=f"give {block.n_states} finite numbers, or 'first_sample'",
-        )
-    return state
 
 
-def scratch_of(kernel: Callable[..., Any], size: int) -> list[Array]:
-    """Return the working memory of a kernel as a list of one array, or an empty list."""
-    return [np.zeros(size)] if in_scratch(kernel) else []
+def _scalars(array: Array) -> memoryview[float]:
+    return array.data.cast("B").cast("d")
 
 
-def needs_sample_time(kind: str, sample_time: float | None) -> float:
-    """Return the sample time; raise an error if a rate-dependent block has none."""
-    if sample_time is None or not sample_time > 0:
-        raise ModelError(
-            f"{kind!r} depends on rate and needs a sample time, but the data have no time",
-            remedy="read the recording with a column of times or `rate`, or give `sample_time`",
-        )
-    return sample_time
+def run_many(
+    blocks: Sequence[Block],
+    inputs: Array,
+    *,
+    sample_time: float | None = None,
+    initial: Initial | None = None,
+) -> Array:
+    """Return outputs of blocks with the same channels, shape (blocks, n, n_outputs), on all cores."""
+    refuse_time(sample_time)
+    outputs = np.empty((len(blocks), inputs.shape[0], len(blocks[0].outputs)))
 
+    def run(index: int) -> None:
+        state = blocks[index].initial_state(inputs[0], initial, sample_time)
+        blocks[index].bind(sample_time, state, inputs, outputs[index])()
 
-def rate_filter(time_constant: float, step: float) -> tuple[float, float]:
-    """Return the decay per step of a first-order rate filter, and its gain on the change."""
-    smoothing = math.exp(-step / time_constant) if time_constant > 0 else 0.0
-    return smoothing, (1 - smoothing) / step
-
-
-def own_sample_time(kind: str, own: float, sample_time: float | None) -> float:
-    """Return the sample time of a discrete block after checking that the data have the same."""
-    step = needs_sample_time(kind, sample_time)
-    if abs(step - own) > 1e-3 * own:
-        raise ModelError(
-            f"{kind!r} holds for a sample time of {own:g} s, but the data have {step:g} s",
-            remedy=f"resample them to {own:g} s, or identify the model again",
-        )
-    return own
+    on_all_cores(run, len(blocks))
+    return outputs

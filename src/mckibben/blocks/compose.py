@@ -20,10 +20,11 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Run, explicit_state
+from mckibben.blocks.base import Advance, Block, Board
 from mckibben.blocks.fields import STRICT, Channel, Initial
-from mckibben.blocks.ranges import by_name
+from mckibben.blocks.ranges import first_known
 from mckibben.blocks.saving import nested
+from mckibben.blocks.starts import stated
 from mckibben.errors import ModelError
 from mckibben.registry import load
 from mckibben.system.compiling import in_turn
@@ -95,7 +96,7 @@ class Layout:
                 passed_on.update(step.taken)
         states, left = [np.empty(0)], None
         if not isinstance(initial, str | None):
-            left = explicit_state(self.block, initial).tolist()
+            left = stated(self.block.kind, self.block.n_states, initial).tolist()
         for step in self.steps:
             sample, block = signals[step.taken], step.block
             if block is None:
@@ -106,16 +107,17 @@ class Layout:
                 start, left = left[: block.n_states], left[block.n_states :]
             states.append(block.initial_state(sample, start, sample_time))
             if left is None and not passed_on.isdisjoint(step.given):
-                outputs = np.empty((1, len(step.given)))
-                block.bind(sample_time, states[-1].copy(), sample[np.newaxis], outputs)()
+                outputs, _ = block.run(sample[np.newaxis], sample_time, states[-1].tolist())
                 signals[step.given] = outputs[0]
         return np.concatenate(states)
 
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+    def bind(
+        self, sample_time: float | None, state: Array, inputs: Array, outputs: Array
+    ) -> Advance:
         """Return a function that runs all blocks, as in `Block.bind`."""
         tables = {tuple(range(self.n_inputs)): inputs}
         places = [(inputs, column) for column in range(self.n_inputs)]  # of signals
-        runs: list[Run] = []
+        runs: list[Advance] = []
 
         def neighbours(numbered: tuple[int, int]) -> tuple[int, int]:
             return id(places[numbered[1]][0]), numbered[1] - numbered[0]
@@ -218,7 +220,9 @@ class Composition(Block):
     ) -> Array:
         return self.wiring.initial_state(first, initial, sample_time)
 
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+    def bind(
+        self, sample_time: float | None, state: Array, inputs: Array, outputs: Array
+    ) -> Advance:
         return self.wiring.bind(sample_time, state, inputs, outputs)
 
 
@@ -286,7 +290,7 @@ class Series(Composition):
             (part.inputs[part.n_driven :], part.known_inputs[part.n_driven :]) for part in others
         ]
         for curve in first.parts if isinstance(first, PerChannel) else (first,):
-            behind = by_name(
+            behind = first_known(
                 curve.outputs, [(part.inputs, part.known_inputs) for part in others[:1]]
             )
             bare = not (curve.path_dependent or curve.rate_dependent)
@@ -296,8 +300,8 @@ class Series(Composition):
                     found.append((curve.inputs, np.sort(ends).reshape(1, 2)))
         return found
 
-    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
-        by_name = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+        signal_of = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
         signals = list(taken)
         for number, part in enumerate(self.parts):
             at_rest = not part.rate_dependent or part.start == "first_sample"
@@ -308,7 +312,7 @@ class Series(Composition):
                     remedy="start it from 'first_sample'",
                 )
             driven = signals[: part.n_driven]
-            signals = part.wired(board, [*driven, *(by_name[name] for name in part.scheduling)])
+            signals = part.wired(board, [*driven, *(signal_of[name] for name in part.scheduling)])
         return signals
 
     def inverse(self) -> Series:
@@ -386,7 +390,7 @@ class Parallel(Composition):
         taken = [names.index(channel.name) for channel in part.inputs]
         return taken, [given.index(channel.name) for channel in part.outputs]
 
-    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         terms: list[list[Any]] = [[] for _ in self.outputs]
         for part in self.parts:
             own, places = self._places(part)
@@ -439,7 +443,7 @@ class PerChannel(Composition):
     def outputs(self) -> tuple[Channel, ...]:
         return tuple(part.outputs[0] for part in self.parts)
 
-    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         pairs = zip(self.parts, taken, strict=True)
         return [part.wired(board, [signal])[0] for part, signal in pairs]
 

@@ -20,14 +20,16 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Ports, Start, needs_sample_time
-from mckibben.blocks.compose import Composition, Layout
-from mckibben.blocks.fields import MEASURED, STRICT, Channel, Channels, Vector
+from mckibben.blocks.base import SEVERAL, Block, Board, Ports, Start
+from mckibben.blocks.compose import Composition
+from mckibben.blocks.fields import STRICT, Channel, Channels, Vector
 from mckibben.blocks.kernels import Step, accumulate, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
+from mckibben.recording import COMMAND, MEASURED
 
 BASE = "_base"
 """Suffix of the name of the command that feedback is added to."""
@@ -223,7 +225,7 @@ def _called(channels: Channels, ending: str) -> Channels:
 
 def _sent(channel: Channel) -> tuple[str, str]:
     """Return name and unit of a command, whether or not it was recorded as one."""
-    return channel.name.removeprefix("command_"), channel.unit
+    return channel.name.removeprefix(COMMAND), channel.unit
 
 
 def _listed(channels: Channels) -> str:
@@ -293,7 +295,7 @@ class FeedforwardFeedback(Composition):
         """All inputs but the references."""
         return tuple(channel.name for channel in self.inputs[len(self.feedback.driven) :])
 
-    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         wires = dict(zip(self.inputs, taken, strict=True))
         bases = self.compensator.wired(board, [wires[one] for one in self.compensator.inputs])
         wires |= dict(zip(_called(self.outputs, BASE), bases, strict=True))

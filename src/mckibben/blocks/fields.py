@@ -12,7 +12,8 @@ from pydantic import AfterValidator, BeforeValidator, ConfigDict, FiniteFloat
 from pydantic.dataclasses import dataclass as validated_dataclass
 
 from mckibben.arrays import NARROWEST, Array
-from mckibben.errors import ModelError
+from mckibben.errors import DataError, ModelError
+from mckibben.recording import Recording
 
 Rule = Literal["first_sample", "virgin"]
 """Name of a start state: at rest at the first input, or as if nothing had ever happened.
@@ -132,9 +133,6 @@ class Channel:
     unit: str
 
 
-MEASURED = "_measured"
-"""Suffix of the name of a measured channel."""
-
 COMMANDS = ("pressure", "voltage")
 """Names of channels that drive a muscle."""
 
@@ -142,6 +140,20 @@ COMMANDS = ("pressure", "voltage")
 def drives(channel: Channel) -> bool:
     """Return whether a channel drives a muscle, by its name or unit."""
     return channel.name.startswith(COMMANDS) or channel.unit in ("bar", "V")
+
+
+def check_units(recording: Recording, channels: Sequence[Channel]) -> None:
+    """Raise an error if a channel of a model is missing in a recording, or has another unit."""
+    for channel in channels:
+        recording[channel.name]  # refuses what is absent
+        if (unit := recording.units[channel.name]) != channel.unit:
+            raise DataError(
+                f"the model has it in {channel.unit or 'no unit'}, the recording in "
+                f"{unit or 'no unit'}",
+                file=recording.source,
+                channel=channel.name,
+                remedy=f"convert the recording, or read it with `units[{channel.name}]=UNIT`",
+            )
 
 
 def _channel(value: Any) -> Any:

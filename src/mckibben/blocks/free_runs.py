@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
-from mckibben.blocks.base import Block, check_units
+from mckibben.blocks.base import Block
 from mckibben.blocks.derivatives import DIFFERENCE, derivatives, relative_sizes
+from mckibben.blocks.fields import check_units
 from mckibben.blocks.runs import FreeRun, Run
-from mckibben.blocks.starts import history, known_state, run_on, state_after
 from mckibben.errors import ModelError
 from mckibben.numerics.descent import differences
 from mckibben.recording import Recording
@@ -97,7 +97,7 @@ class FreeRuns:
         """
         masks = [None] * len(recordings) if rows is None else rows
         pairs = enumerate(zip(recordings, masks, strict=True))
-        runs = [run_on(block, recording, mask, index) for index, (recording, mask) in pairs]
+        runs = [block.as_run(recording, mask, index) for index, (recording, mask) in pairs]
         for run in runs:
             check_units(run.source, block.outputs)
         return cls(block, runs)
@@ -105,7 +105,7 @@ class FreeRuns:
     @cached_property
     def pasts(self) -> list[Array]:
         """Inputs before the first sample of every run, shape (k, inputs) each."""
-        return [history(self.changed(self.block, run.index), run) for run in self.runs]
+        return [self.changed(self.block, run.index).past(run) for run in self.runs]
 
     @cached_property
     def from_rest(self) -> FreeRuns:
@@ -165,7 +165,7 @@ class FreeRuns:
             if run.source.periodic:
                 found.append(own.simulate(run.source).matrix(self.names))
                 continue
-            state, outputs = state_after(own, past, run), np.empty(run.outputs.shape)
+            state, outputs = own.state_after(past, run), np.empty(run.outputs.shape)
             own.bind(run.sample_time, state, run.inputs, outputs)()
             found.append(outputs)
         return found
@@ -199,10 +199,10 @@ class FreeRuns:
             return differences(simulated, values, DIFFERENCE * relative_sizes(values), places)
 
         def start(other: Block) -> Array:
-            state = known_state(other, run)
+            state = other.known_state(run)
             assert state is not None
             return state
 
-        begun = start if known_state(block, run) is not None else None
+        begun = start if block.known_state(run) is not None else None
         whole = np.vstack([past, run.inputs])
         return derivatives(block, whole, run.sample_time, begun, places)[len(past) :]

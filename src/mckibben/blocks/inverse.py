@@ -8,23 +8,22 @@ from __future__ import annotations
 
 import warnings
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Start, explicit_state
+from mckibben.blocks.base import Block, Start
 from mckibben.blocks.fields import STRICT, Channel, Initial, drives
 from mckibben.blocks.kernels import Step, kernel
+from mckibben.blocks.learning import Learnable
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
+from mckibben.blocks.starts import stated
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.registry import load
-
-if TYPE_CHECKING:
-    from mckibben.blocks.learning import Learnable
 
 
 @kernel
@@ -209,7 +208,7 @@ class Inverse(Block):
         n = self.forward.n_states
         if len(start) == n != self.n_states:
             return self.forward.inverse_state(self.forward.initial_state(first, start, sample_time))
-        state = explicit_state(self, start)
+        state = stated(self.kind, self.n_states, start)
         if n <= self.n_states:
             self.forward.initial_state(first, state[:n].tolist(), sample_time)  # which checks it
         return state

@@ -13,6 +13,8 @@ from functools import cache
 from inspect import signature
 from typing import Any, Protocol, TypeVar, cast
 
+import numpy as np
+
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 
@@ -147,3 +149,8 @@ def summing_step(function: Callable[..., None]) -> Step:
 def in_scratch(kernel: Callable[..., Any]) -> bool:
     """Return whether a step or start kernel takes a working memory."""
     return "scratch" in signature(kernel).parameters
+
+
+def scratch_of(kernel: Callable[..., Any], size: int) -> list[Array]:
+    """Return the working memory of a kernel as a list of one array, or an empty list."""
+    return [np.zeros(size)] if in_scratch(kernel) else []

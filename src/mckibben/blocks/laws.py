@@ -106,7 +106,7 @@ class Trial:
         """Return a trial on random inputs, slower for rate-dependent blocks."""
         rng = np.random.default_rng(seed)
         pace = 200 if block.rate_dependent else 12
-        inputs = wander(*input_limits(block), rng, pace, n_turns)
+        inputs = wander(*trial_limits(block), rng, pace, n_turns)
         return cls(block, sample_time, inputs, rng, pace)
 
     def run(
@@ -146,7 +146,7 @@ class Trial:
             self.demand(False, f"bad input raises a {kind.__name__} ({about})")
 
 
-def input_limits(block: Block) -> tuple[Array, Array]:
+def trial_limits(block: Block) -> tuple[Array, Array]:
     """Return the lowest and highest test value of every input, each of shape (n_inputs,)."""
     lowest, highest = (np.full(len(block.inputs), end) for end in DEFAULT_LIMITS)
     driven = slice(0, block.n_driven)
@@ -168,7 +168,7 @@ def identified_limits(block: Block) -> tuple[Array, Array]:
     """Return the ends of every input's identified range, without margins, else its test values."""
     with np.errstate(invalid="ignore"):
         ends = narrowed(*block.known_inputs.T)
-    lowest, highest = np.where(np.isfinite(ends).all(axis=0), ends, input_limits(block))
+    lowest, highest = np.where(np.isfinite(ends).all(axis=0), ends, trial_limits(block))
     return lowest, highest
 
 
@@ -413,9 +413,7 @@ def _late(trial: Trial, inverse: Block) -> int:
 
 
 def _state_after(block: Block, inputs: Array, sample_time: float) -> list[float]:
-    state = block.initial_state(inputs[0], sample_time=sample_time)
-    block.bind(sample_time, state, inputs, np.empty((len(inputs), len(block.outputs))))()
-    return list(map(float, state))
+    return [*map(float, block.run(inputs, sample_time, None)[1])]
 
 
 LAWS: tuple[Callable[[Trial], None], ...] = (

@@ -27,20 +27,15 @@ noise does not cause chatter.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block, Start
 from mckibben.blocks.hysteresis.play_operators import follow
 from mckibben.blocks.kernels import Step, fill, kernel, step
-
-if TYPE_CHECKING:
-    from mckibben.blocks.base import Block, Start
-    from mckibben.blocks.hysteresis.gpi import GPI
-    from mckibben.blocks.hysteresis.pi import PI
 
 
 @dataclass(frozen=True)
@@ -94,23 +89,28 @@ relative to that, last measurement, and the prediction when that changed.
 
 READY, USUAL, SURPRISE, LAST, THEN = range(SENSES)
 
+N_LEARNED, SHARE, NOISE, SCALES = range(4)
+"""Places of the first coefficients of a learner: number of parameters, sample time / time, scatter of
+errors, and what `family_at` describes.
+"""
+
 GATE = 3.0
 """Innovation, in usual errors, beyond which a measurement counts as one of that size."""
 CORRELATED = 10.0
 """Square root of how many errors, each like the last, count as one independent error."""
 QUARTILE = 0.6745
 """Median absolute error of a unit-variance normal distribution."""
-SINGLE = {"ABSURD": 1e-6, "STILL": 1e-9, "UNMOVED": 1e-12}
+SINGLE = {"LEAST_WEIGHT": 1e-6, "LEAST_INFORMATION": 1e-9, "LEAST_SLOPE": 1e-12}
 """Constants with a different value in single precision."""
 NEAR = 0.1
 """Width of the transition at the gate, so that single and double precision decide alike."""
-ABSURD = 1e-6
+LEAST_WEIGHT = 1e-6
 """Weight of an error too large to be plausible."""
-LARGEST = 1e9
+LARGEST_ERROR = 1e9
 """Largest usual error, relative to the noise."""
 NEVER = 1e30
 """Value that no output takes."""
-STILL, UNMOVED = 1e-9, 1e-12
+LEAST_INFORMATION, LEAST_SLOPE = 1e-9, 1e-12
 """Smallest information, and squared slope relative to the noise, below which parameters do not
 change.
 """
@@ -148,8 +148,9 @@ def learn(
     measured, predicted, asked : float
         The output, its prediction by ``theta``, and by the parameters that the inverse uses.
     """
-    p, share, noise = int(c[0]), c[1], c[2]
-    scales, widest, fresh = c[3 : 3 + p], c[3 + p : 3 + 2 * p], c[3 + 3 * p : family_at(c)]
+    p, share, noise = int(c[N_LEARNED]), c[SHARE], c[NOISE]
+    scales, widest = c[SCALES : SCALES + p], c[SCALES + p : SCALES + 2 * p]
+    fresh = c[SCALES + 3 * p : family_at(c)]
     theta, root = adapted[:p], adapted[2 * p : 2 * p + fresh.size]
     first = 2 * p + fresh.size + place * SENSES
     sense = adapted[first : first + SENSES]
@@ -185,18 +186,18 @@ def learn(
     if abs(error) > GATE * expected:
         weight = GATE * expected / abs(error)
     update_size(share, noise, weight * error / expected, sense)
-    if not UNMOVED < r < np.inf or weight < ABSURD:
+    if not LEAST_SLOPE < r < np.inf or weight < LEAST_WEIGHT:
         return False
     settled = share / (1.0 - share)
     lacks = r < settled  # as where errors have grown: then it adapts within the time
     excess = 1.0 / settled - 1.0 / r
     r *= weight
-    _spread(root, f, g, excess if lacks else weight * (1.0 - share - share / r))
+    update_root(root, f, g, excess if lacks else weight * (1.0 - share - share / r))
     gain = weight * error / scatter / (1.0 + r)
     for i in range(p):
         theta[i] += scales[i] * g[i] * gain
     turn = int(sense[READY]) % p
-    _bound(root, widest, turn)
+    bound_variance(root, widest, turn)
     sense[READY] = turn + 1.0
     return True
 
@@ -207,15 +208,15 @@ def update_size(share: float, noise: float, relative: float, sense: Array) -> No
     usual = sense[USUAL]
     quick = min(20.0 * share, 0.5)
     side = min(max((abs(relative) - QUARTILE) / NEAR, -1.0), 1.0)
-    sense[USUAL] = min(max(usual * (1.0 + 0.5 * quick * side), noise), LARGEST * noise)
+    sense[USUAL] = min(max(usual * (1.0 + 0.5 * quick * side), noise), LARGEST_ERROR * noise)
     sense[SURPRISE] += quick * (relative * relative - sense[SURPRISE])
 
 
 @kernel
-def _spread(root: Array, f: Array, g: Array, excited: float) -> None:
+def update_root(root: Array, f: Array, g: Array, excited: float) -> None:
     """Update the factored covariance; ``g`` becomes P phi."""
     p = f.size
-    still = abs(excited) < STILL
+    still = abs(excited) < LEAST_INFORMATION
     before = 0.0 if still else 1.0 / excited
     first = p
     for j in range(p):
@@ -233,7 +234,7 @@ def _spread(root: Array, f: Array, g: Array, excited: float) -> None:
 
 
 @kernel
-def _bound(root: Array, widest: Array, i: int) -> None:
+def bound_variance(root: Array, widest: Array, i: int) -> None:
     """Bound the variance of one parameter, each in turn."""
     p = widest.size
     variance = root[i]
@@ -263,10 +264,12 @@ def pull_back(c: Array, adapted: Array, along: Array, work: Array) -> None:
     """
     p = along.size
     for i in range(p):
-        work[i] = c[1] * (c[3 + 2 * p + i] - adapted[i]) / (c[3 + i] * c[3 + p + i])
+        work[i] = (
+            c[SHARE] * (c[SCALES + 2 * p + i] - adapted[i]) / (c[SCALES + i] * c[SCALES + p + i])
+        )
     covariant(adapted, work, along)
     for i in range(p):
-        adapted[i] += c[3 + i] * along[i]
+        adapted[i] += c[SCALES + i] * along[i]
 
 
 @kernel
@@ -314,15 +317,15 @@ def family_at(c: Array) -> int:
     parameters (p), covariance at the start as root], then the family's. A root is [D, columns of U above
     its diagonal of ones], p (p + 1) / 2 numbers.
     """
-    p = int(c[0])
-    return 3 + 3 * p + root_size(p)
+    p = int(c[N_LEARNED])
+    return SCALES + 3 * p + root_size(p)
 
 
 @kernel
 def start_learning(c: Array, adapted: Array) -> None:
     """Start adaptation, [theta, used, root, senses], with the fitted parameters."""
-    p, noise = int(c[0]), c[2]
-    fitted, fresh = c[3 + 2 * p : 3 + 3 * p], c[3 + 3 * p : family_at(c)]
+    p, noise = int(c[N_LEARNED]), c[NOISE]
+    fitted, fresh = c[SCALES + 2 * p : SCALES + 3 * p], c[SCALES + 3 * p : family_at(c)]
     fill(adapted[:p], fitted)
     fill(adapted[p : 2 * p], fitted)
     fill(adapted[2 * p : 2 * p + fresh.size], fresh)
@@ -334,14 +337,14 @@ def start_learning(c: Array, adapted: Array) -> None:
 
 # -- of weighted sums of play operators ---------------------------------------------------------------
 
-LEAST = 0.1
+LEAST_SHARE = 0.1
 """Smallest share of a fitted partial sum of weights that adaptation leaves."""
 
 
 @kernel
 def inverse_at(c: Array) -> int:
     """Return the index of the inverse's coefficients, after [limits, least]."""
-    return family_at(c) + 2 * int(c[0])
+    return family_at(c) + 2 * int(c[N_LEARNED])
 
 
 @kernel
@@ -363,7 +366,7 @@ def follow_learning(
     n, p, family = r.size, r.size + 1, family_at(c)
     limits, least = c[family : family + 2], c[family + 2 : inverse_at(c)]
     theta, used = adapted[:p], adapted[p : 2 * p]
-    sense = adapted[family - 3 - p :]
+    sense = adapted[family - SCALES - p :]
     work, slopes = scratch[: 2 * p], scratch[2 * p : 3 * p]
     predicted, asked = theta[n], used[n]
     for i in range(n):
@@ -402,7 +405,7 @@ def learning_kernels(
         coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
     ) -> None:
         """Advance the inverse, and adapt weights and offset to measurements."""
-        n = int(coefficients[0]) - 1
+        n = int(coefficients[N_LEARNED]) - 1
         own = coefficients[inverse_at(coefficients) :]
         last, adapted = state[n + before : n + before + 3], state[n + before + 3 :]
         way = follow_learning(
@@ -412,7 +415,7 @@ def learning_kernels(
 
     def adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
         """Start as the inverse does, with the fitted weights."""
-        last = int(coefficients[0]) - 1 + before
+        last = int(coefficients[N_LEARNED]) - 1 + before
         own = coefficients[inverse_at(coefficients) :]
         inverse_start(own, state[: last + 2], inputs, virgin)
         state[last + 2] = 0.0
@@ -449,7 +452,9 @@ def take_over(aim: Array, used: Array, s: Array, y: float, travel: float, band: 
 
 
 def learnable_operators(
-    model: PI | GPI,
+    model: Block,
+    thresholds: Sequence[float],
+    weights: Sequence[float],
     limits: tuple[float, float],
     offset: float,
     step: Step,
@@ -461,17 +466,16 @@ def learnable_operators(
     Gain and friction are expected to change by 30 %, each weight by itself by 10 %, the offset by 30 %
     of the span; ``limits`` are the lowest and highest input of the operators.
     """
-    r, w = np.array(model.thresholds), np.array(model.weights)
+    r, w = np.array(thresholds), np.array(weights)
     n, size, width = len(w), np.abs(w), limits[1] - limits[0]
     span = float(np.sum(w) * (width if np.isfinite(width) else r.max() or 1.0))
-    weights, sliding = np.append(np.ones(n), 0.0), np.array([0.0, *np.ones(n - 1), 0.0])
-    together = 0.3**2 * np.outer(weights, weights) + 0.3**2 * np.outer(sliding, sliding)
+    all_weights, sliding = np.append(np.ones(n), 0.0), np.array([0.0, *np.ones(n - 1), 0.0])
+    together = 0.3**2 * np.outer(all_weights, all_weights) + 0.3**2 * np.outer(sliding, sliding)
     lowest = np.where(w >= 0, 0.0, -np.inf)
-    least = np.concatenate([lowest, LEAST * np.cumsum(w)])  # of weights, then of partial sums
+    least = np.concatenate([lowest, LEAST_SHARE * np.cumsum(w)])  # of weights, then of partial sums
 
     def numbers(sample_time: float | None) -> Array:
-        own = model.inverse_numbers(model.coefficients(sample_time))
-        return np.concatenate([limits, least, own])
+        return np.concatenate([limits, least, model.inverse().coefficients(sample_time)])
 
     return Learnable(
         step,

@@ -222,10 +222,14 @@ def slopes_at(polynomial: Sequence[float], low: float, high: float) -> Array:
     )
 
 
+CENTRE, SCALE = range(2)
+"""Places of the first coefficients of a polynomial."""
+
+
 @step
 def polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Evaluate; coefficients are [centre, scale, ascending polynomial coefficients]."""
-    outputs[0] = horner((inputs[0] - coefficients[0]) / coefficients[1], coefficients[2:])
+    outputs[0] = horner((inputs[0] - coefficients[CENTRE]) / coefficients[SCALE], coefficients[2:])
 
 
 @step
@@ -242,12 +246,12 @@ def polynomial_inverse_step(
     if not bottom < y < top:
         if y < bottom - slack or y > top + slack:
             state[0] += 1.0
-        outputs[0] = coefficients[0] + coefficients[1] * (low if y <= bottom else high)
+        outputs[0] = coefficients[CENTRE] + coefficients[SCALE] * (low if y <= bottom else high)
         return
     x = newton(horner, horner_slope, y, low, high, 0.5 * (low + high), 0.0, c)
     if DERIVED:
         x = improved(horner, y, x, c)
-    outputs[0] = coefficients[0] + coefficients[1] * x
+    outputs[0] = coefficients[CENTRE] + coefficients[SCALE] * x
 
 
 @dataclass(frozen=True, config=fields.STRICT)

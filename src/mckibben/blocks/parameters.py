@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABCMeta
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from functools import wraps
 from inspect import isfunction
 from itertools import islice
@@ -149,6 +149,16 @@ class Parametrised(metaclass=Checked):
         return replace(self, **fields)  # type: ignore[type-var]
 
 
+def plain(part: Any) -> Any:
+    """Return a block, or a value in one, as JSON-ready values."""
+    if is_dataclass(part) and not isinstance(part, type):
+        named = {"kind": part.kind} if hasattr(part, "kind") else {}
+        return named | {f.name: plain(getattr(part, f.name)) for f in fields(part)}
+    if isinstance(part, tuple):
+        return [plain(item) for item in part]
+    return part
+
+
 def same_as(path: str) -> Any:
     """Return a property that refers to an attribute of a part: ``"part.attribute"``."""
     return property(attrgetter(path), doc=f"``{path}``")
@@ -207,3 +217,12 @@ def leaves(value: Any, index: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int,
             yield from leaves(item, (*index, place))
     elif isinstance(value, float | Parametrised):
         yield index, value
+
+
+def one_per(field: str, more: int = 0) -> Any:
+    """Return a property: the number of entries of a field, plus ``more``."""
+
+    def size(part: Any) -> int:
+        return len(getattr(part, field)) + more
+
+    return property(size)

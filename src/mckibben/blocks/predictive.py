@@ -22,7 +22,7 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Run, Start, explicit_state, needs_sample_time
+from mckibben.blocks.base import Advance, Block, Start
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.fields import STRICT, Initial, drives
@@ -33,25 +33,28 @@ from mckibben.blocks.kernels import Step, fill, in_scratch, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.planning import clip_path, plan_path, plan_scratch
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
+from mckibben.blocks.starts import stated
 from mckibben.errors import ModelError
 
 NUDGE = 1e-3
 """Step of pressure for slopes of the model, relative to the pressure range."""
 
-MOST = 1e6
+FASTEST = 1e6
 """Largest limit [bar/s]."""
 
 HEAD = 7
-"""Number of coefficients before the pressure steps."""
+N_PRESSURES, HORIZON, STATES, INVERSE_STATES, NUMBERS, INVERSE_NUMBERS, N_REFERENCES = range(HEAD)
+"""Places of the coefficients before the pressure steps: all are sizes."""
 
 PASSES = 2
 """Number of optimisations per sample, each linearised about the result of the last."""
 
-STILL = 0.1
+UNCHANGED = 0.1
 """Motion, relative to the pressure step, that counts as unchanged."""
 
-Limit = Annotated[FiniteFloat, Gt(0), Le(MOST)]
+Limit = Annotated[FiniteFloat, Gt(0), Le(FASTEST)]
 
 
 # -- the memory that a model and its inverse share -------------------------------------------------
@@ -162,7 +165,7 @@ def _in_room(function: Any) -> Any:
     def without_scratch(
         coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
     ) -> None:
-        """Run a step that needs no working memory."""
+        """Advance a step that needs no working memory."""
         function(coefficients, state, inputs, outputs)
 
     return function if in_scratch(function) else without_scratch
@@ -175,7 +178,7 @@ def _start_in_room(function: Any) -> Any:
     def start_without_scratch(
         coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
     ) -> None:
-        """Run a start that needs no working memory."""
+        """Advance a start that needs no working memory."""
         function(coefficients, state, inputs, virgin)
 
     return function if in_scratch(function) else start_without_scratch
@@ -206,11 +209,11 @@ def predictive_kernels(
     ) -> None:
         """Start as the inverse does: as if its first reference had always been applied."""
         c = coefficients
-        inverse_state = scratch[: int(c[3])]
-        numbers = c[HEAD + 1 + 3 * int(c[0]) + int(c[4]) :]
-        start_inverse(numbers, inverse_state, scratch[int(c[3]) :], inputs, virgin)
+        inverse_state = scratch[: int(c[INVERSE_STATES])]
+        numbers = c[HEAD + 1 + 3 * int(c[N_PRESSURES]) + int(c[NUMBERS]) :]
+        start_inverse(numbers, inverse_state, scratch[inverse_state.size :], inputs, virgin)
         state[:] = 0.0
-        fill(state[: int(c[2])], inverse_state)
+        fill(state[: int(c[STATES])], inverse_state)
 
     return step(predictive_step), predictive_start
 
@@ -252,7 +255,7 @@ def step_of(
             for k in range(n):
                 p = path[(t + 1) * n + k]
                 moved = p - path[t * n + k]
-                if abs(moved) > STILL * nudges[k]:
+                if abs(moved) > UNCHANGED * nudges[k]:
                     way[k] = 1.0 if moved > 0.0 else -1.0
                 given[k] = p
             fill(trial, kept)
@@ -274,11 +277,12 @@ def step_of(
     ) -> None:
         """Compute the first pressures of a horizon within all limits, and take that step."""
         c = coefficients
-        n, m, length, size, n_inverse = int(c[0]), int(c[6]), int(c[1]), int(c[2]), int(c[3])
+        n, m, length = int(c[N_PRESSURES]), int(c[N_REFERENCES]), int(c[HORIZON])
+        size, n_inverse, own_size = int(c[STATES]), int(c[INVERSE_STATES]), int(c[NUMBERS])
         planned, count = length * n, length * m
         nudges, limits = c[HEAD : HEAD + n], c[HEAD + n : HEAD + 3 * n + 1]
         own = c[HEAD + 3 * n + 1 :]
-        model, inverse = own[: int(c[4])], own[int(c[4]) : int(c[4]) + int(c[5])]
+        model, inverse = own[:own_size], own[own_size : own_size + int(c[INVERSE_NUMBERS])]
         memory, desired, last = state[:size], state[size : size + count], state[size + count :]
         states, inverse_state = scratch[: 3 * size], scratch[3 * size : 3 * size + n_inverse]
         more = scratch[3 * size + n_inverse :]
@@ -427,9 +431,14 @@ class Predictive(Block):
     ) -> Array:
         """Return the initial state: as if its reference had always been applied."""
         if initial is not None and not isinstance(initial, str):
-            return explicit_state(self, initial)
+            return stated(self.kind, self.n_states, initial)
         own = model_state(self._inverse, self._inverse.initial_state(first, initial, sample_time))
         return np.concatenate([own, np.zeros(self.n_states - own.size)])
+
+    @property
+    def clip_counts(self) -> tuple[int, ...]:
+        """Place of the count of plans: samples in which a limit acts within the horizon."""
+        return (self.n_states - 1,)
 
     @property
     def start(self) -> Initial:
@@ -484,7 +493,9 @@ class Predictive(Block):
         head = [len(low), self.horizon, *sizes, self.compensator.n_driven]
         return np.concatenate([head, NUDGE * (high - low), [change], low, high, *own])
 
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+    def bind(
+        self, sample_time: float | None, state: Array, inputs: Array, outputs: Array
+    ) -> Advance:
         if self._kernels is not None:
             return super().bind(sample_time, state, inputs, outputs)
         numbers = self._numbers(sample_time, [np.empty(0), np.empty(0)])

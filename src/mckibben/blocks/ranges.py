@@ -1,31 +1,27 @@
 """Which inputs a block was identified for, and which are absurd.
 
 A block answers in `Block.known_inputs` and `Block.known_outputs`; a compensator's inputs are outputs of
-the model that it inverts. `input_bounds` widens them: what is beyond is no motion but a fault, and is
-kept from the memory of streams and of exported C.
+the model that it inverts. `Block.input_bounds` are wider: what is beyond is no motion but a fault, and
+is kept from the memory of streams and of exported C.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.fields import MEASURED, Channel
-from mckibben.recording import PLAUSIBLE, standard_unit
-
-if TYPE_CHECKING:
-    from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel, Initial
+from mckibben.recording import MEASURED, PLAUSIBLE, standard_unit
 
 LARGEST = float(np.finfo(np.float64).max)
 
 SAMPLES_PER_LEG = 20
 
-SLOW_STEP = 1.0
-"""Sample time [s] of a slow way of blocks without one of their own."""
+AT_REST = 1.0
+"""Sample time [s] of runs of one sample at rest, which it does not change."""
 
 
 def unknown(count: int) -> Array:
@@ -33,7 +29,7 @@ def unknown(count: int) -> Array:
     return np.tile([-np.inf, np.inf], (count, 1))
 
 
-def by_name(
+def first_known(
     channels: Sequence[Channel], sources: Iterable[tuple[Sequence[Channel], Array]]
 ) -> Array:
     """Return the first finite range of every channel among sources, shape (n, 2).
@@ -52,21 +48,43 @@ def by_name(
     return found
 
 
-def both_sides(block: Block) -> list[tuple[tuple[Channel, ...], Array]]:
-    """Return the outputs and the inputs of a block with their identified ranges."""
-    return [(block.outputs, block.known_outputs), (block.inputs, block.known_inputs)]
+def known_ranges(channels: Sequence[Channel], ranges: Array) -> dict[str, tuple[float, float]]:
+    """Return the lowest and highest identified value by channel, where known.
+
+    Examples
+    --------
+    >>> from mckibben import PI
+    >>> block = PI.example()
+    >>> known_ranges(block.inputs, block.known_inputs)
+    {'pressure': (0.0, 5.0)}
+    """
+    return {
+        channel.name: (float(low), float(high))
+        for channel, (low, high) in zip(channels, ranges, strict=True)
+        if np.isfinite([low, high]).all()
+    }
 
 
-def over_inputs(block: Block, sample_time: float) -> Array:
-    """Return the range of outputs over the identified inputs, shape (n_outputs, 2).
+def range_over(
+    run: Callable[[Array, Initial | None], Array], inputs: Array, *, moving: bool
+) -> Array | None:
+    """Return the range of a block's outputs over ranges of inputs, shape (n_outputs, 2).
 
     All inputs are at their lowest, highest or middle, then each alone is at an end: at rest there, and
-    on a slow way from one to the next from the block's own start. `Block.reachable` is less: it is what
-    every history leaves in reach.
+    on a way from one to the next from the block's own start. `Block.reachable` is less: it is what every
+    history leaves in reach. None where a range is not known.
+
+    Parameters
+    ----------
+    run : callable
+        Returns the outputs, (n, n_outputs), of a run over inputs, (n, n_inputs), from a start.
+    inputs : array, shape (n_inputs, 2)
+    moving : bool
+        Whether the way counts; without, only the outputs at rest.
     """
-    low, high = block.known_inputs.T
+    low, high = inputs.T
     if not np.isfinite([low, high]).all():
-        return unknown(len(block.outputs))
+        return None
     middle = low + 0.5 * (high - low)
     alone = [np.where(np.eye(low.size, dtype=bool), end, middle) for end in (low, high)]
     corners = np.vstack([low, high, low, middle, *alone])
@@ -74,30 +92,20 @@ def over_inputs(block: Block, sample_time: float) -> Array:
     way = np.stack([np.interp(legs, np.arange(len(corners)), line) for line in corners.T], axis=1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found = [block.simulate(way, sample_time=sample_time)]
-        for row in corners:
-            given = block.simulate(row[np.newaxis], initial="first_sample", sample_time=sample_time)
-            found.append(given)
-    outputs = np.vstack(found)
+        found = [run(way, None)] if moving else []
+        outputs = np.vstack([*found, *(run(row[np.newaxis], "first_sample") for row in corners)])
     ends = np.stack([outputs.min(axis=0), outputs.max(axis=0)], axis=1)
     return np.where(np.isfinite(ends), ends, unknown(len(ends)))
 
 
-def input_bounds(block: Block) -> Array:
-    """Return the lowest and highest value of every input that is no fault, shape (n_inputs, 2).
+def widened(channels: Sequence[Channel], known: Array) -> Array:
+    """Return the lowest and highest value of every channel that is no fault, shape (n, 2).
 
     The identified range, or where none is known the plausible one of its unit, is widened at both ends
     by its width, or by its largest size if that is more: a model that was identified from 180 to 200 mm
     may go from rest. Of a channel without either, all finite values pass.
-
-    Examples
-    --------
-    >>> from mckibben import PI
-    >>> input_bounds(PI.example()).tolist()
-    [[-5.0, 10.0]]
     """
-    known = block.known_inputs
-    likely = np.reshape([plausible(channel) for channel in block.inputs], known.shape)
+    likely = np.reshape([plausible(channel) for channel in channels], known.shape)
     # from 0 to 0 is no range
     moves = np.isfinite(known).all(axis=1, keepdims=True) & known.any(axis=1, keepdims=True)
     low, high = np.where(moves, known, likely).T

@@ -17,10 +17,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Ports, Start, own_sample_time
+from mckibben.blocks.base import Block, Ports, Start
 from mckibben.blocks.fields import DISPLACEMENT, STRICT, Channels, Rows, vector
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.sample_times import own_sample_time
 from mckibben.errors import ModelError
 
 

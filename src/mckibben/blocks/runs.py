@@ -140,9 +140,9 @@ class FreeRun(Run):
 
     @property
     def speeds(self) -> Array:
-        """Speeds of the modelled outputs there [unit/s, or per sample], shape (scored, m)."""
-        moved = np.abs(np.diff(self.modelled, axis=0, prepend=self.modelled[:1]))
-        return np.asarray(moved[self.counts] / (self.sample_time or 1.0))
+        """Speeds of the modelled outputs there [unit/s], shape (scored, m); 0 without time."""
+        moved = np.abs(np.diff(self.modelled, axis=0, prepend=self.modelled[:1]))[self.counts]
+        return np.asarray(0.0 * moved if self.sample_time is None else moved / self.sample_time)
 
 
 def run_of(

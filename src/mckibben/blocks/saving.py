@@ -1,4 +1,4 @@
-"""Blocks as readable JSON: exact to the last bit, and data only, never code.
+"""Reading saved blocks: JSON that is data only, never code. `Block.save` writes it.
 
 A file starts with ``format`` and ``version``; every block names its ``kind``, which the registry
 turns into a class. Unknown kinds and fields, numbers that are not finite and values of the wrong type
@@ -9,32 +9,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from mckibben.blocks.base import FORMAT, VERSION, Block
 from mckibben.errors import DataError, ModelError
 from mckibben.registry import load as load_plugin
 from mckibben.registry import names
-from mckibben.system.atomic import write_text
 from mckibben.system.ordinary import read_text
 
-if TYPE_CHECKING:
-    from mckibben.blocks.base import Block
-
-FORMAT = "mckibben-model"
-VERSION = 1
 LARGEST_FILE = 64 * 2**20
 """Largest model file [bytes]; a larger one is refused before parsing."""
 
 
-def to_dict(block: Block) -> dict[str, Any]:
-    """Return a block as a JSON-ready dict, with ``format`` and ``version`` first."""
-    return {"format": FORMAT, "version": VERSION, **part_to_dict(block)}
-
-
 def from_dict(content: Mapping[str, Any]) -> Block:
-    """Return the block of a dict from `to_dict`; raise an error for invalid content."""
+    """Return the block of a dict from `Block.to_dict`; raise an error for invalid content."""
     if not isinstance(content, Mapping) or content.get("format") != FORMAT:
         raise ModelError(
             f'this is not a saved model (no "format": "{FORMAT}")',
@@ -54,18 +44,8 @@ def from_dict(content: Mapping[str, Any]) -> Block:
     return block
 
 
-def part_to_dict(part: Any) -> Any:
-    """Return a block, or a value in one, as JSON-ready values."""
-    if is_dataclass(part) and not isinstance(part, type):
-        named = {"kind": part.kind} if hasattr(part, "kind") else {}
-        return named | {f.name: part_to_dict(getattr(part, f.name)) for f in fields(part)}
-    if isinstance(part, tuple):
-        return [part_to_dict(item) for item in part]
-    return part
-
-
 def part_from_dict(content: Any, group: str = "blocks") -> Any:
-    """Return the block (or other plug-in of ``group``) of a dict from `part_to_dict`."""
+    """Return the block (or other plug-in of ``group``) of a dict from `plain`."""
     if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str):
         raise ModelError('a block without a "kind"', remedy="save the model again")
     kind = content["kind"]
@@ -91,16 +71,6 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
 def nested(content: Any) -> Any:
     """Convert the dict of a block inside another to that block; for fields of compositions."""
     return part_from_dict(content) if isinstance(content, Mapping) else content
-
-
-def to_text(block: Block) -> str:
-    """Return a block as the text of its file."""
-    return json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n"
-
-
-def save(block: Block, path: str | Path) -> None:
-    """Save a block as JSON, through a temporary file that is then renamed."""
-    write_text(path, to_text(block))
 
 
 def load(path: str | Path) -> Block:

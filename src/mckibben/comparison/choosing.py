@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal, Protocol, TypeVar
 
+from mckibben.metrics import useful
+
 CONSTANT = "constant"
 """Name of the row that predicts the mean of the training output, whatever the input: never chosen."""
 
@@ -12,9 +14,6 @@ CAUTION = 2.0
 """Factor on the ranking error of a model that is reliable only near its training data, or whose error is
 that of the fit.
 """
-
-USEFUL = 0.9
-"""Test error, relative to that of the constant, above which no model is recommended."""
 
 Against = Literal["validation", "test"]
 """The data on which no model is clearly better than the constant, so that none is recommended."""
@@ -100,8 +99,3 @@ def acceptable(row: Ranked, constant: Ranked | None) -> bool:
 
 def _beats(row: Ranked, constant: Ranked) -> bool:
     return useful(row.test_error, constant.test_error)
-
-
-def useful(error: float, constant: float) -> bool:
-    """Return whether an error is clearly smaller than that of the constant on the same samples."""
-    return error < USEFUL * constant

@@ -14,12 +14,12 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.inverse import Inverse
 from mckibben.comparison.choosing import CAUTION, CONSTANT, Against, order, recommended
-from mckibben.comparison.splits import Span
 from mckibben.diagnosis.bands import TestedBand
 from mckibben.diagnosis.branch_gaps import Memory
 from mckibben.errors import MckibbenError
 from mckibben.metrics import Scores
 from mckibben.numerics.statistics import half_interval
+from mckibben.splits import Span
 from mckibben.system.showing import DrawsItself
 
 if TYPE_CHECKING:

@@ -12,7 +12,6 @@ from mckibben import registry
 from mckibben.channels import Channels, Names, channels_of
 from mckibben.comparison.choosing import CONSTANT
 from mckibben.comparison.leaderboard import Leaderboard
-from mckibben.comparison.splits import Part, Split, parts_of, spans_of, split_of
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.catalogue import declared, settings_of_all
 from mckibben.estimators.core.estimator import Estimator
@@ -20,6 +19,7 @@ from mckibben.numerals import counted
 from mckibben.recording import Recording, listed, reading_notes
 from mckibben.signals import made_manageable
 from mckibben.signals.shared_rows import check_shared
+from mckibben.splits import Part, Split, parts_of, spans_of, split_of
 
 Models = str | Sequence[str] | Mapping[str, str | Estimator]
 """Models of a comparison: "all", "quick", short names, or labels with short names or estimators."""

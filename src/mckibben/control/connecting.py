@@ -13,10 +13,10 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.fields import MEASURED, Channel
+from mckibben.blocks.fields import Channel
 from mckibben.control.twin import plain
 from mckibben.errors import DataError
-from mckibben.recording import REST_LENGTH, conversion, standard_unit
+from mckibben.recording import MEASURED, REST_LENGTH, conversion, standard_unit
 
 Channels = tuple[Channel, ...]
 

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.feedback import BASE, FeedforwardFeedback
-from mckibben.blocks.fields import MEASURED, Channel
+from mckibben.blocks.fields import Channel
 from mckibben.control.connecting import Offer
 from mckibben.control.preview import preview_time
 from mckibben.errors import require
+from mckibben.recording import MEASURED
 
 Ahead = tuple[Array, Array]
 
@@ -26,6 +27,9 @@ class Controller(ABC):
 
     forward_model: Block | None = None
     """The model that the compensator inverts, if there is one."""
+
+    stream: Stream | None = None
+    """Its running compensator, if that is a block."""
 
     samples_ahead: int = 0
     """Further preview of the reference for prediction [samples]."""
@@ -54,11 +58,6 @@ class Controller(ABC):
             Reference and schedule, `preview` and `samples_ahead` later, for compensators.
         """
 
-    @property
-    def n_clipped(self) -> int:
-        """Number of samples that its compensator has clipped since the start."""
-        return 0
-
     def applied(self, pressures: Array) -> None:
         """Receive the commands applied after limits."""
         del pressures
@@ -81,11 +80,6 @@ class BlockController(Controller):
         self.preview, self.forward_model = preview_time(self.block), self.block.forward_model
         self.samples_ahead = self.block.samples_ahead
 
-    @property
-    def n_clipped(self) -> int:
-        """Number of samples clipped by the compensator."""
-        return self._stream.block.n_clipped(self._stream.state)
-
     def connect(self, offer: Offer) -> None:
         whole = self.block
         self._compensator, self._pid = whole, None
@@ -99,7 +93,7 @@ class BlockController(Controller):
             self._pid_inputs = offer.inputs(self._pid, bases)
 
     def reset(self, sample_time: float) -> None:
-        self._stream = self._compensator.stream(sample_time)
+        self.stream = self._compensator.stream(sample_time)
         self._feedback = None if self._pid is None else self._pid.stream(sample_time)
         measures = any(channel.name.endswith(MEASURED) for channel in self._compensator.inputs)
         # measurements belong to the reference of the last step, or a dead time before it; predictive
@@ -110,7 +104,8 @@ class BlockController(Controller):
     def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
         reference_ahead, schedule = ahead if self._uses_preview else (reference, scheduled)
         schedule = scheduled if self._predicts else schedule
-        found = self._stream.step(
+        assert self.stream is not None
+        found = self.stream.step(
             self._inputs(np.concatenate((reference_ahead, schedule, measured)))
         )
         if self._feedback is not None:
@@ -145,11 +140,6 @@ class DisturbanceObserver(Controller):
         self.forward_model = self._model
         self.preview = self._model.dead_time
 
-    @property
-    def n_clipped(self) -> int:
-        """That of the compensator."""
-        return self.compensator.n_clipped(self._ahead.state)
-
     def connect(self, offer: Offer) -> None:
         block, model = self.compensator, self._model
         references = block.inputs[: block.n_driven]
@@ -160,7 +150,7 @@ class DisturbanceObserver(Controller):
         self._modelled = offer.selected(references, model.outputs, block.title, model.title)
 
     def reset(self, sample_time: float) -> None:
-        self._ahead = self.compensator.stream(sample_time)
+        self.stream = self.compensator.stream(sample_time)
         self._model_stream = self._model.stream(sample_time)
         self._share = 1.0 - np.exp(-sample_time / self.filter_time)
         self._disturbance = np.zeros(self.compensator.n_driven)
@@ -175,7 +165,8 @@ class DisturbanceObserver(Controller):
         self._scheduled = scheduled
         wanted = self._inputs(np.concatenate((*ahead, measured)))
         wanted[: self._disturbance.size] -= self._disturbance
-        return self._commands(self._ahead.step(wanted))
+        assert self.stream is not None
+        return self._commands(self.stream.step(wanted))
 
     def applied(self, pressures: Array) -> None:
         """Advance the model by the applied commands."""
@@ -207,11 +198,6 @@ class EstimatedLoad(Controller):
         self.preview, self.forward_model = inner.preview, inner.forward_model
         self.samples_ahead = inner.samples_ahead
 
-    @property
-    def n_clipped(self) -> int:
-        """Number of samples clipped by the controller's compensator."""
-        return self.controller.n_clipped
-
     def connect(self, offer: Offer) -> None:
         title, loads = self.estimate.title, self.estimate.outputs
         self._inputs = offer.selected(self.estimate.inputs, offer.measured, title, offer.plant)
@@ -219,13 +205,14 @@ class EstimatedLoad(Controller):
 
     def reset(self, sample_time: float) -> None:
         self.controller.reset(sample_time)
-        self._stream = self.estimate.stream(sample_time)
+        self.stream = self.controller.stream
+        self._estimate = self.estimate.stream(sample_time)
         self._share = 1.0 - np.exp(-sample_time / self.filter_time)
         self._load = np.zeros(len(self.estimate.outputs))
 
     def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
         """Return the controller's commands, with the current load estimate for the next step."""
-        found = self._stream.step(self._inputs(measured))
+        found = self._estimate.step(self._inputs(measured))
         self._load = self._load + self._share * (found - self._load)
         now, then = (np.concatenate((self._load, others)) for others in (scheduled, ahead[1]))
         return self.controller.step(reference, measured, now, (ahead[0], then))

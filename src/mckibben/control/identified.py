@@ -2,31 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import balance_in
+from mckibben.blocks.ranges import known_ranges
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
 BEYOND = 0.05
 """Share of a range beyond which a value counts as outside; noise is smaller."""
-
-
-def known_ranges(model: Block) -> dict[str, tuple[float, float]]:
-    """Return the lowest and highest identified value of a model's inputs, by name, where known.
-
-    Examples
-    --------
-    >>> from mckibben import PI
-    >>> known_ranges(PI.example())
-    {'pressure': (0.0, 5.0)}
-    """
-    return {
-        channel.name: (float(low), float(high))
-        for channel, (low, high) in zip(model.inputs, model.known_inputs, strict=True)
-        if np.isfinite([low, high]).all()
-    }
 
 
 def beyond_known(model: Block, recording: Recording) -> list[str]:
@@ -36,7 +19,7 @@ def beyond_known(model: Block, recording: Recording) -> list[str]:
     """
     if model.inverts and balance_in(model) is None:
         return []
-    known, notes = known_ranges(model), []
+    known, notes = known_ranges(model.inputs, model.known_inputs), []
     for channel in model.inputs:
         if channel.name not in known or channel.name not in recording:
             continue

@@ -35,14 +35,10 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import Channel, vector
-from mckibben.blocks.ranges import input_bounds
 from mckibben.blocks.repetition import Repetition
 from mckibben.control.connecting import find
 from mckibben.errors import DataError, require
-from mckibben.recording import Recording, sample_time_of
-
-DESIRED = "reference_"
-"""Prefix of the desired motion in recordings of a loop."""
+from mckibben.recording import REFERENCE, Recording, sample_time_of
 
 SEGMENTS = 8
 """Half-overlapping parts of the motion over which its spectrum is averaged."""
@@ -184,10 +180,10 @@ def learned(
     require(0 <= ahead < length, "ahead", ahead, f"0 to {length - 1} samples")
     require(0 <= settle < length, "settle", settle, f"0 to {length - 1} samples")
     channels = compensator.inputs[: compensator.n_driven]
-    desired, measured = (_outputs(compensator, runs, prefix) for prefix in (DESIRED, ""))
+    desired, measured = (_outputs(compensator, runs, prefix) for prefix in (REFERENCE, ""))
     if not np.array_equal(desired, np.broadcast_to(desired[0], desired.shape)):
         raise DataError("repetitions have different references", remedy="repeat one motion")
-    bounds = input_bounds(compensator)
+    bounds = compensator.input_bounds
     lessons = [
         _Lesson.of(desired[0, :, k], measured[:, :, k], bounds[k], settle, repeats)
         for k in range(len(channels))

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.fields import Channel
 from mckibben.control.connecting import match
 from mckibben.control.controller import BlockController, Controller
 from mckibben.control.preview import samples_ahead
 from mckibben.control.roles import Plant, asked, offered, resting, roles
 from mckibben.errors import ModelError, require
-from mckibben.recording import Recording, sample_time_of
+from mckibben.recording import COMMAND, REFERENCE, Recording, sample_time_of
 from mckibben.signals.checking import generator
 from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
@@ -185,8 +185,7 @@ def track(
     measured = changed.reset(seed)
     late = [measured] * (delay + 1)
     seen, commands = np.empty((n, len(measured))), np.empty((n, len(driven)))
-    clipped, times = np.zeros(n, dtype=bool), np.empty(n)
-    own = np.zeros(n + 1, dtype=int)
+    clipped, unreached, times = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), np.empty(n)
     last: Array | None = None
     with telling(progress, "tracking") as tell:
         for t in range(n):
@@ -207,7 +206,10 @@ def track(
             if slew is not None and last is not None:
                 allowed = np.clip(allowed, last - slew * step, last + slew * step)
             clipped[t] = bool((np.abs(allowed - wanted) > 1e-9).any())
-            own[t + 1] = controller.n_clipped
+            if (
+                t + 1 < n and controller.stream is not None
+            ):  # what is asked for at a step is due then
+                unreached[t + 1] = controller.stream.status & Stream.CLIPPED
             last = allowed
             controller.applied(allowed)
             command = loop.step(allowed, measured[at_p]) if inner else allowed
@@ -221,7 +223,7 @@ def track(
     due = np.concatenate([path[:1], path[:-1]])
     errors = seen[:, at_y] - due
     reached = ends(controller.forward_model, offer.followed, offer.rest_length)
-    clipped |= np.diff(own, prepend=0)[:-1] > 0
+    clipped |= unreached
     # what creeps or relaxes also goes, for a while, where it is not sure to come
     out = {
         name: outside(due[:, followed.index(name)], *reached[name]) & clipped for name in reached
@@ -229,8 +231,8 @@ def track(
     part = errors[scored]
     parts = dict(zip(followed, part.T, strict=True))
     far = {name: beyond(parts[name], out[name][scored], *reached[name]) for name in reached}
-    references = {f"reference_{c.name}": c.unit for c in offer.followed}
-    sent = {f"command_{c.name}": c.unit for c in offer.driven}
+    references = {REFERENCE + c.name: c.unit for c in offer.followed}
+    sent = {COMMAND + c.name: c.unit for c in offer.driven}
     channels = dict(zip((*references, *sent), (*due.T, *commands.T), strict=True))
     channels |= dict(zip(changed.outputs, seen.T, strict=True))
     channels = dict(zip(held, imposed.T, strict=True)) | channels

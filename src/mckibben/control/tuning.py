@@ -35,7 +35,7 @@ STEEPER = 2.0
 def tune_pid(
     plant: Plant,
     *,
-    sample_time: float = 0.02,
+    sample_time: float,
     closed_loop_time: float | None = None,
     hold: float = 15.0,
     scheduled: dict[str, float] | None = None,

@@ -10,16 +10,12 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.fields import drives
 from mckibben.blocks.inverse import commands
-from mckibben.blocks.running import Stream
-from mckibben.control.identified import known_ranges
+from mckibben.blocks.ranges import known_ranges
 from mckibben.errors import DataError, ModelError
-from mckibben.recording import Recording
-
-COMMAND = "command_"
-"""Prefix of commands in recordings, which plants do not use."""
+from mckibben.recording import COMMAND, Recording
 
 
 def plain(name: str) -> str:
@@ -51,7 +47,8 @@ class Twin:
         Constant inputs, such as a load [N], a length [mm] or an extensor's pressure [bar]. Channels of
         a reference take precedence.
     sample_time : float, optional
-        Time that a command is held [s]; default the model's own, or 0.02 s.
+        Time that a command is held [s]; default the model's own. A model of any sample time that depends
+        on rate needs it in `reset`; `track` gives it that of the reference.
     name : str
         In tables and recordings.
     rest_length : float, optional
@@ -99,8 +96,8 @@ class Twin:
         ends = (*self.forward.inputs, *self.forward.outputs)
         self.units = {plain(channel.name): channel.unit for channel in ends}
         own = self.forward.sample_time
-        self.sample_time = float(sample_time or own or 0.02)
-        if own is not None and abs(self.sample_time - own) > 1e-9 * own:
+        self.sample_time = own if sample_time is None else float(sample_time)
+        if own and self.sample_time and abs(self.sample_time - own) > 1e-9 * own:
             raise ModelError(
                 f"{self.forward.title!r} is a model of steps of {own:g} s, and a loop of "
                 f"{self.sample_time:g} s is closed on it",
@@ -121,7 +118,9 @@ class Twin:
                     f"limits are {low:g} to {high:g}", channel=channel, remedy="give low, then high"
                 )
         self._given = given
-        known = {plain(n): Ends(*e) for n, e in known_ranges(model).items()}
+        known = {
+            plain(n): Ends(*e) for n, e in known_ranges(model.inputs, model.known_inputs).items()
+        }
         self._limits = known | given
         self._rest = np.empty(0)
         self._stream: Stream | None = None
@@ -219,7 +218,8 @@ class Twin:
 
     def run(self, inputs: Recording) -> Recording:
         """Run it over a recording of its inputs, as ``model.simulate`` does; absent inputs are held."""
-        twin = self.changed({"sample_time": inputs.sample_time or self.sample_time})
+        step = inputs.sample_time
+        twin = self.changed({} if step is None else {"sample_time": step})
         twin._begin()
         columns = [
             inputs[name] if name in inputs else np.full(len(inputs), twin._resting(name))

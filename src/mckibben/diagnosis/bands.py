@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands import Band, Banded, inside
-from mckibben.blocks.base import Block, check_units
-from mckibben.blocks.fields import rows, vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import check_units, rows, vector
 from mckibben.blocks.free_runs import free_run
 from mckibben.blocks.inverse import commands
 from mckibben.blocks.runs import FreeRun
@@ -32,7 +32,7 @@ from mckibben.signals.shared_rows import check_shared
 from mckibben.system.progress import Tell, one_by_one, telling
 
 if TYPE_CHECKING:
-    from mckibben.comparison.splits import Split
+    from mckibben.splits import Split
 
 Unit = Literal["auto", "run", "block"]
 
@@ -44,7 +44,7 @@ LEVEL, LEVELS = 0.9, np.linspace(0.0, 1.0, 1001)
 table of half widths.
 """
 
-FEWEST = 9
+FEWEST_UNITS = 9
 """Smallest number of units for a level of 0.9: with fewer runs, blocks of runs are the exchangeable
 units.
 """
@@ -198,7 +198,7 @@ def find_band(
     runs = [run for run in runs if run.counts.any()]
     errors = [run.errors for run in runs]
     memory = max(correlation_length(one) for one in zip(*(e.T for e in errors), strict=True))
-    by_run = unit == "run" or (unit == "auto" and len(runs) >= FEWEST)
+    by_run = unit == "run" or (unit == "auto" and len(runs) >= FEWEST_UNITS)
     which: Literal["run", "block"] = "run" if by_run else "block"
     units: list[NDArray[np.intp]] = []
     n = 0
@@ -321,7 +321,7 @@ class TestedBand:
     """
 
     __test__ = False  # it is no test
-    needed: ClassVar[int] = FEWEST
+    needed: ClassVar[int] = FEWEST_UNITS
 
     unknown: Unknown | None
     level: float
@@ -375,8 +375,8 @@ def tested_band(
     lowest, highest = float(by_run.min()), float(by_run.max())
     branches = n_branches([run.outputs for run in held])
     reasons: dict[Unknown, bool] = {
-        "blocks": band.units < FEWEST,
-        "branches": branches < FEWEST,
+        "blocks": band.units < FEWEST_UNITS,
+        "branches": branches < FEWEST_UNITS,
         "narrow": lowest < SHARES[0],
         "wide": highest > SHARES[1],
     }

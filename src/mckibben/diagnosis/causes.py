@@ -24,7 +24,7 @@ from mckibben.numerics.statistics import correlation_length, half_interval, hats
 from mckibben.signals.holds import holds
 from mckibben.signals.reversals import reversals
 
-PER_BRANCH, FEWEST, MOST = 24, 400, 6000
+PER_BRANCH, FEWEST_BLOCKS, MOST_BLOCKS = 24, 400, 6000
 """Smallest number of blocks per typical branch of the input; smallest and largest number of blocks, if
 there are as many samples.
 """
@@ -39,7 +39,7 @@ WAYS = (0.05, 0.2, 0.6)
 """Distances of reversal, in shares of half the range, after which the input is on the other branch.
 """
 
-HELD = 0.15
+HOLDS_SHARE = 0.15
 """Share of samples in holds above which creep is distinguished from the loop."""
 
 MOST_DELAY, LONGER = 50, 8
@@ -246,7 +246,7 @@ def block_length(block: Block, runs: Sequence[FreeRun]) -> int:
     branches = _branch_lengths(block, runs)
     usual = int(np.median(branches)) // PER_BRANCH if branches else 1
     most = max(int(np.median(sizes)) // (2 * PER_COLUMN), 1)
-    return min(max(1, min(usual, sum(sizes) // FEWEST), -(-sum(sizes) // MOST)), most)
+    return min(max(1, min(usual, sum(sizes) // FEWEST_BLOCKS), -(-sum(sizes) // MOST_BLOCKS)), most)
 
 
 def _branch_lengths(block: Block, runs: Sequence[FreeRun]) -> list[int]:
@@ -336,7 +336,7 @@ def _longest_hold(block: Block, runs: Sequence[FreeRun], names: Sequence[str]) -
     tables = [run.source.matrix(names) for run in runs]
     spans = np.ptp(np.concatenate(tables), axis=0).tolist()
     found = [hold.stop - hold.start for table in tables for hold in holds(table, spans, shortest)]
-    return max(found, default=0) if sum(found) >= HELD * sum(map(len, tables)) else 0
+    return max(found, default=0) if sum(found) >= HOLDS_SHARE * sum(map(len, tables)) else 0
 
 
 def _creeping(modelled: Array, longest: int) -> Array:

@@ -10,13 +10,14 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
-from mckibben.blocks.base import Block, check_units
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import check_units
 from mckibben.blocks.free_runs import free_run
 from mckibben.blocks.runs import FreeRun
-from mckibben.comparison.choosing import useful
 from mckibben.diagnosis.causes import Cause, averaged, block_length, causes
 from mckibben.diagnosis.description import ModelDescription
 from mckibben.errors import DataError
+from mckibben.metrics import useful
 from mckibben.numerics.statistics import NORMAL_95, correlation_length, rms
 from mckibben.recording import Recording, check_sample_times, listed
 from mckibben.signals.shared_rows import check_shared
@@ -24,7 +25,7 @@ from mckibben.system.progress import Tell, one_by_one, telling
 from mckibben.system.showing import DrawsItself
 from mckibben.system.threads import one_blas_thread
 
-FEWEST, SHORTEST = 60, 10
+FEWEST_IN_ALL, FEWEST_IN_EACH = 60, 10
 """Smallest number of samples that can be tested, in total and per recording."""
 
 FEWEST_BLOCKS = 6
@@ -149,7 +150,7 @@ class OutputCheck:
 
     @property
     def useless(self) -> bool:
-        """Whether the mean predicts about as well; see `mckibben.comparison.choosing.useful`."""
+        """Whether the mean predicts about as well; see `mckibben.metrics.useful`."""
         return not useful(self.rmse, self.mean_error)
 
     @property
@@ -259,11 +260,11 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
         _refuse(recording, block)
     check_sample_times(recordings)
     total, source = sum(map(len, recordings)), recordings[0].source
-    if total < FEWEST:
+    if total < FEWEST_IN_ALL:
         raise DataError(
             f"{total} samples are too few to distinguish a wrong model from noise",
             file=source,
-            remedy=f"record at least {FEWEST}, better ten cycles with 50 or more each",
+            remedy=f"record at least {FEWEST_IN_ALL}, better ten cycles with 50 or more each",
         )
     driven = [c.name for c in block.inputs if c.name not in block.scheduling]
     still = [driven[0]] if all(_constant(recordings, name) for name in driven) else []
@@ -279,11 +280,11 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
 
 def _refuse(recording: Recording, block: Block) -> None:
     check_units(recording, (*block.inputs, *block.outputs))
-    if len(recording) < SHORTEST:
+    if len(recording) < FEWEST_IN_EACH:
         raise DataError(
             f"{len(recording)} samples are too few: the residual is correlated over longer times",
             file=recording.source,
-            remedy=f"leave this recording out, or record at least {SHORTEST} samples",
+            remedy=f"leave this recording out, or record at least {FEWEST_IN_EACH} samples",
         )
 
 

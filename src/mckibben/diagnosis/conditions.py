@@ -8,9 +8,8 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.channels import by_name, channels_of
-from mckibben.diagnosis.tracks import FEWEST
 from mckibben.numerics.statistics import hats
-from mckibben.recording import Recording
+from mckibben.recording import FEWEST_SAMPLES, Recording
 from mckibben.signals.holds import STILL, holds, moves
 
 ALIKE, COVERS = 0.02, 0.5
@@ -59,7 +58,9 @@ def constant_segments(
     for place, one in enumerate(recordings):
         columns = one.matrix(others)
         whole = bool(np.all(np.ptp(columns, axis=0) <= STILL * ranges))
-        for hold in [slice(0, len(one))] if whole else holds(columns, ranges.tolist(), FEWEST):
+        for hold in (
+            [slice(0, len(one))] if whole else holds(columns, ranges.tolist(), FEWEST_SAMPLES)
+        ):
             part = one.slice(hold.start, hold.stop)
             if np.ptp(part[given]) > COVERS * span:
                 found.append((columns[hold].mean(axis=0), place, part))

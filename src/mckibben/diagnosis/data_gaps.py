@@ -18,14 +18,14 @@ from mckibben.channels import PRESSURE, channels_of
 from mckibben.diagnosis.excitation import Excitation, extremes
 from mckibben.errors import DataError
 from mckibben.numerics.statistics import dependence
-from mckibben.recording import Recording, listed
+from mckibben.recording import FEWEST_SAMPLES, Recording, listed
 from mckibben.signals.shared_rows import without_copies
 
 if TYPE_CHECKING:
     from mckibben.channels import Names
 
-FEWEST_SAMPLES, MOST_SAMPLES = 10, 20_000
-"""Smallest number of samples of a recording, and largest number used for correlations."""
+MOST_SAMPLES = 20_000
+"""Largest number of samples used for correlations."""
 
 AT_END, OFF_REST = 0.1, 0.1
 """Shares of a range: distance from an end for a turning point to be at it; distance from the most

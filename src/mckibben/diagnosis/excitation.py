@@ -13,7 +13,7 @@ from mckibben.arrays import NARROWEST, Array
 from mckibben.recording import Recording
 from mckibben.signals.holds import holds
 from mckibben.signals.reversals import (
-    FEWEST,
+    FEWEST_FOR_NOISE,
     GROWS,
     NOISE_SHARE,
     OF_NORMAL,
@@ -193,5 +193,5 @@ def extremes(recordings: Sequence[Recording], name: str) -> tuple[float, float]:
 
 
 def _white(x: Array) -> float:
-    one, two = third_differences(x) if x.size >= FEWEST else (0.0, 0.0)
+    one, two = third_differences(x) if x.size >= FEWEST_FOR_NOISE else (0.0, 0.0)
     return one / OF_NORMAL if two < GROWS * one else 0.0

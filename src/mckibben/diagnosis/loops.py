@@ -17,7 +17,7 @@ from mckibben.signals.reversals import whole_cycles
 SHARES = np.linspace(0.02, 0.98, 49)
 """Input levels of a curve, as shares of the input range; the middle one is mid input."""
 
-WINDOW, FEWEST = 0.025, 8
+WINDOW, FEWEST_IN_WINDOW = 0.025, 8
 """Half width of the window of a curve's point, as a share of the range; smallest number of samples
 in it.
 """
@@ -108,7 +108,7 @@ def _loop(number: int, track: Track, piece: slice, scale: Scale) -> Loop | None:
     low, high = float(max(u[0], u[-1])), float(u[top])
     covered, amplitude = u >= low, high - low
     span = float(np.ptp(y[covered]))
-    if min(rise.size, fall.size) < FEWEST or span == 0:
+    if min(rise.size, fall.size) < FEWEST_IN_WINDOW or span == 0:
         return None
     levels, half = low + SHARES * amplitude, _half(scale, amplitude)
     up, down = (curve(u[part], y[part], levels, half) for part in (rise, fall))

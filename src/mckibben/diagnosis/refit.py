@@ -14,12 +14,12 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.inverse import Inverse
 from mckibben.channels import channels_of
-from mckibben.comparison.splits import parts_of
 from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.estimators.catalogue import declared
 from mckibben.numerics.blocks import BlockBootstrap, interval
 from mckibben.numerics.statistics import correlation_length
 from mckibben.recording import Recording
+from mckibben.splits import parts_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,20 +18,16 @@ from mckibben.arrays import Array, true_runs
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import FeedforwardFeedback
-from mckibben.blocks.fields import MEASURED, Channel
-from mckibben.control.twin import COMMAND
+from mckibben.blocks.fields import Channel
 from mckibben.diagnosis.refit import Refit, refitted
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.numerics.blocks import block_length
 from mckibben.numerics.statistics import NORMAL_95, correlation_length, rms
-from mckibben.recording import Recording, listed, sample_time_of
+from mckibben.recording import COMMAND, MEASURED, REFERENCE, Recording, listed, sample_time_of
 from mckibben.signals.shared_rows import check_shared
 from mckibben.system.showing import DrawsItself
 
-REFERENCE = "reference_"
-"""Prefixes of the names of references."""
-
-LONGEST, HELD = 1.0, 3
+LONGEST_DELAY, SAMPLES_AT_LIMIT = 1.0, 3
 """Longest delay searched [s], at most an eighth of the log; number of successive samples at an
 extreme, while the reference moves, above which a command is at a limit.
 """
@@ -320,7 +316,7 @@ def _at_limit(command: Array, references: Sequence[Array]) -> Array:
         flat = np.abs(command - extreme) <= near
         for begin, end in true_runs(flat):
             moves = any(np.ptp(r[begin:end]) > ROUNDING * np.ptp(r) for r in references)
-            found[begin:end] |= end - begin >= HELD and moves
+            found[begin:end] |= end - begin >= SAMPLES_AT_LIMIT and moves
     return found
 
 
@@ -372,7 +368,7 @@ def _delay(where: str, first: Array, then: Array, step: float) -> Delay | None:
 
     The standard error is that of sums over blocks that are long against the correlation of errors.
     """
-    most = min(round(LONGEST / step), len(first) // 8)
+    most = min(round(LONGEST_DELAY / step), len(first) // 8)
     if most < 1 or np.ptp(first) == 0 or np.ptp(then) == 0:
         return None
     inner = slice(most, len(first) - most)

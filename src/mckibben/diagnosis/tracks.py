@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import NARROWEST, Array
 from mckibben.errors import DataError
-from mckibben.recording import Recording
+from mckibben.recording import FEWEST_SAMPLES, Recording
 from mckibben.signals.holds import shortest_hold
 from mckibben.signals.reversals import branches_between, noise_level, reversals, swing_threshold
 
@@ -19,10 +19,8 @@ Range = tuple[float, float]
 QUIET, ROUNDING = 1e-3, 1e-12
 """Shares of the range: noise below the first is not averaged; below the second it is rounding."""
 
-MAJOR, FEWEST = 0.1, 10
-"""Smallest swing of the input, as a share of its range, that separates cycles; smallest number of
-samples in all recordings.
-"""
+MAJOR = 0.1
+"""Smallest swing of the input, as a share of its range, that separates cycles."""
 
 
 @dataclass(frozen=True)
@@ -112,12 +110,12 @@ def prepare(
         raise DataError("there is no recording to characterize", remedy="give at least one")
     us, ys = ([one[name] for one in recordings] for name in (input_name, output_name))
     source, n = recordings[0].source, sum(map(len, recordings))
-    if n < FEWEST:
+    if n < FEWEST_SAMPLES:
         raise DataError(
             f"{n} samples are too few to characterize",
             file=source,
             channel=input_name,
-            remedy=f"record at least {FEWEST}, better whole cycles with 50 or more each",
+            remedy=f"record at least {FEWEST_SAMPLES}, better whole cycles with 50 or more each",
         )
     scale = Scale(Spread.of(us, source, input_name), Spread.of(ys, source, output_name))
     tracks = [
@@ -157,5 +155,5 @@ def _track(u: Array, y: Array, sample_time: float | None, scale: Scale) -> Track
 
 def _closes(x: Array, noise: float) -> bool:
     """Return whether a signal is periodic: its end continues at its beginning."""
-    usual = float(np.quantile(np.abs(np.diff(x)), 0.99)) if x.size > FEWEST else 0.0
+    usual = float(np.quantile(np.abs(np.diff(x)), 0.99)) if x.size > FEWEST_SAMPLES else 0.0
     return bool(abs(x[0] - x[-1]) <= max(1.5 * usual, 4 * np.nan_to_num(noise)))

@@ -16,7 +16,7 @@ from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.table import Column, Table
 from mckibben.files.units import find, weight
-from mckibben.recording import REST_LENGTH, conversion
+from mckibben.recording import COMMAND, REFERENCE, REST_LENGTH, conversion
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
         header = parse(column.label)
         channel = column.header if own else channel_of(header)
         if (channel in fixed and not own) or (
-            channel in named and channel.startswith(("reference_", "command_"))
+            channel in named and channel.startswith((REFERENCE, COMMAND))
         ):
             channel = snake_case(header.name)  # the first of several references is the loop's
         if channel in named and channel not in fixed and not request.needs(channel):

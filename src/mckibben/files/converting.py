@@ -18,7 +18,7 @@ from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.table import Column
 from mckibben.files.units import COUNTS, Unit, convert, find, weight
-from mckibben.recording import PLAUSIBLE, REST_LENGTH, conversion, standard_unit
+from mckibben.recording import COMMAND, PLAUSIBLE, REST_LENGTH, conversion, standard_unit
 
 ASSUMED = "no unit is given, so these are assumed: "
 """Beginning of a note on assumed units."""
@@ -182,7 +182,7 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
     unit = read_in.name if unit is None else unit
     samples = convert(values, read_in.name, unit)
     if not own and not source.request.raw:
-        if not channel.startswith(("voltage", "command_")):  # a sawtooth can be commanded
+        if not channel.startswith(("voltage", COMMAND)):  # a sawtooth can be commanded
             quality.refuse_wraps(channel, raw, source)
         samples = quality.without_codes(channel, samples, raw, source)
     if not own or channel in source.request.units or calibrated:

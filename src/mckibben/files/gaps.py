@@ -11,8 +11,9 @@ from mckibben.arrays import Array, Mask, true_runs
 from mckibben.files import timebase
 from mckibben.files.converting import Times
 from mckibben.files.notices import listed
-from mckibben.files.request import FEWEST, Source
+from mckibben.files.request import Source
 from mckibben.files.units import convert
+from mckibben.recording import FEWEST_SAMPLES
 
 Channels = dict[str, Array]
 
@@ -88,8 +89,9 @@ def pieces(
             else np.interp(grid, time[~mask], channels[name][~mask])
             for name, mask in missing.items()
         }
-        begin = start + (step or 1.0) * first if times is None else times.seconds(t[0])
-        marked = begin + (step or 1.0) * (true_runs(bridged) - [0, 1])
+        pitch = 1.0 if step is None else step  # without time, samples are numbered
+        begin = start + pitch * first if times is None else times.seconds(t[0])
+        marked = begin + pitch * (true_runs(bridged) - [0, 1])
         found.append(Piece(samples, step, float(begin), marked.tolist()))
     return found
 
@@ -169,7 +171,7 @@ def _judged_step(
 
 def _long_enough(spans: timebase.Spans, source: Source) -> timebase.Spans:
     """Return the spans of sufficient length."""
-    fewest = FEWEST if len(spans) > 1 else source.request.fewest
+    fewest = FEWEST_SAMPLES if len(spans) > 1 else source.request.fewest
     long = spans[spans[:, 1] - spans[:, 0] >= fewest]
     if not long.size:
         raise source.error(

@@ -14,10 +14,7 @@ from mckibben.files.channels import Channel, Described, Time
 from mckibben.files.formats import MOST_BYTES
 from mckibben.files.notices import warn
 from mckibben.files.table import Table
-from mckibben.recording import conversion
-
-FEWEST = 10
-"""Smallest number of samples of a recording, or of a segment of one."""
+from mckibben.recording import FEWEST_SAMPLES, conversion
 
 LONGEST = 1e6
 """Largest rest length of a muscle [mm]."""
@@ -48,7 +45,7 @@ class Request:
     @property
     def fewest(self) -> int:
         """Smallest number of samples of a recording."""
-        return FEWEST if self.informative else 2
+        return FEWEST_SAMPLES if self.informative else 2
 
     @property
     def names_channels(self) -> bool:

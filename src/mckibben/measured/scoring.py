@@ -12,7 +12,6 @@ import pandas as pd
 
 from mckibben.arrays import Array, Mask
 from mckibben.channels import Channels, channels_of
-from mckibben.comparison.splits import Split, split_of
 from mckibben.diagnosis.branch_gaps import gap_ratio, paired_gaps
 from mckibben.errors import DataError
 from mckibben.files import write
@@ -21,6 +20,7 @@ from mckibben.measured.sets import Set, Task, parted
 from mckibben.metrics import rmse
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
+from mckibben.splits import Split, split_of
 
 START = 20
 """Measured outputs of a test recording that any model may start from, and that are not scored."""

@@ -14,13 +14,12 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from mckibben.comparison.splits import FEWEST
 from mckibben.errors import DataError
 from mckibben.files import read
 from mckibben.files.channels import NAME, Folder, describing, description
 from mckibben.files.formats import SOUGHT
 from mckibben.files.sources import inside, is_bag
-from mckibben.recording import PERIODIC, Recording
+from mckibben.recording import FEWEST_SAMPLES, PERIODIC, Recording
 from mckibben.signals import resample
 from mckibben.system.validation import reason
 
@@ -115,7 +114,7 @@ class Split(_Strict):
     about: str = ""
     resample: Annotated[float, Field(gt=0)] | None = None
     gaps: Literal["error", "split", "interpolate"] = "interpolate"
-    period: Annotated[int, Field(ge=FEWEST)] | None = None
+    period: Annotated[int, Field(ge=FEWEST_SAMPLES)] | None = None
     periodic: list[str] = ["*"]
     tasks: Annotated[list[Task], Field(min_length=1)] = [Task()]
 
@@ -256,7 +255,7 @@ def parted(
         cuts = [round(task.cut * len(one)) for one in used]
         train = [one.slice(0, cut) for one, cut in zip(used, cuts, strict=True)]
         test = [one.slice(cut, len(one)) for one, cut in zip(used, cuts, strict=True)]
-        if any(len(one) < FEWEST for one in (*train, *test)):
+        if any(len(one) < FEWEST_SAMPLES for one in (*train, *test)):
             raise wrong(f"cutting at {task.cut:g} leaves too little")
     if not train or (task.tested and not test):
         raise wrong(f"no recording is to be {'tested on' if train else 'fitted'}")

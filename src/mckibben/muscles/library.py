@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.saving import from_dict, to_dict
+from mckibben.blocks.saving import from_dict
 from mckibben.errors import DataError, ModelError
 from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import GROUPS, PLACES, traits
@@ -108,7 +108,7 @@ class Muscle:
         """Return it with its conditions and its balance, for JSON."""
         conditions = self.conditions.model_dump(exclude_none=True)
         about = {"name": self.name} | self.summary()
-        return about | {"conditions": conditions, "balance": to_dict(self.balance)}
+        return about | {"conditions": conditions, "balance": self.balance.to_dict()}
 
     @property
     def traits(self) -> Array:
@@ -168,7 +168,7 @@ def _load(path: Path) -> Muscle:
         )
     try:
         found = _File.model_validate(content)
-        example = to_dict(Balance.example())
+        example = Balance.example().to_dict()
         balance = from_dict({name: example[name] for name in HEADING} | found.balance)
     except ValidationError as error:
         raise invalid(error, path, "correct it, as files of the library have it") from None
@@ -211,7 +211,7 @@ def parsed(path: Path) -> dict[str, Any]:
 
 def described(muscle: Muscle) -> str:
     """Return a muscle as the text of its file."""
-    block = to_dict(muscle.balance)
+    block = muscle.balance.to_dict()
     channels = {"driven", "scheduled", "given"}
     left = {*HEADING, "pressure_range", *channels}
     left |= {

@@ -30,7 +30,7 @@ ZERO = 0.03
 SMOOTH, FINE = 1.0, 0.03
 """Correlation length of a trait's numbers, in neighbours, and the independent part of each."""
 
-FEWEST = 3
+FEWEST_MUSCLES = 3
 """Smallest number of muscles for estimating a spread."""
 
 MIDDLE = 0.8413
@@ -179,7 +179,7 @@ def _spreads(table: Array) -> tuple[float, float]:
     known = np.isfinite(table)
     muscles = known.any(axis=1)
     n = int(muscles.sum())
-    if n < FEWEST:
+    if n < FEWEST_MUSCLES:
         return DEFAULT_SPREAD, DEFAULT_SPREAD
     table, known = table[muscles], known[muscles]
     away = np.where(known, table, 0.0)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from mckibben.blocks.base import Block
+from mckibben.blocks.ranges import known_ranges
 from mckibben.channels import Channels, any_moves, channels_of
-from mckibben.control.identified import known_ranges
 from mckibben.control.loop import ends
 from mckibben.diagnosis.coupling import coupling
 from mckibben.errors import DataError, ModelError
@@ -215,7 +215,8 @@ def _block_loop(
     names = [channel.name for channel in block.inputs]
     driven, given = input or names[0], output or block.outputs[0].name
     compensated = block.forward_model if block.inverts else None
-    ranges = known_ranges(block) | ends(compensated, block.inputs[: block.n_driven], None)
+    ranges = known_ranges(block.inputs, block.known_inputs)
+    ranges |= ends(compensated, block.inputs[: block.n_driven], None)
     if driven not in ranges and high is None:
         raise ModelError(
             f"the range of {driven} that the model was identified on is not known",

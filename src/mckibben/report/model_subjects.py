@@ -9,6 +9,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
+from mckibben.recording import REFERENCE
 from mckibben.report.drawing import (
     N_COLOURS,
     POINTS,
@@ -87,7 +88,7 @@ def tracking(loops: Mapping[str, Tracked], output: str, points: int = POINTS) ->
         (found.recording[output], name, series_colour(place), "line")
         for place, (name, found) in enumerate([*loops.items()][:N_COLOURS])
     ]
-    wanted: Course = (first[f"reference_{output}"], "reference", "measured", "broad")
+    wanted: Course = (first[REFERENCE + output], "reference", "measured", "broad")
     curves = _courses(first.time, points, wanted, *ways)
     return Drawing((Panel(time_label(first), axis_label(output, first.units[output]), curves),))
 

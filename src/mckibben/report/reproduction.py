@@ -23,8 +23,8 @@ RECORDED = ("", "simulated", "measured", "sensor", "extracted", "reference", "of
 LONGEST = 40
 """Letters of all names of curves for which a third of the page is wide enough."""
 
-FEWEST = 40
-"""Points of a curve that is drawn as a line; fewer are dots."""
+DOTS = 40
+"""Most points of a curve that is drawn as dots; more are a line."""
 
 
 def heading(one: Table | Figure, *, quick: bool = False) -> str:
@@ -142,7 +142,7 @@ def drawing(figure: Figure) -> Drawing:
         for name, (x, y) in given.items():
             ink = name not in models
             colour = "measured" if ink else f"series-{models.index(name) % N_COLOURS + 1}"
-            style: Style = "line" if len(x) > FEWEST else "dots"
+            style: Style = "line" if len(x) > DOTS else "dots"
             curves.append(Curve(x, y, "" if name in seen else name, colour, style))
         seen |= {*given}
         panels.append(Panel(figure.text.x, figure.text.y, tuple(curves), title))

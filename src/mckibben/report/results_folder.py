@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from mckibben.blocks.saving import to_text
 from mckibben.diagnosis.check import Validation
 from mckibben.diagnosis.refit import Refit
 from mckibben.outputs import Results
@@ -74,15 +73,15 @@ class StudyFolder:
         if not board.rows and study.review is not None:
             write("review.json", to_json(study.review.to_dict()) + "\n")
             if isinstance(study.review.refit, Refit):
-                write("refit.json", to_text(study.review.refit.model))
+                write("refit.json", study.review.refit.model.to_text())
         for row in board.rows:
             if row.block is not None and row.model not in self._saved:
-                write(model_file(row.model), to_text(row.block))
+                write(model_file(row.model), row.block.to_text())
                 self._saved.add(row.model)
         write_leaderboard(board, self._results)
         undone = study.inverse
         if undone is not None:
-            write("inverse.json", to_text(undone.inverse))
+            write("inverse.json", undone.inverse.to_text())
         if undone is not None or last:
             facts = {"model": None} if undone is None else undone.to_dict()
             facts |= {"passed_over": dict(study.passed_over)}
@@ -96,7 +95,7 @@ class StudyFolder:
             about |= {name: whole[name] for name in ("description", "data_gaps")}
             write("validation.json", to_json(about) + "\n")
             if best.banded is not None:
-                write("banded.json", to_text(best.banded))
+                write("banded.json", best.banded.to_text())
         started = time.monotonic()
         if last or not board.pending or started >= self._next_page:
             write("report.html", page(study, self._command, title=self._title))

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from mckibben.blocks.fields import Channel
     from mckibben.comparison.choosing import Against
     from mckibben.comparison.leaderboard import Leaderboard
-    from mckibben.comparison.splits import Span
     from mckibben.control import Learned
     from mckibben.diagnosis.bands import Calibration
     from mckibben.diagnosis.causes import Cause
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from mckibben.diagnosis.review import Review
     from mckibben.planning.planner import Plan
     from mckibben.recording import Recording
+    from mckibben.splits import Span
     from mckibben.studying.results import Tracking
     from mckibben.studying.study import Study
 

@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.recording import Recording
-from mckibben.rigs.files import load_rig
-from mckibben.rigs.rig import Rig
+from mckibben.rigs.rig import Rig, load_rig
 from mckibben.signals import cut
 from mckibben.signals.checking import generator
 from mckibben.signals.protocol import PlannedRun, Protocol, protocol

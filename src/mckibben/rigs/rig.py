@@ -1,26 +1,36 @@
-"""A virtual rig: a validated set of physical parameters that can be run and stepped like hardware."""
+"""A virtual rig: a validated set of physical parameters that can be run and stepped like hardware.
+
+Its parameters are in a file, one of the package's or the user's; a recording of it has in its ``meta``
+how it differs from the published rig of its name, from which it can be rebuilt.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from operator import attrgetter
+from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import PrivateAttr, ValidationError, model_validator
 
+from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.recording import PROVENANCE, Recording
 from mckibben.rigs.commands import Commands
-from mckibben.rigs.files import CHANGES, REMEDY, changes
+from mckibben.rigs.files import PUBLISHED, REMEDY, describe, fields_of, rig_names
 from mckibben.rigs.parameters import AGEING, Air, Muscle, Range, Section, Sensor, parameter
 from mckibben.rigs.system import Demands, State, System, Traces
 from mckibben.signals.checking import generator
+from mckibben.system.atomic import write_text
 from mckibben.system.showing import DrawsItself
 from mckibben.system.validation import invalid
+
+CHANGES = "rig_changes"
+"""In the ``meta`` of what a rig recorded: how it differs from the published one."""
 
 
 class Rig(DrawsItself, Section, ABC):
@@ -403,3 +413,105 @@ def _volumes(traces: Traces) -> dict[str, Array]:
 def quantity(channel: str) -> str:
     """Return the quantity of a channel: ``pressure_2`` and ``pressure_extensor`` are ``pressure``."""
     return channel.partition("_")[0]
+
+
+# -- its file, and the published rig of its name ---------------------------------------------
+
+
+def load_rig(rig: str | Path) -> Rig:
+    """Return a rig by name, or from a file.
+
+    Parameters
+    ----------
+    rig : str or path
+        A name of `rig_names`, or a path that ends in ``.toml``.
+
+    Raises
+    ------
+    DataError
+        On an unknown name, or a file that is not a rig: the text names the parameter and its range.
+    """
+    path = Path(rig)
+    if path.suffix != ".toml":
+        if str(rig) not in rig_names():
+            raise DataError(
+                f"there is no rig {str(rig)!r}",
+                remedy=f"use one of {', '.join(rig_names())}, or a file that ends in .toml",
+            )
+        path = PUBLISHED / f"{rig}.toml"
+    return _from_fields(fields_of(path), path)
+
+
+def save_rig(rig: Rig, path: str | Path) -> None:
+    """Write a rig as a documented file; an earlier file is replaced when all is written."""
+    path = Path(path)
+    if path.suffix != ".toml":
+        raise DataError("a rig's file ends in .toml", file=path, remedy="name it so")
+    write_text(path, describe(rig))
+
+
+def changes(rig: Rig) -> dict[str, Any] | None:
+    """Return the differences of a rig from the published one of its name; None without one.
+
+    >>> changes(load_rig("mas20-hanging").changed({"payload": 10.0}))
+    {'payload': 10.0}
+    """
+    if rig.name not in rig_names():
+        return None
+    return _differing(_fields(load_rig(rig.name)), _fields(rig))
+
+
+def recorded_on(recording: Recording) -> Rig | None:
+    """Return the rig of a recording, rebuilt; None if it names no published one.
+
+    Raises
+    ------
+    DataError
+        If that was another version, or what was changed is not known or makes no rig.
+    """
+    named = str(recording.meta.get("rig", ""))
+    name, given = named.partition(" ")[0], recording.meta.get(CHANGES)
+    if name not in rig_names():
+        return None
+    rig = load_rig(name)
+    if named != rig.signature:
+        raise DataError(
+            f"{recording.name} is of {named[:60]}, not of {rig.signature}",
+            remedy="record it again, or name the rig",
+        )
+    if not isinstance(given, dict):
+        raise DataError(
+            f"{recording.name} does not record whether its rig {name} was changed",
+            remedy="record it again, or name the rig",
+        )
+    return rig.changed(given)
+
+
+def _fields(rig: Rig) -> dict[str, Any]:
+    """Return the fields of a rig as JSON values."""
+    return rig.model_dump(mode="json", exclude={"title", "source"})
+
+
+def _differing(known: dict[str, Any], own: dict[str, Any], path: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name, value in own.items():
+        before = known.get(name)
+        if isinstance(before, dict) and isinstance(value, dict) and value.keys() == before.keys():
+            found |= _differing(before, value, f"{path}{name}.")
+        elif value != before:
+            found[path + name] = value
+    return found
+
+
+def _from_fields(fields: dict[str, Any], path: Path) -> Rig:
+    known = registry.names("setups")
+    setup = fields.get("setup")
+    if setup not in known:
+        raise DataError(
+            f"setup is {setup!r:.60}", file=path, remedy=f"give one of {', '.join(known)}"
+        )
+    model: type[Rig] = registry.load("setups", str(setup))
+    try:
+        return model.model_validate(fields)
+    except ValidationError as error:
+        raise invalid(error, path, REMEDY) from None

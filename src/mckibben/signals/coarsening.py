@@ -9,13 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.errors import DataError, require
-from mckibben.recording import Recording
+from mckibben.recording import FEWEST_SAMPLES, Recording
 from mckibben.signals.reversals import reversals
 
-FEWEST = 10
-"""Smallest number of samples of a thinned recording; shorter ones are left out."""
-
-MOST = 100_000
+MOST_SAMPLES = 100_000
 """Largest number of samples to fit to, and to test on."""
 
 
@@ -87,7 +84,7 @@ def made_manageable(
     channel : str
         What drives.
     most : int, optional
-        Samples of all recordings of a side together; default `MOST`.
+        Samples of all recordings of a side together; default `MOST_SAMPLES`.
 
     Returns
     -------
@@ -100,8 +97,8 @@ def made_manageable(
     DataError
         If the limit is not positive, or leaves nothing.
     """
-    most = MOST if most is None else most
-    require(most >= FEWEST, "most_samples", most, f"{FEWEST} or more", DataError)
+    most = MOST_SAMPLES if most is None else most
+    require(most >= FEWEST_SAMPLES, "most_samples", most, f"{FEWEST_SAMPLES} or more", DataError)
     total = max(sum(map(len, recordings)) for recordings in sides)
     factor = -(-total // most)
     if factor == 1:
@@ -114,10 +111,10 @@ def made_manageable(
     ]
     thinned, lost = [], 0
     for recordings in sides:
-        long = [r for r in recordings if len(r) >= FEWEST * factor]
+        long = [r for r in recordings if len(r) >= FEWEST_SAMPLES * factor]
         thinned.append([coarsened(recording, factor, channel) for recording in long])
         lost += sum(_lost(recording[channel], factor) for recording in long)
-        left_out = [r.name for r in recordings if len(r) < FEWEST * factor]
+        left_out = [r.name for r in recordings if len(r) < FEWEST_SAMPLES * factor]
         if left_out:
             notes.append(f"Left out as too short: {', '.join(left_out)}.")
         if recordings and not long:

@@ -20,7 +20,8 @@ SLIGHT = 1e-3
 GROWS = 1.5
 """Scatter that grows so much over every second of so many samples is of movement."""
 
-FEWEST = 32
+FEWEST_FOR_NOISE = 32
+"""Smallest number of samples from which noise is estimated."""
 
 OF_NORMAL = 0.6745 * np.sqrt(20.0)
 """Median size of third differences of N(0, 1), of variance 20; 0.6745 is the median of |N(0, 1)|."""
@@ -64,7 +65,7 @@ def noise_level(x: ArrayLike, span: float | None = None) -> float:
     scatter, twice = third_differences(values)
     noise = scatter / OF_NORMAL
     span = float(np.ptp(values)) if span is None else span
-    moves = values.size >= FEWEST and noise > SLIGHT * span and twice > GROWS * scatter
+    moves = values.size >= FEWEST_FOR_NOISE and noise > SLIGHT * span and twice > GROWS * scatter
     return noise if noise <= NOISE_SHARE * span and not moves else float("nan")
 
 

@@ -20,7 +20,7 @@ from mckibben.recording import Recording
 WINDOW = 64
 """Number of consecutive output changes that must agree; half of that of short recordings."""
 
-FEWEST = 8
+FEWEST_CHANGES = 8
 """Number of output changes below which recordings are not compared."""
 
 ROUNDING = 2e-4
@@ -65,7 +65,7 @@ def shared_rows(
         return []
     moves = _movements(recordings, inputs, outputs)
     counts = np.array([codes.size for _, codes in moves], dtype=np.int64)
-    lengths = np.where(counts < FEWEST, 0, np.clip(counts // 2, FEWEST, WINDOW))
+    lengths = np.where(counts < FEWEST_CHANGES, 0, np.clip(counts // 2, FEWEST_CHANGES, WINDOW))
     found = []
     for length in np.unique(lengths[lengths > 0]):
         windows = [

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
-from mckibben.blocks.running import Stream
+from mckibben.blocks.base import Block, Stream
 from mckibben.stream.fixed_rate import Deadlines, FixedRate
 
 

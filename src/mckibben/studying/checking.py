@@ -9,10 +9,9 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.runs import FreeRun
-from mckibben.blocks.starts import run_on
-from mckibben.comparison.splits import Split
 from mckibben.diagnosis.check import Validation, check_runs, check_usable
 from mckibben.errors import DataError
+from mckibben.splits import Split
 
 
 def check_on_test(
@@ -36,7 +35,7 @@ def check_on_test(
         if not scored.size:
             continue
         start, stop = int(scored[0]), int(scored[-1]) + 1
-        run = run_on(model, recording.slice(start, stop))
+        run = model.as_run(recording.slice(start, stop))
         runs.append(FreeRun.of(run, found[start:stop, places]))
     try:
         check_usable(model, [run.source for run in runs])

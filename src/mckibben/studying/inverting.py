@@ -15,16 +15,15 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.fields import drives
 from mckibben.blocks.force.feedforward import compensator
-from mckibben.blocks.running import Stream
-from mckibben.comparison.choosing import acceptable, useful
+from mckibben.comparison.choosing import acceptable
 from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.comparison.splits import Split
-from mckibben.control.twin import COMMAND
 from mckibben.errors import MckibbenError, ModelError, ModelWarning
-from mckibben.recording import Recording
+from mckibben.metrics import useful
+from mckibben.recording import COMMAND, Recording
+from mckibben.splits import Split
 from mckibben.studying.recorded_inputs import RecordedInputs
 from mckibben.studying.static_map import static_error
 

@@ -10,9 +10,8 @@ import numpy as np
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.control import UNCOMPENSATED, Tracked, before, control_law, track, tune_pid
 from mckibben.errors import DataError, MckibbenError
-from mckibben.recording import Recording
-from mckibben.rigs import Rig
-from mckibben.rigs.files import changes, recorded_on
+from mckibben.recording import Recording, sample_time_of
+from mckibben.rigs.rig import Rig, changes, recorded_on
 
 LONGEST = 200.0
 """Longest motion that is tracked [s]."""
@@ -63,6 +62,11 @@ def closed_loops(
         To close them on.
     tests : sequence of Recording
         Of which the one that moves most in its stillest output is followed.
+
+    Raises
+    ------
+    DataError
+        If that has no time.
     """
     inverses = {row.model: row.inverse for row in board.rows if row.inverse is not None}
     if not {channel.name for channel in inverses[chosen].outputs} <= set(rig.inputs):
@@ -70,7 +74,7 @@ def closed_loops(
     wanted = {channel.name for inverse in inverses.values() for channel in inverse.inputs}
     held = [name for name in rig.inputs if name in wanted]
     reference = _followed(tests, board.outputs, held)
-    step = reference.sample_time or 0.05
+    step = sample_time_of(reference, "be tracked")
     scheduled = {name: float(reference[name][0]) for name in held}
     asked = inverses[chosen].inputs
     pid = tune_pid(rig, sample_time=step, scheduled=scheduled, references=asked, seed=seed)
@@ -90,7 +94,7 @@ def closed_loops(
 def _followed(tests: Sequence[Recording], outputs: Sequence[str], held: Sequence[str]) -> Recording:
     """Return a smoothed measured motion, with scheduling inputs at their means."""
     model = max(tests, key=lambda run: min(float(np.ptp(run[name])) for name in outputs))
-    step = model.sample_time or 0.05
+    step = sample_time_of(model, "be tracked")
     n = min(len(model), round(LONGEST / step))
     width = max(round(SMOOTHED / step), 1)
     window = np.ones(width) / width

@@ -10,9 +10,10 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.coupled.balance import balance_in
+from mckibben.blocks.coupled.balance import drive_of
 from mckibben.blocks.laws import wander
-from mckibben.control.identified import BEYOND, known_ranges
+from mckibben.blocks.ranges import known_ranges
+from mckibben.control.identified import BEYOND
 from mckibben.recording import Recording
 
 FAST = 0.99
@@ -22,7 +23,9 @@ STRIDES = (4, 1000)
 """Fewest and most samples from one turning point of a random motion to the next."""
 
 SAMPLES, STEP = 100, 0.02
-"""Of the motion of a model whose recordings are not at hand: samples, and the time between them [s]."""
+"""Of the test motion of a model whose recordings are not at hand: samples in which it goes through the
+range, and the time between them [s].
+"""
 
 EVEN = 3.0**0.5
 """Reach of an even distribution, in standard deviations."""
@@ -108,7 +111,7 @@ class RecordedInputs:
         is not known are 0. The fastest motion runs through the range in 100 samples; they are 20 ms
         apart unless the model has a sample time of its own, or one is given [s].
         """
-        ranges = known_ranges(block)
+        ranges = known_ranges(block.inputs, block.known_inputs)
         if not any(channel.name in ranges for channel in block.inputs):
             return None
         names = tuple(channel.name for channel in block.inputs)
@@ -117,14 +120,13 @@ class RecordedInputs:
         step = sample_time or block.sample_time or STEP
         middle, scale = ends.mean(axis=0), np.where(ends[1] > ends[0], ends[1] - ends[0], 1.0)
         directions, extent = np.eye(len(names)), (ends - middle) / scale
-        placed = balance_in(block)
-        if placed is not None and placed.solved and placed.balance.drive:
-            drive, n = np.array(placed.balance.drive), len(placed.balance.given)
-            ways = drive[:, 1:] / scale[:n, np.newaxis]
+        if (drive := drive_of(block)) is not None:
+            centre, n = drive[0], len(drive[0])
+            ways = drive[1] / scale[:n, np.newaxis]
             own = np.linalg.qr(ways, mode="complete").Q
             reach = EVEN * np.sqrt(((own.T @ ways) ** 2).sum(axis=1))
             directions[:n, :n] = own
-            extent[:, :n] = (drive[:, 0] - middle[:n]) / scale[:n] @ own + [-reach, reach]
+            extent[:, :n] = (centre - middle[:n]) / scale[:n] @ own + [-reach, reach]
         return cls(names, units, middle, scale, directions, extent, ends, SAMPLES, step)
 
     def motion(self, slowness: float, seed: int) -> Recording:

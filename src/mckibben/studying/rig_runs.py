@@ -12,9 +12,9 @@ import numpy as np
 from mckibben import registry
 from mckibben.errors import DataError
 from mckibben.recording import Recording
-from mckibben.rigs.files import load_rig, rig_names
+from mckibben.rigs.files import rig_names
 from mckibben.rigs.recording import record
-from mckibben.rigs.rig import Rig
+from mckibben.rigs.rig import Rig, load_rig
 from mckibben.signals import build, settings_of
 from mckibben.signals.protocol import Protocol, protocol
 from mckibben.system import ordinary

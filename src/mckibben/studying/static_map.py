@@ -10,9 +10,9 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.runs import run_of
-from mckibben.comparison.splits import Split
 from mckibben.numerics.blocks import squared_errors, sums_of_others
 from mckibben.numerics.least_squares import solve_products
+from mckibben.splits import Split
 
 LARGEST_DEGREE, MOST_TERMS = 5, 60
 """Of the polynomial."""

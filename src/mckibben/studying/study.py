@@ -17,14 +17,13 @@ from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.planning import plan_of
 from mckibben.comparison.ranking import Standing, ranked
 from mckibben.control import Tracked
-from mckibben.control.twin import COMMAND
 from mckibben.diagnosis import Characterization, characterize
 from mckibben.diagnosis.check import Validation
 from mckibben.diagnosis.data_gaps import Gap, data_gaps
 from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.diagnosis.review import Review, review
 from mckibben.errors import DataError
-from mckibben.recording import Recording, listed
+from mckibben.recording import COMMAND, Recording, listed
 from mckibben.rigs import load_rig
 from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import Compensation, compensation
@@ -238,8 +237,11 @@ def study(
                 raise
             plant, so_far = None, replace(so_far, not_looped=str(error))
         if plant is not None:
-            loops = closed_loops(board, undone.model, plant, so_far.test, seed)
-            so_far = replace(so_far, loops=loops, plant=named(plant))
+            try:
+                loops = closed_loops(board, undone.model, plant, so_far.test, seed)
+                so_far = replace(so_far, loops=loops, plant=named(plant))
+            except DataError as error:
+                so_far = replace(so_far, not_looped=str(error))
     if found is not None:
         found(so_far)
     if clear:

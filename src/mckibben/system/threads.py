@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 
 _lock = threading.Lock()
@@ -50,3 +51,18 @@ def one_blas_thread() -> Iterator[None]:
             _inside -= 1
             if _inside == 0:
                 _limits.close()
+
+
+def on_all_cores(call: Callable[[int], None], count: int) -> None:
+    """Call a function with 0, 1, ... count - 1, on all cores at once."""
+    workers = min(cores(), count)
+
+    def every(first: int) -> None:
+        for index in range(first, count, workers):
+            call(index)
+
+    if workers == 1:
+        every(0)
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            list(pool.map(every, range(workers)))

@@ -17,7 +17,7 @@ from mckibben.app.widgets import mark
 from mckibben.errors import DataError, MckibbenError
 from mckibben.numerals import number
 from mckibben.options import InvertOptions, TrackOptions
-from mckibben.recording import Recording
+from mckibben.recording import COMMAND, Recording
 from mckibben.report import interactive, words
 from mckibben.report.drawing import Curve, Drawing, Panel, axis_label, over_time, series_colour
 
@@ -347,7 +347,7 @@ def _plot(
         known = {*run.get("rmse", {}), *_wish(state)["held"]}
         driven = [key for key in one.channels if key.startswith(DRIVEN) and key not in known]
         moved = [key for key in driven if np.ptp(one[key]) > 0]
-        moved = [key for key in moved if key.startswith("command_")] or moved
+        moved = [key for key in moved if key.startswith(COMMAND)] or moved
         commands = [
             Curve(*over_time(one.time, one[x]), x, series_colour(k), "line")
             for k, x in enumerate(moved)

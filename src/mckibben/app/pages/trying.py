@@ -13,7 +13,7 @@ from mckibben.app.pages import parts
 from mckibben.app.state import State
 from mckibben.app.widgets import mark
 from mckibben.errors import DataError
-from mckibben.recording import Recording
+from mckibben.recording import REFERENCE, Recording
 from mckibben.report import results
 from mckibben.report.drawing import Curve, Drawing, Panel, axis_label, over_time
 
@@ -79,7 +79,7 @@ def log(state: State, names: list[str]) -> None:
 
     async def loaded(event: events.UploadEventArguments) -> None:
         path, found = await received(state, event)
-        if not any(key.startswith("reference_") for key in found.channels):
+        if not any(key.startswith(REFERENCE) for key in found.channels):
             problem, remedy = "it has no reference", "name a column reference_displacement_mm"
             raise DataError(problem, file=path, remedy=remedy)
         asked = {"log": path.name, "model": name, "form": state.chosen["compensate.form"]}

@@ -31,7 +31,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Ports, Start, needs_sample_time
+from mckibben.blocks.base import SEVERAL, Block, Ports, Start
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.balance_adaptive import learnable_balance
 from mckibben.blocks.coupled.balance_law import (
@@ -52,6 +52,7 @@ from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.learning import Learnable
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.ranges import unknown
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError, ModelWarning
 
 
@@ -680,3 +681,15 @@ def balance_in(model: Block) -> Placed | None:
         if isinstance(balance, Balance):
             return Placed(balance, solved, parts[:place], parts[place + 1 :])
     return None
+
+
+def drive_of(model: Block) -> tuple[Array, Array] | None:
+    """Return the middle of the pressures at which a model was driven, (n,), and ways from there, (n, r).
+
+    None if all pressures were driven freely, or the model does not begin with them.
+    """
+    placed = balance_in(model)
+    if placed is None or not placed.solved or not placed.balance.drive:
+        return None
+    drive = np.array(placed.balance.drive)
+    return drive[:, 0], drive[:, 1:]

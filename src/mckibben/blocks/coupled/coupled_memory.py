@@ -20,11 +20,12 @@ from annotated_types import Interval
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, needs_sample_time
+from mckibben.blocks.base import SEVERAL, Block
 from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
 from mckibben.blocks.hysteresis.play_operators import start_operators
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
 

@@ -23,8 +23,8 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
-from mckibben.blocks.compose import Composition, Layout, PerChannel, Series
+from mckibben.blocks.base import Block, Board
+from mckibben.blocks.compose import Composition, PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance, balance_in
 from mckibben.blocks.coupled.balance_law import (
     AT_REST,
@@ -249,7 +249,7 @@ class ForceCompensator(Composition):
     def outputs(self) -> tuple[Channel, ...]:
         return (self.forward.inputs[1],)
 
-    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         force, place, *scheduled = taken
         return Series(self.parts).wired(board, [place, *scheduled, force])
 

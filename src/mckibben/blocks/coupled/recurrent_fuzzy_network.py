@@ -25,11 +25,12 @@ from annotated_types import Interval
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, own_sample_time
+from mckibben.blocks.base import SEVERAL, Block
 from mckibben.blocks.fields import STRICT, Channel, Channels, Positive, PositiveRows, Rows, Vector
 from mckibben.blocks.kernels import kernel, remember, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
+from mckibben.blocks.sample_times import own_sample_time
 from mckibben.errors import ModelError
 
 LEAST_FIRING = 1e-290

@@ -28,10 +28,10 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import needs_sample_time
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, remember, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError, ModelWarning
 
 LONGEST_LAG = 1e6
@@ -42,45 +42,47 @@ APPROACHED = 0.05
 reachable.
 """
 
-WHOLE = 1e-6
+WHOLE_WITHIN = 1e-6
 """Share of a sample by which a dead time may differ from a whole number of samples."""
 
 
+GAIN, FILLS_FROM, VENTS_FROM, FILLED, VENTED, LOWEST, HIGHEST, LATE = range(8)
+"""Places of the coefficients: gain, offset while filling, while venting, share of the way that a sample
+fills, that it vents, lowest, highest pressure, dead time in samples.
+"""
+
+
 @kernel
-def _moved(c: Array, x: float, u: float) -> float:
+def pressure_after(c: Array, x: float, u: float) -> float:
     """Return the pressure after a sample."""
-    filling = min(max(c[0] * (u - c[1]), c[5]), c[6])
+    filling = min(max(c[GAIN] * (u - c[FILLS_FROM]), c[LOWEST]), c[HIGHEST])
     if filling > x:
-        return x + c[3] * (filling - x)
-    venting = min(max(c[0] * (u - c[2]), c[5]), c[6])
+        return x + c[FILLED] * (filling - x)
+    venting = min(max(c[GAIN] * (u - c[VENTS_FROM]), c[LOWEST]), c[HIGHEST])
     if venting < x:
-        return x + c[4] * (venting - x)
+        return x + c[VENTED] * (venting - x)
     return x
 
 
 @kernel
-def _middle_of(c: Array) -> float:
+def middle_of(c: Array) -> float:
     """Return the command for zero pressure, midway between filling and venting."""
-    return 0.5 * (c[1] + c[2])
+    return 0.5 * (c[FILLS_FROM] + c[VENTS_FROM])
 
 
 @kernel
-def _resting(c: Array, u: float, virgin: bool) -> float:
+def resting_pressure(c: Array, u: float, virgin: bool) -> float:
     """Return the steady pressure of a command; for a virgin start, the ambient pressure or 0."""
     if virgin:
-        return c[5] if c[5] > -math.inf else 0.0
-    return min(max(c[0] * (u - _middle_of(c)), c[5]), c[6])
+        return c[LOWEST] if c[LOWEST] > -math.inf else 0.0
+    return min(max(c[GAIN] * (u - middle_of(c)), c[LOWEST]), c[HIGHEST])
 
 
 @step
 def air_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Advance the model; the state is [pressure, past pressures, latest first].
-
-    Coefficients are [gain, offset while filling, while venting, share of the way that a sample fills,
-    that it vents, lowest, highest pressure, dead time in samples].
-    """
-    late = int(coefficients[7])
-    state[0] = _moved(coefficients, state[0], inputs[0])
+    """Advance the model; the state is [pressure, past pressures, latest first]."""
+    late = int(coefficients[LATE])
+    state[0] = pressure_after(coefficients, state[0], inputs[0])
     outputs[0] = state[late]
     remember(state[0], state[1 : late + 1])
 
@@ -88,7 +90,7 @@ def air_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -
 @kernel
 def air_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start at the steady pressure of the first command, or at ambient pressure."""
-    state[:] = _resting(coefficients, inputs[0], virgin)
+    state[:] = resting_pressure(coefficients, inputs[0], virgin)
 
 
 @step
@@ -99,20 +101,20 @@ def air_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: 
     """
     c = coefficients
     lowest, highest = c[c.size - 2], c[c.size - 1]
-    middle = _middle_of(c)
+    middle = middle_of(c)
     wanted, x = inputs[0], state[0]
     # pressures that differ by less are held, in the middle between filling and venting
-    held = ROUNDING * (abs(wanted) + c[0] * abs(middle))
+    held = ROUNDING * (abs(wanted) + c[GAIN] * abs(middle))
     if wanted > x + held:
-        u = min(x + (wanted - x) / c[3], c[6]) / c[0] + c[1]
+        u = min(x + (wanted - x) / c[FILLED], c[HIGHEST]) / c[GAIN] + c[FILLS_FROM]
     elif wanted < x - held:
-        u = max(x + (wanted - x) / c[4], c[5]) / c[0] + c[2]
+        u = max(x + (wanted - x) / c[VENTED], c[LOWEST]) / c[GAIN] + c[VENTS_FROM]
     else:
         wanted = x
-        u = x / c[0] + middle
+        u = x / c[GAIN] + middle
     u = min(max(u, lowest), highest)
-    reached = _moved(c, x, u)
-    if abs(reached - wanted) > SLACK * (abs(wanted) + c[0] * abs(u)):
+    reached = pressure_after(c, x, u)
+    if abs(reached - wanted) > SLACK * (abs(wanted) + c[GAIN] * abs(u)):
         state[1] += 1.0
         state[0] = reached
     else:
@@ -124,8 +126,8 @@ def air_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: 
 def air_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start at the steady pressure of the first command, within its limits."""
     c = coefficients
-    u = min(max(inputs[0] / c[0] + _middle_of(c), c[c.size - 2]), c[c.size - 1])
-    state[0], state[1] = _resting(c, u, virgin), 0.0
+    u = min(max(inputs[0] / c[GAIN] + middle_of(c), c[c.size - 2]), c[c.size - 1])
+    state[0], state[1] = resting_pressure(c, u, virgin), 0.0
 
 
 @dataclass(frozen=True, config=fields.STRICT)
@@ -227,9 +229,9 @@ class Air(Invertible):
 
     def check_time(self, sample_time: float | None) -> None:
         """Warn if the dead time is not a whole number of samples."""
-        late = self.coefficients(sample_time)[-1]
+        late = self.coefficients(sample_time)[LATE]
         assert sample_time is not None
-        if abs(self.dead_time / sample_time - late) > WHOLE:
+        if abs(self.dead_time / sample_time - late) > WHOLE_WITHIN:
             warnings.warn(
                 f"the dead time of {self.kind!r}, {self.dead_time:g} s, is no whole number of samples "
                 f"of {sample_time:g} s: {late * sample_time:g} s is taken",

@@ -12,7 +12,6 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import needs_sample_time, one_per
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     STRICT,
@@ -24,6 +23,8 @@ from mckibben.blocks.fields import (
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
 

@@ -25,14 +25,17 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, Start, own_sample_time
+from mckibben.blocks.base import Block, Start
 from mckibben.blocks.hysteresis.play_operators import check_order, start_operators
 from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.sample_times import own_sample_time
 from mckibben.errors import ModelError
 
 HEAD = 7
-"""Number of coefficients before the thresholds: lags of output and input, operators, and scales."""
+OUTPUT_LAGS, INPUT_LAGS, OPERATORS = range(3)
+INPUT_CENTRE, INPUT_SCALE, OUTPUT_CENTRE, OUTPUT_SCALE = range(3, HEAD)
+"""Places of the coefficients before the thresholds."""
 
 FARTHEST, SPACING, PLACES = 1.5, 0.0025, 1201
 """Grid of scaled outputs on which an equilibrium is searched: the data's range and half of it
@@ -62,8 +65,9 @@ SYMBOLS = {
 @kernel
 def take_input(u: float, coefficients: Array, state: Array) -> None:
     """Shift a new input into the past ones, and update the play operators."""
-    n, m, k = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
-    x = (u - coefficients[3]) / coefficients[4]
+    n, m = int(coefficients[OUTPUT_LAGS]), int(coefficients[INPUT_LAGS])
+    k = int(coefficients[OPERATORS])
+    x = (u - coefficients[INPUT_CENTRE]) / coefficients[INPUT_SCALE]
     remember(x, state[n : n + m])
     for i in range(k):
         r = coefficients[HEAD + i]
@@ -74,8 +78,8 @@ def take_input(u: float, coefficients: Array, state: Array) -> None:
 @kernel
 def give_output(y: float, coefficients: Array, state: Array) -> float:
     """Shift a new output into the past ones, and return it in its unit."""
-    remember(y, state[: int(coefficients[0])])
-    return coefficients[5] + coefficients[6] * y
+    remember(y, state[: int(coefficients[OUTPUT_LAGS])])
+    return coefficients[OUTPUT_CENTRE] + coefficients[OUTPUT_SCALE] * y
 
 
 def narx_kernels(regression: Callable[[Array, Array], float]) -> tuple[Step, Start]:
@@ -93,8 +97,9 @@ def narx_kernels(regression: Callable[[Array, Array], float]) -> tuple[Step, Sta
         for an input that has risen, the middle one for a virgin start; where there is none, the output
         that changes least.
         """
-        n, m, k = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
-        x = (inputs[0] - coefficients[3]) / coefficients[4]
+        n, m = int(coefficients[OUTPUT_LAGS]), int(coefficients[INPUT_LAGS])
+        k = int(coefficients[OPERATORS])
+        x = (inputs[0] - coefficients[INPUT_CENTRE]) / coefficients[INPUT_SCALE]
         state[n : n + m] = x
         start_operators(coefficients[HEAD : HEAD + k], x, x, virgin, state[n + m :])
         found, rests = 0.0, 0
@@ -125,7 +130,7 @@ def sum_of_terms(coefficients: Array, state: Array) -> float:
     After what all NARX kernels start with: highest degree, then for every term its weight and,
     padded with -1, the places in the state of its factors.
     """
-    k = HEAD + int(coefficients[2])
+    k = HEAD + int(coefficients[OPERATORS])
     degree = int(coefficients[k])
     terms = coefficients[k + 1 :]
     width = degree + 1
@@ -148,7 +153,7 @@ def network(coefficients: Array, state: Array) -> float:
     After what all NARX kernels start with: number of regressors, of units, whether they are
     wavelets, places in the state, bias, linear, then for every unit its weights, shift and output.
     """
-    start = HEAD + int(coefficients[2])
+    start = HEAD + int(coefficients[OPERATORS])
     n, units = int(coefficients[start]), int(coefficients[start + 1])
     wavelets = coefficients[start + 2] > 0.0
     places = coefficients[start + 3 : start + 3 + n]

@@ -21,9 +21,10 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, needs_sample_time
+from mckibben.blocks.base import Block
 from mckibben.blocks.kernels import kernel, remember, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
 

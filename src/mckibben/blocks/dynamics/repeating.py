@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from annotated_types import Interval
 
-from mckibben.blocks.base import Block, needs_sample_time
+from mckibben.blocks.base import Block
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 from mckibben.signals.periodic import band_limited

@@ -22,14 +22,20 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, needs_sample_time, one_per
+from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
 HEAD = 9
-"""Number of coefficients before the weights."""
+SUBSTEP, N_SUBSTEPS, HOLDS, N_STATES, UNITS = range(5)
+INPUT_CENTRE, INPUT_SCALE, OUTPUT_CENTRE, OUTPUT_SCALE = range(5, HEAD)
+"""Places of the coefficients before the weights; `SUBSTEP` is in units of 1 / rate, and `HOLDS` 1 for
+zero-order hold.
+"""
 
 SETTLING, SETTLING_STEP = 1000, 0.1
 """Number of steps in which an initial equilibrium is reached, and their length in units of 1 /
@@ -86,21 +92,17 @@ def advance(
 def state_network_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Advance the model; the state is [x, last input].
-
-    Coefficients are [substep by rate, how many, 1 for zero-order hold, states, units, offset and scale
-    of the input, of the output, weights].
-    """
-    h, count, held = coefficients[0], int(coefficients[1]), coefficients[2] > 0.0
-    n, units = int(coefficients[3]), int(coefficients[4])
+    """Advance the model; the state is [x, last input]."""
+    h, count, held = coefficients[SUBSTEP], int(coefficients[N_SUBSTEPS]), coefficients[HOLDS] > 0.0
+    n, units = int(coefficients[N_STATES]), int(coefficients[UNITS])
     weights = coefficients[HEAD:]
-    last = (state[n] - coefficients[5]) / coefficients[6]
-    now = (inputs[0] - coefficients[5]) / coefficients[6]
+    last = (state[n] - coefficients[INPUT_CENTRE]) / coefficients[INPUT_SCALE]
+    now = (inputs[0] - coefficients[INPUT_CENTRE]) / coefficients[INPUT_SCALE]
     rise = 0.0 if held else (now - last) / count
     for s in range(count):
         advance(weights, n, units, state, last + s * rise, rise, h, scratch)
     state[n] = inputs[0]
-    outputs[0] = coefficients[7] + coefficients[8] * state[0]
+    outputs[0] = coefficients[OUTPUT_CENTRE] + coefficients[OUTPUT_SCALE] * state[0]
 
 
 @kernel
@@ -110,8 +112,8 @@ def state_network_start(
     """Start in equilibrium with the first input, or with zeros."""
     state[:] = 0.0
     if not virgin:
-        n, units = int(coefficients[3]), int(coefficients[4])
-        u = (inputs[0] - coefficients[5]) / coefficients[6]
+        n, units = int(coefficients[N_STATES]), int(coefficients[UNITS])
+        u = (inputs[0] - coefficients[INPUT_CENTRE]) / coefficients[INPUT_SCALE]
         for _ in range(SETTLING):
             advance(coefficients[HEAD:], n, units, state, u, 0.0, SETTLING_STEP, scratch)
         state[n] = inputs[0]

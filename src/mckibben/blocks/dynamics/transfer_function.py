@@ -16,10 +16,14 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, own_sample_time
+from mckibben.blocks.base import Block
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.sample_times import own_sample_time
 from mckibben.errors import ModelError
+
+INPUT_OFFSET, OUTPUT_OFFSET = range(2)
+"""Places of the first coefficients: the operating point."""
 
 
 @step
@@ -27,7 +31,7 @@ def filter_step(coefficients: Array, state: Array, inputs: Array, outputs: Array
     """Advance the filter in transposed direct form; coefficients are [u_0, y_0, b, f, gain]."""
     n = state.size
     b, f = coefficients[2 : 3 + n], coefficients[3 + n : 4 + 2 * n]
-    u = inputs[0] - coefficients[0]
+    u = inputs[0] - coefficients[INPUT_OFFSET]
     y = b[0] * u
     if n > 0:
         y += state[0]
@@ -35,7 +39,7 @@ def filter_step(coefficients: Array, state: Array, inputs: Array, outputs: Array
         state[i] = state[i + 1] + b[i + 1] * u - f[i + 1] * y
     if n > 0:
         state[n - 1] = b[n] * u - f[n] * y
-    outputs[0] = y + coefficients[1]
+    outputs[0] = y + coefficients[OUTPUT_OFFSET]
 
 
 @kernel
@@ -43,7 +47,7 @@ def filter_start(coefficients: Array, state: Array, inputs: Array, virgin: bool)
     """Start the filter at rest: at the first input, or at the operating point."""
     n = state.size
     b, f = coefficients[2 : 3 + n], coefficients[3 + n : 4 + 2 * n]
-    u = 0.0 if virgin else inputs[0] - coefficients[0]
+    u = 0.0 if virgin else inputs[0] - coefficients[INPUT_OFFSET]
     y = coefficients[4 + 2 * n] * u
     coming = 0.0
     for i in range(n, 0, -1):

@@ -18,10 +18,11 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, Ports, needs_sample_time, rate_filter
+from mckibben.blocks.base import Block, Ports
 from mckibben.blocks.hysteresis.play_operators import check_order
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.sample_times import needs_sample_time, rate_filter
 from mckibben.errors import ModelError
 
 PORTS: Ports = ("input",), ("force",), ("output",)
@@ -33,6 +34,14 @@ INSTEAD = "use it as the compensator, or fit pressure to contraction by another 
 # -- the published model ---------------------------------------------------------------------
 
 POINTS = 4
+
+SMOOTHING, RATE_GAIN, GAMMA, PHI, CONTRACTIONS, PRESSURES = 0, 1, 2, 3, 7, 23
+"""Places of the coefficients: those of the filter of the rate, gamma, and cubics of the force: phi, four
+contractions, and the pressures at these.
+"""
+
+E, RATE = range(2)
+"""Places of the state: previous contraction, and filtered rate."""
 
 
 @kernel
@@ -51,27 +60,25 @@ def lagrange(e: float, own: float, one: float, two: float, three: float) -> floa
 
 @step
 def published_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Advance the model; the state is [previous contraction, filtered rate].
-
-    Coefficients are [smoothing, gain of the rate, gamma, phi (4), contractions (16), pressures
-    (16)].
-    """
+    """Advance the model."""
     e, force = inputs[0], inputs[1]
-    rate = coefficients[0] * state[1] + coefficients[1] * (e - state[0])
-    one, two = cubic(coefficients, 7, force), cubic(coefficients, 11, force)
-    three, four = cubic(coefficients, 15, force), cubic(coefficients, 19, force)
-    y = lagrange(e, one, two, three, four) * cubic(coefficients, 23, force)
-    y += lagrange(e, two, one, three, four) * cubic(coefficients, 27, force)
-    y += lagrange(e, three, one, two, four) * cubic(coefficients, 31, force)
-    y += lagrange(e, four, one, two, three) * cubic(coefficients, 35, force)
-    outputs[0] = y + coefficients[2] * cubic(coefficients, 3, force) * rate
-    state[0], state[1] = e, rate
+    rate = coefficients[SMOOTHING] * state[RATE] + coefficients[RATE_GAIN] * (e - state[E])
+    one = cubic(coefficients, CONTRACTIONS, force)
+    two = cubic(coefficients, CONTRACTIONS + 4, force)
+    three = cubic(coefficients, CONTRACTIONS + 8, force)
+    four = cubic(coefficients, CONTRACTIONS + 12, force)
+    y = lagrange(e, one, two, three, four) * cubic(coefficients, PRESSURES, force)
+    y += lagrange(e, two, one, three, four) * cubic(coefficients, PRESSURES + 4, force)
+    y += lagrange(e, three, one, two, four) * cubic(coefficients, PRESSURES + 8, force)
+    y += lagrange(e, four, one, two, three) * cubic(coefficients, PRESSURES + 12, force)
+    outputs[0] = y + coefficients[GAMMA] * cubic(coefficients, PHI, force) * rate
+    state[E], state[RATE] = e, rate
 
 
 @kernel
 def published_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start at rest at the first contraction."""
-    state[0], state[1] = inputs[0], 0.0
+    state[E], state[RATE] = inputs[0], 0.0
 
 
 @dataclass(frozen=True, config=fields.STRICT)
@@ -173,28 +180,30 @@ class ActivationPressure(Block):
 
 # -- the model with memory -------------------------------------------------------------------
 
+CENTRE, SCALE, FORCE_CENTRE, FORCE_SCALE, DEGREE, FORCE_DEGREE, N_SLOW, SURFACE = range(2, 10)
+"""Places of the coefficients after those of the filter of the rate."""
+
 
 @step
 def remembering_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Advance the model; the state is [play operators, previous contraction, filtered rate, x_m].
 
-    Coefficients are [smoothing, gain of the rate, contraction's centre and scale, force's centre
-    and scale, degree by contraction, degree by force, number of x_m, c row by row, thresholds, a,
-    b, d, g, h, decays of x_m].
+    Coefficients from `SURFACE` on are c row by row, thresholds, a, b, d, g, h and decays of x_m.
     """
-    degree, by_force, m = int(coefficients[6]), int(coefficients[7]), int(coefficients[8])
+    degree, by_force = int(coefficients[DEGREE]), int(coefficients[FORCE_DEGREE])
+    m = int(coefficients[N_SLOW])
     n = state.size - 2 - m
-    thresholds = 9 + (degree + 1) * (by_force + 1)
-    surface, r = coefficients[9:thresholds], coefficients[thresholds:]
+    thresholds = SURFACE + (degree + 1) * (by_force + 1)
+    surface, r = coefficients[SURFACE:thresholds], coefficients[thresholds:]
     friction = r[n:]
     viscosity = friction[2 * n :]
     relaxation = viscosity[2:]
     decays = relaxation[2 * m :]
     followers = state[n + 2 :]
     e = inputs[0]
-    x = (e - coefficients[2]) / coefficients[3]
-    f = (inputs[1] - coefficients[4]) / coefficients[5]
-    rate = coefficients[0] * state[n + 1] + coefficients[1] * (e - state[n])
+    x = (e - coefficients[CENTRE]) / coefficients[SCALE]
+    f = (inputs[1] - coefficients[FORCE_CENTRE]) / coefficients[FORCE_SCALE]
+    rate = coefficients[SMOOTHING] * state[n + 1] + coefficients[RATE_GAIN] * (e - state[n])
     p = 0.0
     for i in range(degree, -1, -1):
         row = 0.0
@@ -215,14 +224,14 @@ def remembering_step(coefficients: Array, state: Array, inputs: Array, outputs: 
 @kernel
 def remembering_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start as if the contraction had only risen to the first one, or never moved."""
-    m = int(coefficients[8])
+    m = int(coefficients[N_SLOW])
     n = state.size - 2 - m
-    thresholds = 9 + (int(coefficients[6]) + 1) * (int(coefficients[7]) + 1)
+    thresholds = SURFACE + (int(coefficients[DEGREE]) + 1) * (int(coefficients[FORCE_DEGREE]) + 1)
     e = inputs[0]
     for k in range(n):
         state[k] = e if virgin else e - coefficients[thresholds + k]
     state[n], state[n + 1] = e, 0.0
-    state[n + 2 :] = (e - coefficients[2]) / coefficients[3]
+    state[n + 2 :] = (e - coefficients[CENTRE]) / coefficients[SCALE]
 
 
 @dataclass(frozen=True, config=fields.STRICT)

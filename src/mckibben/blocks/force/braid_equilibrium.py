@@ -26,60 +26,62 @@ from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton
 
-SHARE = 0.995
+LARGEST_SHARE = 0.995
 """Largest contraction of the muscle, relative to the contraction at which the braid's pull is zero.
 """
 
-LEAST = -0.1
+LEAST_CONTRACTION = -0.1
 """Smallest contraction modelled."""
 
-STILL = 1e-16
+CONVERGED = 1e-16
 """Change of the contraction at which the iteration has converged."""
 
-SINGLE = {"STILL": 1e-8}
+SINGLE = {"CONVERGED": 1e-8}
+
+
+LOAD, STIFFNESS, HARDENING, PER_BAR, A, B, LOW, HIGH, REST_LENGTH, OFFSET = range(10)
+"""Places of the coefficients; `LOW` and `HIGH` are the least and the largest contraction."""
 
 
 @kernel
 def balance(e: float, c: Array) -> float:
     """Return the pressure in equilibrium at a contraction."""
-    return (c[0] + e * (c[1] + c[2] * e * e)) / (c[3] * (c[4] * (1.0 - e) ** 2 - c[5]))
+    pull = c[PER_BAR] * (c[A] * (1.0 - e) ** 2 - c[B])
+    return (c[LOAD] + e * (c[STIFFNESS] + c[HARDENING] * e * e)) / pull
 
 
 @kernel
 def balance_slope(e: float, p: float, c: Array) -> float:
     """Return the slope of that pressure by the contraction."""
-    pull = c[3] * (c[4] * (1.0 - e) ** 2 - c[5])
-    return (c[1] + 3.0 * c[2] * e * e + p * 2.0 * c[3] * c[4] * (1.0 - e)) / pull
+    pull = c[PER_BAR] * (c[A] * (1.0 - e) ** 2 - c[B])
+    stiffness = c[STIFFNESS] + 3.0 * c[HARDENING] * e * e
+    return (stiffness + p * 2.0 * c[PER_BAR] * c[A] * (1.0 - e)) / pull
 
 
 @step
 def braid_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Solve for the displacement.
-
-    Coefficients are [load, stiffness, hardening, force per bar, a, b, least and largest
-    contraction, rest length, offset].
-    """
+    """Solve for the displacement."""
     c = coefficients
     p = inputs[0]
-    low, high = c[6], c[7]
+    low, high = c[LOW], c[HIGH]
     if p <= balance(low, c):
         e = low
     elif p >= balance(high, c):
         e = high
     else:
         start = min(max(0.0, low), high)
-        e = newton(balance, balance_slope, p, low, high, start, STILL, c)
+        e = newton(balance, balance_slope, p, low, high, start, CONVERGED, c)
         if DERIVED:
             e = improved(balance, p, e, c)
-    outputs[0] = c[8] * e + c[9]
+    outputs[0] = c[REST_LENGTH] * e + c[OFFSET]
 
 
 @step
 def braid_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Compute the pressure of a displacement; the state is the clip count."""
     c = coefficients
-    e = (inputs[0] - c[9]) / c[8]
-    inside = min(max(e, c[6]), c[7])
+    e = (inputs[0] - c[OFFSET]) / c[REST_LENGTH]
+    inside = min(max(e, c[LOW]), c[HIGH])
     if abs(e - inside) > SLACK:
         state[0] += 1.0
     outputs[0] = balance(inside, c)
@@ -151,13 +153,13 @@ class BraidEquilibrium(Invertible):
     def input_range(self) -> tuple[float, float]:
         """Lowest and highest pressure for which the balance is solved [bar]."""
         c = self.coefficients(None)
-        return float(balance(c[6], c)), float(balance(c[7], c))
+        return float(balance(c[LOW], c)), float(balance(c[HIGH], c))
 
     def coefficients(self, sample_time: float | None) -> Array:
         area, a, b = braid(self.braid_angle, self.diameter)
-        largest = SHARE * (1.0 - math.sqrt(b / a))
+        largest = LARGEST_SHARE * (1.0 - math.sqrt(b / a))
         # below, the bladder would have to pull harder than the load
-        least = LEAST
+        least = LEAST_CONTRACTION
         if self.stiffness > 0:
             least = max(least, -0.9 * self.load / (self.stiffness + 0.01 * self.hardening))
         head = [self.load, self.stiffness, self.hardening, area, a, b, least, largest]
@@ -165,7 +167,8 @@ class BraidEquilibrium(Invertible):
 
     def reachable(self) -> tuple[Array, Array]:
         c = self.coefficients(None)
-        return np.array([c[8] * c[6] + c[9]]), np.array([c[8] * c[7] + c[9]])
+        low, high = (np.array([c[REST_LENGTH] * end + c[OFFSET]]) for end in (c[LOW], c[HIGH]))
+        return low, high
 
     def inverse_numbers(self, own: Array) -> Array:
         return own

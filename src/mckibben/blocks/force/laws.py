@@ -70,13 +70,16 @@ class ForceLaw(Block):
 
 # -- polynomials in length -------------------------------------------------------------------
 
+CENTRE, SCALE, N_PER_BAR, TERMS = range(4)
+"""Places of the coefficients; the polynomials with and without pressure are from the last on."""
+
 
 @kernel
 def polynomial_force_terms(length: float, c: Array) -> tuple[float, float]:
     """Return force per pressure, and force without any; ``c`` is [centre, scale, number of g, g, h]."""
-    n = int(c[2])
-    x = (length - c[0]) / c[1]
-    return polynomial_at(x, c, 3, n), polynomial_at(x, c, 3 + n, c.size - 3 - n)
+    n = int(c[N_PER_BAR])
+    x = (length - c[CENTRE]) / c[SCALE]
+    return polynomial_at(x, c, TERMS, n), polynomial_at(x, c, TERMS + n, c.size - TERMS - n)
 
 
 @step
@@ -143,18 +146,21 @@ class PolynomialForce(ForceLaw):
 
 # -- an inextensible braid -------------------------------------------------------------------
 
+PER_SQUARE, ZERO_SQUARE, ADDED = range(3)
+"""Places of the coefficients: force per bar and square of length, b^2 / 3, and constant."""
+
 
 @step
 def chou_hannaford_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Evaluate; coefficients are [force per bar and square length, square of b / 3, constant]."""
-    pull = inputs[0] * inputs[0] - coefficients[1]
-    outputs[0] = inputs[1] * coefficients[0] * pull + coefficients[2]
+    """Compute the force at a length and a pressure."""
+    pull = inputs[0] * inputs[0] - coefficients[ZERO_SQUARE]
+    outputs[0] = inputs[1] * coefficients[PER_SQUARE] * pull + coefficients[ADDED]
 
 
 @kernel
 def chou_hannaford_terms(length: float, c: Array) -> tuple[float, float]:
     """Return force per pressure, and force without any."""
-    return c[0] * (length * length - c[1]), c[2]
+    return c[PER_SQUARE] * (length * length - c[ZERO_SQUARE]), c[ADDED]
 
 
 @dataclass(frozen=True, config=fields.STRICT)
@@ -209,23 +215,27 @@ MU_DECAY = 40.0
 """Decay of mu per unit of contraction."""
 
 
+REST, AREA, A, B, MU_1, MU_0, KAPPA_1, KAPPA_0, CONSTANT = range(9)
+"""Places of the coefficients; `REST` is the length at rest."""
+
+
 @step
 def tondu_lopez_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Evaluate; coefficients are [rest length, A, a, b, mu_1, mu_0, kappa_1, kappa_0, constant]."""
+    """Compute the force at a length and a pressure."""
     c = coefficients
-    e, p = 1.0 - inputs[0] / c[0], inputs[1]
-    mu = c[4] * math.exp(-MU_DECAY * e) + c[5]
-    short = 1.0 - (c[6] * math.exp(-p) + c[7]) * e
-    outputs[0] = mu * c[1] * p * (c[2] * short * short - c[3]) + c[8]
+    e, p = 1.0 - inputs[0] / c[REST], inputs[1]
+    mu = c[MU_1] * math.exp(-MU_DECAY * e) + c[MU_0]
+    short = 1.0 - (c[KAPPA_1] * math.exp(-p) + c[KAPPA_0]) * e
+    outputs[0] = mu * c[AREA] * p * (c[A] * short * short - c[B]) + c[CONSTANT]
 
 
 @kernel
 def tondu_lopez_terms(length: float, c: Array) -> tuple[float, float]:
     """Return force per pressure, and force without any, where kappa_1 = 0."""
-    e = 1.0 - length / c[0]
-    mu = c[4] * math.exp(-MU_DECAY * e) + c[5]
-    short = 1.0 - c[7] * e
-    return mu * c[1] * (c[2] * short * short - c[3]), c[8]
+    e = 1.0 - length / c[REST]
+    mu = c[MU_1] * math.exp(-MU_DECAY * e) + c[MU_0]
+    short = 1.0 - c[KAPPA_0] * e
+    return mu * c[AREA] * (c[A] * short * short - c[B]), c[CONSTANT]
 
 
 @dataclass(frozen=True, config=fields.STRICT)

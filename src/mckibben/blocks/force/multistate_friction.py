@@ -31,9 +31,11 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, needs_sample_time, one_per
+from mckibben.blocks.base import Block
 from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
 Direction = Literal["shared", "both", "lengthening", "shortening"]
@@ -89,20 +91,25 @@ def sticking(x: float, v: float, k: float, sigma: float, limit: float) -> float:
     return ((limit - sigma * v) / k - x) / v if v > 0.0 else math.inf
 
 
+STEP, GAIN, REFERENCE, LENGTHENING, SHORTENING = 0, 1, 2, 3, 6
+"""Places of the coefficients: sample time, pressure gain and reference, the first element's."""
+
+
 @step
 def multistate_friction_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Run the elements; the state is [deflections, previous length].
 
-    Coefficients are [sample time, pressure gain, reference pressure], then for every element k,
-    sigma and F_c lengthening, k, sigma and F_c shortening; F_c = 0 where it does not act.
+    For every element coefficients are k, sigma and F_c lengthening, k, sigma and F_c shortening;
+    F_c = 0 where it does not act.
     """
     n = state.size - 1
-    step = coefficients[0]
+    step = coefficients[STEP]
     v = (inputs[0] - state[n]) / step
     state[n] = inputs[0]
-    first = 3 if v >= 0.0 else 6
+    first = LENGTHENING if v >= 0.0 else SHORTENING
+    other = SHORTENING if v >= 0.0 else LENGTHENING
     sign = 1.0 if v >= 0.0 else -1.0
     force = 0.0
     for i in range(n):
@@ -111,7 +118,7 @@ def multistate_friction_step(
         if limit == 0.0:
             x = state[i] + v * step
             state[i] = min(x, 0.0) if sign > 0.0 else max(x, 0.0)
-            force += coefficients[9 - first + 6 * i] * state[i]
+            force += coefficients[other + 6 * i] * state[i]
             continue
         k, sigma = coefficients[place], coefficients[place + 1]
         if sticking(sign * state[i], sign * v, k, sigma, limit) >= step:
@@ -120,7 +127,7 @@ def multistate_friction_step(
             state[i] = sign * deflected(sign * state[i], sign * v, step, k, sigma, limit)
             scratch[i] = 0.0
         force += min(max(k * state[i] + sigma * v, -limit), limit)
-    grown = 1.0 + coefficients[1] * (inputs[1] - coefficients[2])
+    grown = 1.0 + coefficients[GAIN] * (inputs[1] - coefficients[REFERENCE])
     outputs[0] = force * grown
 
 

@@ -45,6 +45,15 @@ from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solved_inverse
 from mckibben.errors import ModelError
 
+Z, BEFORE = range(2)
+"""Places of the state: hysteretic part (of a Duhem model the output), and previous input."""
+
+RATE, CENTRE, SCALE, EXPONENT, WEIGHT, SHAPE = range(6)
+"""Places of the coefficients: sigma, or b2 to b6, are from `SHAPE` on, then the polynomial."""
+
+CURVES = 3
+"""Place of the coefficients of P rising, P falling and f of a Duhem model, after its first three."""
+
 
 def loop_kernels(
     moved: Callable[..., float], output: Callable[..., float], start: Start
@@ -57,8 +66,8 @@ def loop_kernels(
 
     @kernel
     def advance(u: float, c: Array, state: Array) -> None:
-        state[0] = moved(u, c, state)
-        state[1] = u
+        state[Z] = moved(u, c, state)
+        state[BEFORE] = u
 
     @kernel
     def trial(u: float, memory: tuple[Array, Array]) -> float:
@@ -69,7 +78,7 @@ def loop_kernels(
     def loop_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
         """Advance the hysteretic state with the input; the state is [z, previous input]."""
         advance(inputs[0], coefficients, state)
-        outputs[0] = output(inputs[0], state[0], coefficients)
+        outputs[0] = output(inputs[0], state[Z], coefficients)
 
     return loop_step, *solved_inverse(trial, advance, start)
 
@@ -82,8 +91,8 @@ def many_peaks(model: Invertible) -> Array:
 @kernel
 def bouc_wen_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start with z = 1, as after a long rise, or z = 0."""
-    state[0] = 0.0 if virgin else 1.0
-    state[1] = inputs[0]
+    state[Z] = 0.0 if virgin else 1.0
+    state[BEFORE] = inputs[0]
 
 
 @kernel
@@ -96,9 +105,9 @@ def flow(v: float, tau: float, unloading: float, loading: float, n: int) -> floa
     Wants loading > 0 and unloading < 1 / |v|^n, so that v returns to zero and then stays bounded.
     """
     if v < 0.0:
-        needed = _way_to_zero(-v, unloading, n)
+        needed = way_to_zero(-v, unloading, n)
         if tau <= needed:
-            return min(-_shrunk(-v, tau, unloading, n), 0.0)
+            return min(-shrunk(-v, tau, unloading, n), 0.0)
         v, tau = 0.0, tau - needed
     if n == 1:
         limit = 1.0 / loading
@@ -109,7 +118,7 @@ def flow(v: float, tau: float, unloading: float, loading: float, n: int) -> floa
 
 
 @kernel
-def _way_to_zero(w: float, psi: float, n: int) -> float:
+def way_to_zero(w: float, psi: float, n: int) -> float:
     """Return the input change after which w = |v| has decayed to zero."""
     if psi == 0.0:
         return w
@@ -120,7 +129,7 @@ def _way_to_zero(w: float, psi: float, n: int) -> float:
 
 
 @kernel
-def _shrunk(w: float, tau: float, psi: float, n: int) -> float:
+def shrunk(w: float, tau: float, psi: float, n: int) -> float:
     """Return w = |v| after the input change ``tau``."""
     if psi == 0.0:
         return w - tau
@@ -136,18 +145,20 @@ def _shrunk(w: float, tau: float, psi: float, n: int) -> float:
 
 
 @kernel
-def _bouc_wen_moved(u: float, c: Array, state: Array) -> float:
+def bouc_wen_moved(u: float, c: Array, state: Array) -> float:
     """Return z after the input has moved to ``u``."""
-    du = u - state[1]
+    du = u - state[BEFORE]
     if du == 0.0:
-        return state[0]
+        return state[Z]
     up = 1.0 if du > 0.0 else -1.0
-    return up * flow(up * state[0], abs(c[0] * du), 1.0 - 2.0 * c[1], 1.0, int(c[2]))
+    return up * flow(up * state[Z], abs(c[RATE] * du), 1.0 - 2.0 * c[SHAPE], 1.0, int(c[EXPONENT]))
 
 
 @kernel
-def _bouc_wen_output(u: float, z: float, c: Array) -> float:
-    return polynomial_at((u - c[4]) / c[5], c, 6, c.size - 6) + c[3] * z
+def bouc_wen_output(u: float, z: float, c: Array) -> float:
+    """Return the output of a hysteretic state."""
+    x = (u - c[CENTRE]) / c[SCALE]
+    return polynomial_at(x, c, SHAPE + 1, c.size - SHAPE - 1) + c[WEIGHT] * z
 
 
 @dataclass(frozen=True, config=fields.STRICT)
@@ -180,10 +191,10 @@ class BoucWen(Invertible):
     peaks = many_peaks
     start_kernel = bouc_wen_start
     kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
-        _bouc_wen_moved, _bouc_wen_output, bouc_wen_start
+        bouc_wen_moved, bouc_wen_output, bouc_wen_start
     )
     parameters = ("polynomial", "weight", "rate", "sigma")
-    layout = ("rate", "sigma", "exponent", "weight", "centre", "scale", "polynomial")
+    layout = ("rate", "centre", "scale", "exponent", "weight", "sigma", "polynomial")
     typical = ((14.0, 16.0, -1.0, -1.0), -2.5, 1.2, 0.7, 1, 2.5, 2.5, (0.0, 5.0))
     notation = Notation(
         r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",
@@ -216,36 +227,37 @@ class BoucWen(Invertible):
 
 
 @kernel
-def _psi(going: float, z: float, side: float, c: Array) -> float:
-    return going * z + c[5] * side * going + c[6] * side * z + c[7] * going + c[8] * z + c[9] * side
+def psi_of(going: float, z: float, side: float, c: Array) -> float:
+    """Return psi for directions of motion, of the hysteretic state and of the input, 1 or -1."""
+    b = c[SHAPE : SHAPE + 5]
+    return going * z + b[0] * side * going + b[1] * side * z + b[2] * going + b[3] * z + b[4] * side
 
 
 @kernel
-def _stretch(z: float, du: float, side: float, c: Array) -> float:
+def stretched(z: float, du: float, side: float, c: Array) -> float:
     """Return z after an input change ``du`` on one side of the centre."""
     if du == 0.0:
         return z
     up = 1.0 if du > 0.0 else -1.0
-    loading, unloading = _psi(up, up, side, c), _psi(up, -up, side, c)
-    return up * flow(up * z, abs(c[0] * du), unloading, loading, int(c[1]))
+    loading, unloading = psi_of(up, up, side, c), psi_of(up, -up, side, c)
+    return up * flow(up * z, abs(c[RATE] * du), unloading, loading, int(c[EXPONENT]))
 
 
 @kernel
-def _generalized_moved(u: float, c: Array, state: Array) -> float:
-    """Return z after the input has moved to ``u``.
-
-    Coefficients are [rate, n, weight, centre, scale, b2 to b6, polynomial].
-    """
-    z, before, centre = state[0], state[1], c[3]
+def generalized_moved(u: float, c: Array, state: Array) -> float:
+    """Return z after the input has moved to ``u``."""
+    z, before, centre = state[Z], state[BEFORE], c[CENTRE]
     if (before - centre) * (u - centre) < 0.0:
-        z = _stretch(z, centre - before, 1.0 if before > centre else -1.0, c)
+        z = stretched(z, centre - before, 1.0 if before > centre else -1.0, c)
         before = centre
-    return _stretch(z, u - before, 1.0 if before + u > 2.0 * centre else -1.0, c)
+    return stretched(z, u - before, 1.0 if before + u > 2.0 * centre else -1.0, c)
 
 
 @kernel
-def _generalized_output(u: float, z: float, c: Array) -> float:
-    return polynomial_at((u - c[3]) / c[4], c, 10, c.size - 10) + c[2] * z
+def generalized_output(u: float, z: float, c: Array) -> float:
+    """Return the output of a hysteretic state."""
+    x = (u - c[CENTRE]) / c[SCALE]
+    return polynomial_at(x, c, SHAPE + 5, c.size - SHAPE - 5) + c[WEIGHT] * z
 
 
 @dataclass(frozen=True, config=fields.STRICT)
@@ -278,10 +290,10 @@ class GeneralizedBoucWen(Invertible):
     peaks = many_peaks
     start_kernel = bouc_wen_start
     kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
-        _generalized_moved, _generalized_output, bouc_wen_start
+        generalized_moved, generalized_output, bouc_wen_start
     )
     parameters = ("polynomial", "weight", "rate", "shape")
-    layout = ("rate", "exponent", "weight", "centre", "scale", "shape", "polynomial")
+    layout = ("rate", "centre", "scale", "exponent", "weight", "shape", "polynomial")
     typical = (
         *((14.0, 16.0, -1.0, -1.0), -0.9, 1.2, (0.1, -0.1, 0.15, 0.05, -0.1)),
         *(1, 2.5, 2.5, (0.0, 5.0)),
@@ -339,23 +351,23 @@ class GeneralizedBoucWen(Invertible):
 
 
 @kernel
-def _duhem_moved(u: float, c: Array, state: Array) -> float:
+def duhem_moved(u: float, c: Array, state: Array) -> float:
     """Return the output after the input has moved to ``u``.
 
     Coefficients are [alpha, centre, scale, P rising, P falling, f].
     """
-    y, before = state[0], state[1]
+    y, before = state[Z], state[BEFORE]
     if u == before:
         return y
-    size = (c.size - 3) // 3
-    first = 3 if u > before else 3 + size
-    x, x0 = (u - c[1]) / c[2], (before - c[1]) / c[2]
-    kept = math.exp(-c[0] * abs(x - x0))
+    size = (c.size - CURVES) // 3
+    first = CURVES if u > before else CURVES + size
+    x, x0 = (u - c[CENTRE]) / c[SCALE], (before - c[CENTRE]) / c[SCALE]
+    kept = math.exp(-c[RATE] * abs(x - x0))
     return polynomial_at(x, c, first, size) + (y - polynomial_at(x0, c, first, size)) * kept
 
 
 @kernel
-def _duhem_output(u: float, y: float, c: Array) -> float:
+def duhem_output(u: float, y: float, c: Array) -> float:
     """Return the output, which is the hysteretic state."""
     return y
 
@@ -363,10 +375,10 @@ def _duhem_output(u: float, y: float, c: Array) -> float:
 @kernel
 def duhem_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start on the curve of monotonically risen inputs, or on f."""
-    x = (inputs[0] - coefficients[1]) / coefficients[2]
-    size = (coefficients.size - 3) // 3
-    state[0] = polynomial_at(x, coefficients, 3 + 2 * size if virgin else 3, size)
-    state[1] = inputs[0]
+    x = (inputs[0] - coefficients[CENTRE]) / coefficients[SCALE]
+    size = (coefficients.size - CURVES) // 3
+    state[Z] = polynomial_at(x, coefficients, CURVES + 2 * size if virgin else CURVES, size)
+    state[BEFORE] = inputs[0]
 
 
 def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: float) -> Array:
@@ -407,7 +419,7 @@ class Duhem(Invertible):
     peaks = many_peaks
     start_kernel = duhem_start
     kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
-        _duhem_moved, _duhem_output, duhem_start
+        duhem_moved, duhem_output, duhem_start
     )
     parameters = ("target", "slope", "alpha")
     typical = ((14.0, 16.0, -1.0), (12.0, -1.0), 1.5, 2.5, 2.5, (0.0, 5.0))

@@ -20,13 +20,16 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import one_per
 from mckibben.blocks.hysteresis.play_operators import check_thresholds, start_operators
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import inlined, kernel
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
 from mckibben.blocks.solving import solved_kernels
 from mckibben.errors import ModelError
+
+FIRST_INPUT, ALPHA, BETA, OFFSET, A_1, A_2, A_3, THRESHOLDS = range(8)
+"""Places of the coefficients; thresholds, then weights, are from the last on."""
 
 
 @inlined
@@ -50,31 +53,30 @@ def eupi_matrix(x: Array, alpha: float, beta: float, r: Array, s: Array, operato
 @kernel
 def eupi_advance(u: float, c: Array, state: Array) -> None:
     """Update the operators to an input."""
-    x = u - c[0]
+    x = u - c[FIRST_INPUT]
     for i in range(state.size):
-        state[i] = unparallel_play(state[i], x, c[7 + i], c[1], c[2])
+        state[i] = unparallel_play(state[i], x, c[THRESHOLDS + i], c[ALPHA], c[BETA])
 
 
 @kernel
 def eupi_output(u: float, memory: tuple[Array, Array]) -> float:
-    """Return the output at an input.
-
-    Coefficients are [u_0, alpha, beta, offset, a_1, a_2, a_3, thresholds, weights].
-    """
+    """Return the output at an input."""
     c, state = memory
     n = state.size
-    x = u - c[0]
-    y = c[3] + ((c[6] * x + c[5]) * x + c[4]) * x
+    x = u - c[FIRST_INPUT]
+    y = c[OFFSET] + ((c[A_3] * x + c[A_2]) * x + c[A_1]) * x
     for i in range(n):
-        y += c[7 + n + i] * unparallel_play(state[i], x, c[7 + i], c[1], c[2])
+        y += c[THRESHOLDS + n + i] * unparallel_play(
+            state[i], x, c[THRESHOLDS + i], c[ALPHA], c[BETA]
+        )
     return y
 
 
 @kernel
 def eupi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start the operators before the first sample."""
-    x = inputs[0] - coefficients[0]
-    start_operators(coefficients[7 : state.size + 7], x, x, virgin, state)
+    x = inputs[0] - coefficients[FIRST_INPUT]
+    start_operators(coefficients[THRESHOLDS : THRESHOLDS + state.size], x, x, virgin, state)
 
 
 @dataclass(frozen=True, config=fields.STRICT)

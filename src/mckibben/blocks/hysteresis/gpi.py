@@ -28,7 +28,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, one_per
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.hysteresis.envelopes import Envelope, Tanh, nested_envelope
 from mckibben.blocks.hysteresis.play_operators import (
@@ -43,6 +43,7 @@ from mckibben.blocks.kernels import inlined, kernel, step, summing_step
 from mckibben.blocks.learning import Learnable, learnable_operators, learning_kernels
 from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
 from mckibben.errors import ModelError
 
 EnvelopeField = Annotated[InstanceOf[Envelope], BeforeValidator(nested_envelope)]
@@ -249,5 +250,8 @@ class GPI(Invertible):
             shift = Affine(1.0, offset, self.output, self.output)
             return Series((changed, shift)) if offset else changed
 
-        adaptive = (self.adaptive_step, self.adaptive_start)
-        return learnable_operators(self, limits, 0.0, *adaptive, with_parameters)
+        operators, adaptive = (
+            (self.thresholds, self.weights),
+            (self.adaptive_step, self.adaptive_start),
+        )
+        return learnable_operators(self, *operators, limits, 0.0, *adaptive, with_parameters)

@@ -18,13 +18,18 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import one_per
 from mckibben.blocks.hysteresis.play_operators import check_thresholds
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.memoryless import least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
 from mckibben.blocks.solving import solve_input, solved_start
+
+KAPPA, LAMBDA, CENTRE, SCALE, LIMITS = range(5)
+"""Places of the coefficients: ratios of stiffness and of limits, those of the polynomial's input, and
+limits, weights and polynomial from the last on.
+"""
 
 
 @kernel
@@ -58,25 +63,27 @@ def slip_matrix(
 
 
 @kernel
-def _advance(u: float, c: Array, state: Array, lost: Array) -> None:
+def maxwell_slip_advance(u: float, c: Array, state: Array, lost: Array) -> None:
+    """Update the deflections to an input."""
     n = state.size - 1
     du = u - state[n]
-    change = stretch(du, c[0])
+    change = stretch(du, c[KAPPA])
     for i in range(n):
         moved = accumulate(state[i], change, lost, i)
-        state[i] = slip(moved, du, c[4 + i], c[1])
+        state[i] = slip(moved, du, c[LIMITS + i], c[LAMBDA])
     state[n] = u
 
 
 @kernel
-def _trial(u: float, memory: tuple[Array, Array]) -> float:
+def maxwell_slip_output(u: float, memory: tuple[Array, Array]) -> float:
+    """Return the output at an input."""
     c, state = memory
     n = state.size - 1
     du = u - state[n]
-    change = stretch(du, c[0])
-    y = polynomial_at((u - c[2]) / c[3], c, 4 + 2 * n, c.size - 4 - 2 * n)
+    change = stretch(du, c[KAPPA])
+    y = polynomial_at((u - c[CENTRE]) / c[SCALE], c, LIMITS + 2 * n, c.size - LIMITS - 2 * n)
     for i in range(n):
-        y += c[4 + n + i] * slip(state[i] + change, du, c[4 + i], c[1])
+        y += c[LIMITS + n + i] * slip(state[i] + change, du, c[LIMITS + i], c[LAMBDA])
     return y
 
 
@@ -84,15 +91,14 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
 def maxwell_slip_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Run the model; the state is [deflections, previous input].
-
-    Coefficients are [kappa, lambda, centre, scale, limits, weights, polynomial].
-    """
+    """Run the model; the state is [deflections, previous input]."""
     c, n = coefficients, state.size - 1
-    _advance(inputs[0], c, state, scratch)
-    y = polynomial_at((inputs[0] - c[2]) / c[3], c, 4 + 2 * n, c.size - 4 - 2 * n)
+    maxwell_slip_advance(inputs[0], c, state, scratch)
+    y = polynomial_at(
+        (inputs[0] - c[CENTRE]) / c[SCALE], c, LIMITS + 2 * n, c.size - LIMITS - 2 * n
+    )
     for i in range(n):
-        y += c[4 + n + i] * state[i]
+        y += c[LIMITS + n + i] * state[i]
     outputs[0] = y
 
 
@@ -101,8 +107,8 @@ def maxwell_slip_inverse_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Solve for the input; see `mckibben.blocks.solving`."""
-    u = solve_input(_trial, coefficients, state, inputs)
-    _advance(u, coefficients[:-2], state[:-2], scratch)
+    u = solve_input(maxwell_slip_output, coefficients, state, inputs)
+    maxwell_slip_advance(u, coefficients[:-2], state[:-2], scratch)
     outputs[0] = u
 
 
@@ -111,7 +117,7 @@ def maxwell_slip_start(coefficients: Array, state: Array, inputs: Array, virgin:
     """Start with all springs slipping upwards, or undeflected."""
     n = state.size - 1
     for i in range(n):
-        state[i] = 0.0 if virgin else coefficients[4 + i]
+        state[i] = 0.0 if virgin else coefficients[LIMITS + i]
     state[n] = inputs[0]
 
 
@@ -148,7 +154,7 @@ class MaxwellSlip(Invertible):
     kernel = maxwell_slip_step
     start_kernel = maxwell_slip_start
     inverse_kernel = maxwell_slip_inverse_step
-    inverse_start_kernel = solved_start(_trial, maxwell_slip_start)
+    inverse_start_kernel = solved_start(maxwell_slip_output, maxwell_slip_start)
     parameters = ("weights", "polynomial", "stiffness_ratio", "limit_ratio")
     layout = (
         *("stiffness_ratio", "limit_ratio", "centre", "scale"),

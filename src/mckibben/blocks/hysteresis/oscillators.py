@@ -34,36 +34,39 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, Start, needs_sample_time
+from mckibben.blocks.base import Block, Start
 from mckibben.blocks.dynamics.repeating import Hold, Substeps
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import gathered
+from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
 HEAD = 7
-"""Number of coefficients before those of the hysteretic element."""
+SUBSTEP, SUBSTEPS, HOLDS, MASS, DAMPING, STIFFNESS, OFFSET = range(HEAD)
+"""Places of the coefficients before those of the hysteretic element; `SUBSTEP` is its length [s], and
+`HOLDS` 1 for zero-order hold.
+"""
+
+Y, VELOCITY, Z, FORCE = range(4)
+"""Places of the state; Z is the element's force, and FORCE the last input."""
 
 SETTLING = 64
 """Number of steps in which an initial equilibrium is reached."""
 
 
 def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[Step, Start]:
-    """Return step and start of an oscillator with ``slope(z, velocity, numbers)``.
-
-    Coefficients are [substep, how many, 1 for zero-order hold, m, c, k, offset, numbers of the
-    element]; the state is [y, y', z, last input].
-    """
+    """Return step and start of an oscillator with ``slope(z, velocity, numbers)``."""
 
     def oscillator_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
         """Advance an oscillator in Runge-Kutta substeps."""
-        h, n, held = coefficients[0], int(coefficients[1]), coefficients[2] > 0.0
-        m, c, k, offset = coefficients[3], coefficients[4], coefficients[5], coefficients[6]
+        h, n, held = coefficients[SUBSTEP], int(coefficients[SUBSTEPS]), coefficients[HOLDS] > 0.0
+        m, c, k = coefficients[MASS], coefficients[DAMPING], coefficients[STIFFNESS]
         own = coefficients[HEAD:]
-        y, v, z = state[0], state[1], state[2]
-        rise = 0.0 if held else (inputs[0] - state[3]) / n
+        y, v, z = state[Y], state[VELOCITY], state[Z]
+        rise = 0.0 if held else (inputs[0] - state[FORCE]) / n
         for s in range(n):
-            u = state[3] + s * rise
+            u = state[FORCE] + s * rise
             v1 = v
             a1 = (u - c * v1 - k * y - z) / m
             z1 = v1 * slope(z, v1, own)
@@ -84,9 +87,9 @@ def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[S
             y += h / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4)
             v += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
             z += h / 6.0 * (z1 + 2.0 * z2 + 2.0 * z3 + z4)
-        state[3] = inputs[0]
-        outputs[0] = y + offset
-        state[0], state[1], state[2] = y, v, z
+        state[FORCE] = inputs[0]
+        outputs[0] = y + coefficients[OFFSET]
+        state[Y], state[VELOCITY], state[Z] = y, v, z
 
     @kernel
     def share(z: float, force: float, k: float, own: Array) -> float:
@@ -97,7 +100,7 @@ def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[S
     def oscillator_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
         """Start in equilibrium with the first force, or, virgin, without force."""
         force = 0.0 if virgin else inputs[0]
-        k, own = coefficients[5], coefficients[HEAD:]
+        k, own = coefficients[STIFFNESS], coefficients[HEAD:]
         step = force / SETTLING
         z = 0.0
         for _ in range(SETTLING):
@@ -106,7 +109,7 @@ def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[S
             share3 = share(z + 0.5 * step * share2, force, k, own)
             share4 = share(z + step * share3, force, k, own)
             z += step / 6.0 * (share1 + 2.0 * share2 + 2.0 * share3 + share4)
-        state[0], state[1], state[2], state[3] = (force - z) / k, 0.0, z, force
+        state[Y], state[VELOCITY], state[Z], state[FORCE] = (force - z) / k, 0.0, z, force
 
     return step(oscillator_step), kernel(oscillator_start)
 
@@ -127,7 +130,7 @@ class Oscillator(Block):
     hold: Hold
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the coefficients described in `oscillator_kernels`; the mass in N s^2/mm."""
+        """Return the coefficients from `SUBSTEP` on; the mass in N s^2/mm."""
         step = needs_sample_time(self.kind, sample_time)
         head = [step / self.substeps, self.substeps, self.hold == "zero"]
         springs = [1e-3 * self.mass, self.damping, self.stiffness, self.output_offset or 0.0]

@@ -25,7 +25,6 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import needs_sample_time, one_per, rate_filter
 from mckibben.blocks.hysteresis.play_operators import (
     check_invertible_sum,
     check_thresholds,
@@ -43,6 +42,8 @@ from mckibben.blocks.learning import (
     start_learning,
 )
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
+from mckibben.blocks.sample_times import needs_sample_time, rate_filter
 from mckibben.blocks.solving import solved_kernels
 
 
@@ -182,6 +183,8 @@ class PI(Invertible):
         """Adaptive parameters: weights and offset."""
         return learnable_operators(
             self,
+            self.thresholds,
+            self.weights,
             self.input_limits,
             self.offset,
             pi_adaptive_step,
@@ -190,20 +193,21 @@ class PI(Invertible):
         )
 
 
+SMOOTHING, RATE_GAIN, OFFSET, THRESHOLDS = range(4)
+"""Places of the coefficients of the rate-dependent model; thresholds, k and d are from the last on."""
+
+
 @kernel
 def rate_pi_output(u: float, memory: tuple[Array, Array]) -> float:
-    """Return the output at an input; the state is [operators, previous input, filtered rate].
-
-    Coefficients are [smoothing, gain of the rate, offset, thresholds, k, d].
-    """
+    """Return the output at an input; the state is [operators, previous input, filtered rate]."""
     coefficients, state = memory
     n = state.size - 2
-    r = coefficients[3 : n + 3]
-    rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
-    y = coefficients[2]
+    r = coefficients[THRESHOLDS : THRESHOLDS + n]
+    rate = coefficients[SMOOTHING] * state[n + 1] + coefficients[RATE_GAIN] * (u - state[n])
+    y = coefficients[OFFSET]
     for i in range(n):
         s = min(max(state[i], u - r[i]), u + r[i])
-        y += (coefficients[2 * n + 3 + i] + rate * coefficients[n + 3 + i]) * s
+        y += (coefficients[THRESHOLDS + 2 * n + i] + rate * coefficients[THRESHOLDS + n + i]) * s
     return y
 
 
@@ -212,9 +216,9 @@ def rate_pi_advance(u: float, coefficients: Array, state: Array) -> None:
     """Update the state to an input."""
     n = state.size - 2
     for i in range(n):
-        r = coefficients[3 + i]
+        r = coefficients[THRESHOLDS + i]
         state[i] = min(max(state[i], u - r), u + r)
-    state[n + 1] = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
+    state[n + 1] = coefficients[SMOOTHING] * state[n + 1] + coefficients[RATE_GAIN] * (u - state[n])
     state[n] = u
 
 
@@ -222,7 +226,9 @@ def rate_pi_advance(u: float, coefficients: Array, state: Array) -> None:
 def rate_pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start at rest, at the first input."""
     n = state.size - 2
-    start_operators(coefficients[3 : n + 3], inputs[0], inputs[0], virgin, state[:n])
+    start_operators(
+        coefficients[THRESHOLDS : THRESHOLDS + n], inputs[0], inputs[0], virgin, state[:n]
+    )
     state[n], state[n + 1] = inputs[0], 0.0
 
 

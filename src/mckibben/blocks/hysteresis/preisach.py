@@ -32,11 +32,10 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import one_per
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.parameters import Parametrised
+from mckibben.blocks.parameters import Parametrised, one_per
 from mckibben.blocks.solving import solved_kernels, solved_start
 from mckibben.errors import ModelError
 
@@ -109,7 +108,7 @@ forgotten.
 
 
 @kernel
-def _place(u: float, levels: Array) -> tuple[int, float]:
+def cell_at(u: float, levels: Array) -> tuple[int, float]:
     """Return the interval of an input among the levels, and its position there, 0 to 1."""
     low, high = 0, levels.size - 2
     while low < high:
@@ -125,8 +124,8 @@ def _place(u: float, levels: Array) -> tuple[int, float]:
 def everett(a: float, b: float, levels: Array, table: Array) -> float:
     """Return the total weight of relays between b and a, from a table at the levels."""
     n = levels.size
-    i, x = _place(a, levels)
-    j, y = _place(b, levels)
+    i, x = cell_at(a, levels)
+    j, y = cell_at(b, levels)
     if i == j:
         return table[(i + 1) * n + i] * (x - y)
     low = table[i * n + j] * (1.0 - y) + table[i * n + j + 1] * y
@@ -135,10 +134,10 @@ def everett(a: float, b: float, levels: Array, table: Array) -> float:
 
 
 @kernel
-def _solve(target: float, other: float, rising: bool, levels: Array, table: Array) -> float:
+def solved_everett(target: float, other: float, rising: bool, levels: Array, table: Array) -> float:
     """Return the input for which E between it and the turning point ``other`` is ``target``."""
     n = levels.size
-    j, _ = _place(other, levels)
+    j, _ = cell_at(other, levels)
     near, near_e = other, 0.0
     for i in range(n):
         k = j + 1 + i if rising else j - i
@@ -156,42 +155,42 @@ def _solve(target: float, other: float, rising: bool, levels: Array, table: Arra
     return near
 
 
-# The state is [depth, direction, turning points, outputs at them, last input, last output]; the first
-# turning point is the lowest level, from which everything has risen.
-CORNERS, OUTPUTS = 2, 2 + DEPTH
-LAST, LAST_OUTPUT = 2 + 2 * DEPTH, 3 + 2 * DEPTH
-CLIPPED = 4 + 2 * DEPTH
-"""Index of the clip counter in the inverse's state, after the block's own state."""
+N_TURNS, DIRECTION, CORNERS, OUTPUTS = 0, 1, 2, 2 + DEPTH
+LAST, LAST_OUTPUT, CLIPPED = 2 + 2 * DEPTH, 3 + 2 * DEPTH, 4 + 2 * DEPTH
+"""Places of the state: number of turning points, direction of travel, turning points, outputs at them,
+last input and output, and of the inverse the count of samples clipped. The first turning point is the
+lowest level, from which everything has risen.
+"""
 
 SWINGS = DEPTH // 2 - 2
 """Number of shrinking swings that lead to a virgin start."""
 
 
 @kernel
-def _output(u: float, state: Array, levels: Array, table: Array) -> float:
+def output_at(u: float, state: Array, levels: Array, table: Array) -> float:
     """Return the output at ``u``, within the last two turning points."""
-    top = int(state[0]) - 1
+    top = int(state[N_TURNS]) - 1
     corner, y = state[CORNERS + top], state[OUTPUTS + top]
     if u == corner:
         return y
-    if state[1] > 0.0:
+    if state[DIRECTION] > 0.0:
         return y + 2.0 * everett(u, corner, levels, table)
     return y - 2.0 * everett(corner, u, levels, table)
 
 
 @kernel
-def _turn(going: float, state: Array) -> None:
+def turn(going: float, state: Array) -> None:
     """Store the last sample as a turning point if the input reverses there."""
-    if going != state[1]:
-        depth = int(state[0])
+    if going != state[DIRECTION]:
+        depth = int(state[N_TURNS])
         if depth == DEPTH:
             depth -= 2
         state[CORNERS + depth], state[OUTPUTS + depth] = state[LAST], state[LAST_OUTPUT]
-        state[0], state[1] = depth + 1.0, going
+        state[N_TURNS], state[DIRECTION] = depth + 1.0, going
 
 
 @kernel
-def _visit(wanted: float, c: Array, state: Array) -> None:
+def visit(wanted: float, c: Array, state: Array) -> None:
     """Move to an input, clipped to the levels."""
     n = int(c[0])
     levels, table = c[1 : 1 + n], c[1 + n : 1 + n + n * n]
@@ -199,19 +198,19 @@ def _visit(wanted: float, c: Array, state: Array) -> None:
     if u == state[LAST]:
         return
     going = 1.0 if u > state[LAST] else -1.0
-    _turn(going, state)
-    while state[0] >= 3.0:
-        before = state[CORNERS + int(state[0]) - 2]
+    turn(going, state)
+    while state[N_TURNS] >= 3.0:
+        before = state[CORNERS + int(state[N_TURNS]) - 2]
         if (u - before) * going < 0.0:
             break
-        state[0] -= 2.0  # a loop is closed, and wiped out
-    state[LAST], state[LAST_OUTPUT] = u, _output(u, state, levels, table)
+        state[N_TURNS] -= 2.0  # a loop is closed, and wiped out
+    state[LAST], state[LAST_OUTPUT] = u, output_at(u, state, levels, table)
 
 
 @step
 def preisach_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Advance the model; coefficients are [number of levels, levels, Everett table, offset]."""
-    _visit(inputs[0], coefficients, state)
+    visit(inputs[0], coefficients, state)
     outputs[0] = state[LAST_OUTPUT]
 
 
@@ -227,12 +226,15 @@ def preisach_inverse_step(coefficients: Array, state: Array, inputs: Array, outp
         state[CLIPPED] += 1.0
     if abs(target - state[LAST_OUTPUT]) > ROUNDING * size:
         going = 1.0 if target > state[LAST_OUTPUT] else -1.0
-        _turn(going, state)
-        while state[0] >= 3.0 and (target - state[OUTPUTS + int(state[0]) - 2]) * going >= 0.0:
-            state[0] -= 2.0
-        top = int(state[0]) - 1
+        turn(going, state)
+        while state[N_TURNS] >= 3.0:
+            before = state[OUTPUTS + int(state[N_TURNS]) - 2]
+            if (target - before) * going < 0.0:
+                break
+            state[N_TURNS] -= 2.0
+        top = int(state[N_TURNS]) - 1
         half = 0.5 * abs(target - state[OUTPUTS + top])
-        u = _solve(half, state[CORNERS + top], going > 0.0, levels, table)
+        u = solved_everett(half, state[CORNERS + top], going > 0.0, levels, table)
         state[LAST] = min(max(u, levels[0]), levels[n - 1])
         state[LAST_OUTPUT] = target
     outputs[0] = state[LAST]
@@ -244,20 +246,20 @@ def preisach_start(coefficients: Array, state: Array, inputs: Array, virgin: boo
     n = int(coefficients[0])
     low, high, offset = coefficients[1], coefficients[n], coefficients[1 + n + n * n]
     state[:] = 0.0
-    state[0], state[1] = 1.0, 1.0
+    state[N_TURNS], state[DIRECTION] = 1.0, 1.0
     state[CORNERS], state[OUTPUTS] = low, offset
     state[LAST], state[LAST_OUTPUT] = low, offset
     if virgin:
         middle = min(max(inputs[0], low), high)
         for k in range(SWINGS):
             share = 1.0 - k * (1.0 / (SWINGS - 1))
-            _visit(middle + share * (high - middle), coefficients, state)
-            _visit(middle + share * (low - middle), coefficients, state)
-    _visit(inputs[0], coefficients, state)
+            visit(middle + share * (high - middle), coefficients, state)
+            visit(middle + share * (low - middle), coefficients, state)
+    visit(inputs[0], coefficients, state)
 
 
 @kernel
-def _first_output(u: float, memory: tuple[Array, Array]) -> float:
+def first_output(u: float, memory: tuple[Array, Array]) -> float:
     """Return the first output after a start."""
     _, state = memory
     return state[LAST_OUTPUT]
@@ -283,7 +285,7 @@ class Preisach(Triangle, Invertible):
     kernel = preisach_step
     start_kernel = preisach_start
     inverse_kernel = preisach_inverse_step
-    inverse_start_kernel = solved_start(_first_output, preisach_start, 1)
+    inverse_start_kernel = solved_start(first_output, preisach_start, 1)
     n_states = CLIPPED
     notation = Notation(
         r"y = y_0 + \sum_{j \le i} w_{ij} \left(1 + R_{ij}[u]\right)",
@@ -309,7 +311,7 @@ class Preisach(Triangle, Invertible):
     ) -> Array:
         """Return the initial state; raise an error for an invalid depth or direction."""
         state = super().initial_state(first, initial, sample_time)
-        depth, direction = state[0], state[1]
+        depth, direction = state[N_TURNS], state[DIRECTION]
         if depth not in range(1, DEPTH + 1) or direction not in (1.0, -1.0):
             raise ModelError(
                 f"the memory of {self.kind!r} has depth {depth:g} and direction {direction:g}",
@@ -331,40 +333,42 @@ class Preisach(Triangle, Invertible):
             )
 
 
+N_INTERVALS, OFFSET, LEVELS = range(3)
+"""Places of the coefficients of a Krasnosel'skii-Pokrovskii model; from the last on levels, weights."""
+
+
 @kernel
-def _ramp(u: float, levels: Array, i: int) -> float:
+def ramp(u: float, levels: Array, i: int) -> float:
+    """Return the position of an input in an interval of the levels, 0 to 1."""
     return min(max((u - levels[i]) / (levels[i + 1] - levels[i]), 0.0), 1.0)
 
 
 @kernel
 def ridges_advance(u: float, c: Array, state: Array) -> None:
     """Update the operators to an input."""
-    n = int(c[0])
-    levels = c[2 : 3 + n]
+    n = int(c[N_INTERVALS])
+    levels = c[LEVELS : LEVELS + n + 1]
     place = 0
     for i in range(n):
-        least = _ramp(u, levels, i)
+        least = ramp(u, levels, i)
         for j in range(i + 1):
-            state[place] = max(least, min(_ramp(u, levels, j), state[place]))
+            state[place] = max(least, min(ramp(u, levels, j), state[place]))
             place += 1
     state[place] = u
 
 
 @kernel
 def ridges_output(u: float, memory: tuple[Array, Array]) -> float:
-    """Return the output at an input; the state is [operators, previous input].
-
-    Coefficients are [number of intervals, offset, levels, weights].
-    """
+    """Return the output at an input; the state is [operators, previous input]."""
     c, state = memory
-    n = int(c[0])
-    levels = c[2 : 3 + n]
-    y = c[1]
+    n = int(c[N_INTERVALS])
+    levels = c[LEVELS : LEVELS + n + 1]
+    y = c[OFFSET]
     place = 0
     for i in range(n):
-        least = _ramp(u, levels, i)
+        least = ramp(u, levels, i)
         for j in range(i + 1):
-            y += c[3 + n + place] * max(least, min(_ramp(u, levels, j), state[place]))
+            y += c[LEVELS + n + 1 + place] * max(least, min(ramp(u, levels, j), state[place]))
             place += 1
     return y
 
@@ -372,13 +376,13 @@ def ridges_output(u: float, memory: tuple[Array, Array]) -> float:
 @kernel
 def ridges_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start on the rising ridges, or half-way between the ridges."""
-    n = int(coefficients[0])
-    levels = coefficients[2 : 3 + n]
+    n = int(coefficients[N_INTERVALS])
+    levels = coefficients[LEVELS : LEVELS + n + 1]
     place = 0
     for i in range(n):
-        least = _ramp(inputs[0], levels, i)
+        least = ramp(inputs[0], levels, i)
         for j in range(i + 1):
-            most = _ramp(inputs[0], levels, j) if virgin else least
+            most = ramp(inputs[0], levels, j) if virgin else least
             state[place] = 0.5 * (least + most)
             place += 1
     state[place] = inputs[0]

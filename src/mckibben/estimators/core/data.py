@@ -10,13 +10,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from mckibben.arrays import Array, Mask
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, run_many
 from mckibben.blocks.fields import Channel
-from mckibben.blocks.running import run_many
 from mckibben.blocks.runs import Run as Run
 from mckibben.blocks.runs import run_of
 from mckibben.errors import DataError
-from mckibben.recording import Recording, check_sample_times, listed, sample_time_of
+from mckibben.recording import FEWEST_SAMPLES, Recording, check_sample_times, listed, sample_time_of
 
 Made = TypeVar("Made")
 
@@ -27,9 +26,6 @@ SLOWEST = 1 / 3
 """Largest time constant of a linear model, relative to the longest recording: in a slower one the gain
 and the time constant are not determined separately.
 """
-
-FEWEST_SAMPLES = 10
-"""Smallest number of samples for identification."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.coupled.balance import BalanceEstimator, fixed_in
 from mckibben.estimators.coupled.balance_prior import PriorLike, as_prior
-from mckibben.estimators.coupled.base import FEWEST_SAMPLES
+from mckibben.estimators.coupled.base import FEWEST_IN_A_ROW
 from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording
 
@@ -120,7 +120,7 @@ class BalanceForceEstimator(SearchEstimator):
             outputs=(displacement,),
             scheduled=data.outputs,
             spans=balance.spans,
-        ).stretches(FEWEST_SAMPLES - 1)  # a force that does not count is not to be given as a load
+        ).stretches(FEWEST_IN_A_ROW - 1)  # a force that does not count is not to be given as a load
         force = load_of(balance.find(muscle, tracker))
         if rest is None:
             return force

@@ -14,12 +14,11 @@ from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, run_many
 from mckibben.blocks.coupled.balance_law import coordinate_at
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Contact, PiecewiseLinear
-from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_structure import Structure

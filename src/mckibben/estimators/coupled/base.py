@@ -21,7 +21,7 @@ MOVES = 0.1
 RESTS = 0.03
 """Share of that range above the lowest value below which an input is at rest."""
 
-FEWEST_SAMPLES = 50
+FEWEST_IN_A_ROW = 50
 """Smallest number of successive samples for several muscles."""
 
 
@@ -125,11 +125,11 @@ class CoupledEstimator(Estimator):
         inputs, outputs, scheduling = channels.inputs, channels.outputs, taken(channels)
         every = self.completed(every, scheduling)
         longest = max(map(len, every))
-        if longest < FEWEST_SAMPLES:  # shorter ones beside a longer one are passed over below
+        if longest < FEWEST_IN_A_ROW:  # shorter ones beside a longer one are passed over below
             raise DataError(
                 f"{longest} samples are too few for this model",
                 file=first.source,
-                remedy=f"give recordings of at least {FEWEST_SAMPLES} samples",
+                remedy=f"give recordings of at least {FEWEST_IN_A_ROW} samples",
             )
         if self.pairs and not self.fits(len(inputs), len(outputs)):
             raise DataError(
@@ -140,10 +140,10 @@ class CoupledEstimator(Estimator):
         found = training_data(
             every, inputs, outputs, rows, scheduling, one_rate=False, spans=self.spans
         )
-        kept = bridged(found) if self.through else found.stretches(FEWEST_SAMPLES - 1)
-        if sum(int(run.counts.sum()) for run in kept.runs) < FEWEST_SAMPLES:
+        kept = bridged(found) if self.through else found.stretches(FEWEST_IN_A_ROW - 1)
+        if sum(int(run.counts.sum()) for run in kept.runs) < FEWEST_IN_A_ROW:
             raise DataError(
-                f"no {FEWEST_SAMPLES} samples in a row count", remedy="give longer recordings"
+                f"no {FEWEST_IN_A_ROW} samples in a row count", remedy="give longer recordings"
             )
         return kept
 

@@ -21,12 +21,11 @@ from numpy.typing import NDArray
 
 from mckibben import registry
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, run_many
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
 from mckibben.blocks.fields import rows, vector
 from mckibben.blocks.kernels import kernel
-from mckibben.blocks.running import run_many
 from mckibben.errors import DataError, MckibbenError, ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
@@ -134,7 +133,7 @@ class MPINarmaxEstimator(CoupledEstimator):
         ]
         settings = {"input": u.name, "output": free, "seed": self.seed}
         if self.memory == "rdpi":
-            settings["rate_time_constant"] = 5.0 * (data.runs[0].sample_time or 0.0)
+            settings["rate_time_constant"] = 5.0 * data.timed()
         estimator = registry.load("estimators", self.memory)(**settings)
         counted = [run.counts for run in data.runs]
         block: Block = estimator.find(estimator.data(recordings, counted), Tracker())

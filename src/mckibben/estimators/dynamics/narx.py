@@ -35,7 +35,6 @@ from mckibben.blocks.dynamics.narx import (
 )
 from mckibben.blocks.fields import vector
 from mckibben.blocks.kernels import kernel
-from mckibben.blocks.starts import start_state
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, SearchEstimator
@@ -399,7 +398,10 @@ def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stre
     Of short ones no more than `HORIZON_SAMPLES` take, spread evenly.
     """
     if horizon is None:
-        return [Stretch(run, start_state(model, run), driven(model, run)) for run in data.runs]
+        return [
+            Stretch(run, model.state_after(model.past(run), run), driven(model, run))
+            for run in data.runs
+        ]
     found: list[Stretch] = []
     n, m = model.output_lags, model.past_inputs
     for run in data.runs:

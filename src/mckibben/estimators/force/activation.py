@@ -131,7 +131,7 @@ class ActivationMemoryEstimator(SeparableEstimator):
 
 # -- as published ----------------------------------------------------------------------------
 
-HELD = 0.05
+CONSTANT_SHARE = 0.05
 """Range of an input, relative to the largest of any run, below which it is noise and the input
 constant.
 """
@@ -241,7 +241,7 @@ def frequencies(runs: Sequence[Run]) -> Array:
     """Return the dominant frequency of each run's input [Hz]; 0 if it is constant."""
     spans = np.array([float(np.ptp(run.u)) for run in runs])
     found = np.array([dominant_frequency(run) for run in runs])
-    return np.where(spans < HELD * spans.max(), 0.0, found)
+    return np.where(spans < CONSTANT_SHARE * spans.max(), 0.0, found)
 
 
 def dominant_frequency(run: Run) -> float:

@@ -16,8 +16,6 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.kernels import in_scratch
 from mckibben.blocks.laws import identified_limits, wander
-from mckibben.blocks.ranges import input_bounds
-from mckibben.blocks.saving import to_text
 from mckibben.errors import ModelError, ModelWarning, require
 from mckibben.export.c.serving import Serving, served, served_files
 from mckibben.export.c.translator import Translation
@@ -123,7 +121,7 @@ def c_files(
         f"matlab/{name}_mex.c": render("mex.c.j2", content),
         "matlab/build.m": render("build.m.j2", content),
         f"test/{name}_selftest.c": render("selftest.c.j2", content),
-        "model.json": to_text(block),
+        "model.json": block.to_text(),
     }
 
 
@@ -204,7 +202,7 @@ def described(
         "bytes": size,
         "sample_time": step,
         "step_words": f"{step!r} s" if step else "sample",
-        "period": round(1e6 * (step or 0.01)),
+        "period": round(1e6 * step) if step else 0,
         "inputs": inputs,
         "outputs": outputs,
         "constants": _constants(inputs, outputs, step),
@@ -213,8 +211,8 @@ def described(
         "steps": steps,
         "given": wiring.outputs,
         "n_needed": len(inputs) - block.n_missable,
-        "bound_rows": [literals(ends, single=single) for ends in input_bounds(block)],
-        "bounds": [[f"{end:.6g}" for end in ends] for ends in input_bounds(block)],
+        "bound_rows": [literals(ends, single=single) for ends in block.input_bounds],
+        "bounds": [[f"{end:.6g}" for end in ends] for ends in block.input_bounds],
         "clip_places": wiring.clip_counts,
         "clip_counts": [f"numbers[{place}]" for place in wiring.clip_counts],
         "n_signals": wiring.n_signals,

@@ -24,7 +24,6 @@ import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.laws import identified_limits
-from mckibben.blocks.saving import to_dict, to_text
 from mckibben.errors import DataError, ModelError
 from mckibben.export.c.project import described, source_files
 from mckibben.export.folders import write_texts, zipped
@@ -147,7 +146,7 @@ def fmu_files(
         **{f"sources/{source}": text for source, text in sources.items()},
         "modelDescription.xml": _render("fmi2.xml.j2", content),
         "documentation/index.html": _render("index.html.j2", content),
-        "resources/model.json": to_text(block),
+        "resources/model.json": block.to_text(),
     }
 
 
@@ -161,7 +160,7 @@ def _headers() -> dict[str, str]:
 
 def _token(block: Block, sample_time: float | None) -> str:
     """Return the model's unique identifier: a digest of its content."""
-    digest = hashlib.sha256(json.dumps([to_dict(block), sample_time], sort_keys=True).encode())
+    digest = hashlib.sha256(json.dumps([block.to_dict(), sample_time], sort_keys=True).encode())
     return f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
 
 

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from mckibben.blocks.base import Block
-from mckibben.blocks.saving import to_text
 from mckibben.errors import ModelError
 from mckibben.export.c.project import described, source_files
 from mckibben.export.folders import write_folder
@@ -107,5 +106,5 @@ def ros2_files(
         f"src/{name}_controller.cpp": filled("controller.cpp.j2"),
         f"config/{name}.yaml": filled("config.yaml.j2"),
         "README.md": filled("README.md.j2"),
-        "model.json": to_text(block),
+        "model.json": block.to_text(),
     }

@@ -19,7 +19,7 @@ from mckibben.estimators.coupled.sdchm import learned_inverse
 from mckibben.metrics import crosstalk, loop_width
 from mckibben.papers.experiment import Cell, Curves, Experiment, Runs
 from mckibben.papers.sdchm.protocol import PERIOD
-from mckibben.recording import Recording
+from mckibben.recording import REFERENCE, Recording
 from mckibben.rigs import Rig
 from mckibben.system.workers import Tell, all_of
 
@@ -155,7 +155,7 @@ def _tracked(common: None, trial: tuple[Block | Controller, Rig, Task, int], _: 
 def widths(recording: Recording, moving: str, outputs: Sequence[str]) -> dict[str, float]:
     """Return e_w of the moving output over the last period, and cross-motion of others [%]."""
     n = round(PERIOD / recording.step)
-    u, found = recording[f"reference_{moving}"][-n:], {}
+    u, found = recording[REFERENCE + moving][-n:], {}
     for name in outputs:  # each turned to begin at its minimum
         x, y = (np.roll(wave, -int(np.argmin(u))) for wave in (u, recording[name][-n:]))
         if name == moving:
@@ -177,13 +177,13 @@ def _shown(
         late = late.slice(int(np.searchsorted(late.time, task.settle)), len(late))
         rows[name] = {f"RMSE of y{y[-1]} [mm]": error for y, error in tracked.rmse.items()}
         rows[name] |= widths(late, one, [*tracked.rmse]) if alone else {}
-        errors = np.array([late[y] - late[f"reference_{y}"] for y in tracked.rmse])
+        errors = np.array([late[y] - late[REFERENCE + y] for y in tracked.rmse])
         ends = {"lowest error [mm]": errors.min(), "highest error [mm]": errors.max()}
         rows[name] |= {end: float(error) for end, error in ends.items()}
         for y in tracked.rmse if name in [*found][:DRAWN] else ():
-            x = late[f"reference_{one}"] if alone else late.time
+            x = late[REFERENCE + one] if alone else late.time
             title = f"y{one[-1]} moves: y{y[-1]}" if alone else f"y{y[-1]}"
-            panels.setdefault(title, {"reference": (x, late[f"reference_{y}"])})
+            panels.setdefault(title, {"reference": (x, late[REFERENCE + y])})
             panels[title][name] = x, late[y]
     lines: dict[str, list[Cell]] = {name: [*cells.values()] for name, cells in rows.items()}
     experiment.table(key, [*rows[name]], lines, **task.facts)

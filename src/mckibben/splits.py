@@ -12,14 +12,8 @@ from mckibben.arrays import Array, Mask
 from mckibben.channels import Channels
 from mckibben.errors import DataError
 from mckibben.numerals import counted
-from mckibben.recording import Recording
+from mckibben.recording import FEWEST_SAMPLES, Recording
 from mckibben.signals.reversals import reversals
-
-FEWEST = 10
-"""Smallest number of samples on either side of a split, and of a part of a recording."""
-
-N_PARTS = 8
-"""Number of parts; a few more where recordings are cut equally."""
 
 HELD_OUT = 0.25
 """Share of the input's travel that is held out by default."""
@@ -31,6 +25,12 @@ HARDLY = 0.2
 """Standard deviation of an output in a part, relative to the whole, below which the part counts as
 at rest.
 """
+
+N_PARTS = 8
+"""Number of parts; a few more where recordings are cut equally."""
+
+Part = tuple[Mask, ...]
+"""For every recording, the samples that a part has."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,6 @@ class Split:
     test: tuple[Recording, ...]
     test_rows: tuple[Mask, ...]
     described: str
-
-
-Part = tuple[Mask, ...]
-"""For every recording, the samples of a part."""
 
 
 @dataclass(frozen=True)
@@ -197,9 +193,11 @@ def _cut(
         after.insert(0, before.pop())
     run, gone = before[-1], travels[-1]
     start = int(np.searchsorted(gone, gone[-1] - travel))
-    if start < FEWEST and len(before) > 1:  # nearly all of it, as of recordings equally long
+    if (
+        start < FEWEST_SAMPLES and len(before) > 1
+    ):  # nearly all of it, as of recordings equally long
         return before[:-1], None, [run, *after]
-    if min(start, len(run) - start) < FEWEST:
+    if min(start, len(run) - start) < FEWEST_SAMPLES:
         return before, None, after
     return before[:-1], (run, start), after
 
@@ -223,6 +221,9 @@ def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]
     return [group for group in groups if group] if min(map(levels.count, levels)) > 1 else []
 
 
+# -- parts of the training data that are left out in turn, to choose a model -------------------
+
+
 def parts_of(recordings: Sequence[Recording], channels: Channels) -> tuple[Part, ...]:
     """Return the parts: blocks of time of fewer than `N_PARTS` recordings, else whole recordings.
 
@@ -235,7 +236,8 @@ def parts_of(recordings: Sequence[Recording], channels: Channels) -> tuple[Part,
         (place, piece)
         for place in _by_level(recordings, channels)
         for piece in np.array_split(
-            np.arange(len(recordings[place])), np.clip(len(recordings[place]) // FEWEST, 1, each)
+            np.arange(len(recordings[place])),
+            np.clip(len(recordings[place]) // FEWEST_SAMPLES, 1, each),
         )
     ]
     count = len(pieces) if each > 1 else N_PARTS

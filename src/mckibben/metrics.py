@@ -79,16 +79,10 @@ def mean_scores(found: Sequence[Scores]) -> Scores:
     return Scores(**means, max_error=max(one.max_error for one in found))
 
 
-def rms(errors: Array) -> float:
-    """Return the root mean square; infinite, or NaN, of the errors of a model that overflows."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        return float(np.sqrt(np.mean(errors**2)))
-
-
 def rmse(measured: ArrayLike, modelled: ArrayLike) -> float:
     """Return the root mean square error, in the unit of the output."""
     y, model = _pair(measured, modelled)
-    return rms(y - model)
+    return float(np.sqrt(np.mean((y - model) ** 2)))
 
 
 def mae(measured: ArrayLike, modelled: ArrayLike) -> float:

@@ -17,7 +17,6 @@ from mckibben.blocks.running import run_many
 from mckibben.blocks.runs import FreeRun, Run
 from mckibben.blocks.starts import history, run_on, state_after
 from mckibben.errors import ModelError
-from mckibben.metrics import rms
 from mckibben.recording import Recording
 
 DIFFERENCE = 1e-6
@@ -146,17 +145,19 @@ class FreeRuns:
         by_output = self.residual.reshape(-1, len(self.names)).T
         if not np.isfinite(by_output).all():
             return (np.inf,) * len(by_output)
-        return tuple(map(rms, by_output))
+        return tuple(float(np.sqrt(np.mean(errors**2))) for errors in by_output)
 
     @property
     def rmse(self) -> float:
         """Root mean square of the residual."""
-        return rms(self.residual)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(np.sqrt(np.mean(self.residual**2)))
 
     def apart(self, other: FreeRuns) -> float:
         """Return the root mean square by which outputs differ from those of other runs."""
-        with np.errstate(invalid="ignore"):  # infinity less itself
-            return rms(self.scored(self.modelled) - self.scored(other.modelled))
+        with np.errstate(over="ignore", invalid="ignore"):
+            differences = self.scored(self.modelled) - self.scored(other.modelled)
+            return float(np.sqrt(np.mean(differences**2)))
 
     def scored(self, outputs: Sequence[NDArray[Kind]]) -> NDArray[Kind]:
         """Return the outputs of all runs, (n, m) each, at the samples that count, (N,)."""

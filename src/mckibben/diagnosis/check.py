@@ -17,7 +17,6 @@ from mckibben.comparison.choosing import useful
 from mckibben.diagnosis.causes import Cause, averaged, block_length, causes
 from mckibben.diagnosis.description import ModelDescription
 from mckibben.errors import DataError
-from mckibben.metrics import rms
 from mckibben.recording import Recording, check_sample_times, listed
 from mckibben.signals.shared_rows import check_shared
 from mckibben.statistics import NORMAL_95, correlation_length
@@ -327,7 +326,7 @@ def _output(
     channel = model.outputs[place]
     residuals = [run.residual[:, place] for run in runs]
     measured = [run.outputs[:, place] for run in runs]
-    span, rmse = float(np.ptp(np.concatenate(measured))), rms(np.concatenate(residuals))
+    span, rmse = float(np.ptp(np.concatenate(measured))), _rms(residuals)
     exact = rmse <= max(ROUNDING * span, STEP * _resolution(measured))
     if exact:
         # what rounding follows is the arithmetic, or the sensor's steps
@@ -350,7 +349,7 @@ def _output(
         sample_time=runs[0].sample_time,
         span=span,
         rmse=rmse,
-        mean_error=rms(np.concatenate(measured) - mean),
+        mean_error=_rms([y - mean for y in measured]),
         exact=exact,
         missing=missing,
         suspects=suspects,
@@ -426,6 +425,10 @@ def bins(
                 limits = mean - half, mean + half
                 found.append(Bin(label, *ends_of, own.size * every, mean, limits))
     return tuple(found)
+
+
+def _rms(pieces: Sequence[Array]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(pieces) ** 2)))
 
 
 def _resolution(measured: Sequence[Array]) -> float:

@@ -22,7 +22,6 @@ from mckibben.blocks.fields import MEASURED, Channel
 from mckibben.control.twin import COMMAND
 from mckibben.diagnosis.refit import Refit, refitted
 from mckibben.errors import DataError, ModelError, ModelWarning
-from mckibben.metrics import rms
 from mckibben.recording import Recording, listed, sample_time_of
 from mckibben.signals.shared_rows import check_shared
 from mckibben.statistics import NORMAL_95, block_length, correlation_length
@@ -338,13 +337,13 @@ def _followed(links: Sequence[_Link], channel: Channel) -> Followed:
         commanded = np.concatenate(given)
         parts |= {"pressure": modelled - commanded, "command": commanded - reference}
     least = ROUNDING * float(np.ptp(reference))
-    sizes = {kind: size if (size := rms(part)) > least else 0.0 for kind, part in parts.items()}
+    sizes = {kind: size if (size := _rms(part)) > least else 0.0 for kind, part in parts.items()}
     slope, half = _slope([got - model for model, got in pairs], step)
     time = logs[0].time if len(logs) == 1 else step * np.arange(measured.size)
     return Followed(
         output=name,
         unit=channel.unit,
-        achieved=rms(measured - reference),
+        achieved=_rms(measured - reference),
         predicted=sizes.get("command"),
         pressure=sizes.get("pressure"),
         residual=sizes["model"],
@@ -407,3 +406,7 @@ def _shifted(x: Array, samples: float) -> Array:
     """Return a signal (n,) shifted by so many samples, extended by its end values."""
     at = np.arange(len(x)) - samples
     return np.interp(at, np.arange(len(x)), x)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

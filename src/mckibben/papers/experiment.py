@@ -424,6 +424,11 @@ def reproduce(
     return experiment.done(on)
 
 
+def rms(errors: Array) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(errors**2)))
+
+
 def thinned(values: Sequence[float] | Array, most: int = MOST) -> Array:
     """Return every k-th value, so that at most so many remain."""
     array = np.asarray(values, dtype=np.float64)

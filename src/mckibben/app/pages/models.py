@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
 from nicegui import ui
 
 from mckibben.app import modelling, widgets
@@ -19,7 +20,6 @@ from mckibben.channels import Channels
 from mckibben.diagnosis.coupling import coupling
 from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.estimators.catalogue import full_name
-from mckibben.metrics import rms
 from mckibben.numerals import number, typeset, typeset_within
 from mckibben.recording import Recording
 from mckibben.report import interactive, results, subjects
@@ -299,7 +299,7 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
         drawn = subjects.against(FIGURES[tab], run, pair, {name: y}, tested)
         plots = interactive.plots(drawn)
         rows, unit = slice(tested or 0, None), run.units[wanted]
-        off = rms(y[rows] - run[wanted][rows])
+        off = float(np.sqrt(np.mean((y[rows] - run[wanted][rows]) ** 2)))
         what = f"{'the held-out part of ' if tested else ''}{run.name}"
         text = [f"RMSE of {wanted} on {what}: {number(off, 3)} {unit}".rstrip() + "."]
         with ui.element("div").classes("columns-even" if len(plots) > 1 else "stack"):

@@ -33,7 +33,6 @@ from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors
 from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.metrics import rms
 from mckibben.recording import Recording, check_sample_times
 
 UNLOADED = 0.05
@@ -247,7 +246,9 @@ class RecurrentProblem:
 
     def cost(self, outputs: Sequence[Array]) -> float:
         """Return the free-running RMSE; infinite for diverging runs."""
-        value = rms(np.concatenate(outputs) - self.data.stacked("y"))
+        with np.errstate(over="ignore", invalid="ignore"):
+            errors = np.concatenate(outputs) - self.data.stacked("y")
+            value = float(np.sqrt(np.mean(errors**2)))
         return value if np.isfinite(value) else np.inf
 
     def best(self, sets: Sets, feedbacks: Array) -> RecurrentFuzzyNetwork:

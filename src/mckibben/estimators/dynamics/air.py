@@ -19,7 +19,6 @@ from mckibben.estimators.core.estimator import Start
 from mckibben.estimators.core.separable import SEARCH_SAMPLES, SeparableEstimator
 from mckibben.estimators.optimisers.multi_start import multi_start
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.metrics import rms
 from mckibben.recording import Recording
 
 NO_COMMANDS = ("contraction", "displacement", "force", "length")
@@ -206,10 +205,10 @@ class AirEstimator(SeparableEstimator):
         tracker.update_from(part)
         without = best.copy()
         without[2] = 0.0
-        error, error_without = (rms(residuals(p)) for p in (best, without))
+        error, error_without = (np.sqrt(np.mean(residuals(p) ** 2)) for p in (best, without))
         if error_without <= (1 + NO_WORSE) * error:
-            return block_at(without), error_without
-        return block_at(best), error
+            return block_at(without), float(error_without)
+        return block_at(best), float(error)
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [log filling time, log venting time, hysteresis]."""

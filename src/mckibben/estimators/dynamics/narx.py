@@ -42,7 +42,6 @@ from mckibben.estimators.core.estimator import Grid, SearchEstimator
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.metrics import rms
 from mckibben.presets import preset
 
 BOUND = 1.0
@@ -476,7 +475,7 @@ class StretchErrors:
         half = self.model.output_scale[1]
         errors = (self.outputs(self.model.unpack(theta))[self.counts] - self.target) / half
         errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
-        self.tracker.update(theta, half * rms(errors))
+        self.tracker.update(theta, half * float(np.sqrt(np.mean(errors**2))))
         return errors
 
     def slopes(self, theta: Array) -> Array:
@@ -501,7 +500,8 @@ class StretchErrors:
 def free_run_rmse(model: Narx, data: TrainingData) -> float:
     """Return the RMSE of free runs from measured starts; infinite on overflow."""
     whole = StretchErrors(model, stretches(model, data, None), Tracker())
-    value = rms(whole.outputs(model)[whole.counts] - whole.target)
+    with np.errstate(over="ignore", invalid="ignore"):
+        value = float(np.sqrt(np.mean((whole.outputs(model)[whole.counts] - whole.target) ** 2)))
     return value if np.isfinite(value) else np.inf
 
 

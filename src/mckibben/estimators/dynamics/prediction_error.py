@@ -27,7 +27,6 @@ from mckibben.arrays import Array, Mask
 from mckibben.estimators.core.data import Run
 from mckibben.estimators.optimisers.multi_start import follow_best, trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.metrics import rms
 
 STABLE = 1.0 - 1e-7
 """Largest magnitude of a pole."""
@@ -286,7 +285,7 @@ def evaluate(
         found.append(e)
         slopes.append(own)
     e = np.concatenate(found)
-    return e, np.concatenate(slopes), rms(e)
+    return e, np.concatenate(slopes), float(np.sqrt(np.mean(e**2)))
 
 
 def from_rest(theta: Array, orders: Orders, run: Run, start: Beginning) -> tuple[Array, Array]:

@@ -26,7 +26,6 @@ from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.dynamics.process_model import ProcessModelEstimator
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.metrics import rms
 from mckibben.signals.periodic import band_limited
 
 ANGLE = 1 / 3
@@ -261,7 +260,7 @@ class NetworkErrors:
         found = self._followed(theta)
         self._slopes = found[:, 1:]
         errors = found[:, 0] - self.target
-        self.tracker.update(theta, rms(errors))
+        self.tracker.update(theta, float(np.sqrt(np.mean(errors**2))))
         return np.asarray(errors)
 
     def slopes(self, theta: Array) -> Array:

@@ -23,7 +23,6 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators, SearchEstimator
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.metrics import rms
 from mckibben.signals.reversals import reversals
 
 SMOOTHED = 3.0
@@ -225,7 +224,7 @@ class ActivationPressureEstimator(SearchEstimator):
         from scipy.optimize import least_squares
 
         found = least_squares(errors, np.append(start, 0.0), bounds=(lower, upper)).x
-        tracker.update(found, rms(errors(found)))
+        tracker.update(found, float(np.sqrt(np.mean(errors(found) ** 2))))
         phi = found[:4] / largest ** np.array([3, 2, 1, 0])
         slope = float(found[4]) / max(middle, 1e-9)
         return phi, (slope, 1.0 - slope * middle)

@@ -16,11 +16,11 @@ from mckibben.estimators.force.activation import (
     by_force,
     outermost,
 )
-from mckibben.metrics import rms
 from mckibben.papers.experiment import (
     Curves,
     Experiment,
     Runs,
+    rms,
 )
 from mckibben.recording import Recording
 from mckibben.signals.protocol import protocol

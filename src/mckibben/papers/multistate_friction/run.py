@@ -16,13 +16,14 @@ from mckibben.blocks.force.multistate_friction import MultistateFriction
 from mckibben.control import track
 from mckibben.estimators.catalogue import full_name
 from mckibben.estimators.force.multistate import extract_hysteresis
-from mckibben.metrics import rms, score
+from mckibben.metrics import score
 from mckibben.papers.experiment import (
     Cell,
     Curves,
     Experiment,
     Fitted,
     Runs,
+    rms,
 )
 from mckibben.papers.multistate_friction.protocol import SAMPLE_TIME
 from mckibben.recording import Recording

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.metrics import err, loop_width, rms, rmse
-from mckibben.papers.experiment import Cell, Experiment, Fitted, Runs
+from mckibben.metrics import err, loop_width, rmse
+from mckibben.papers.experiment import Cell, Experiment, Fitted, Runs, rms
 from mckibben.papers.sdchm import loops
 from mckibben.papers.sdchm.loops import BALANCE, OURS, PUBLISHED, numbered
 from mckibben.papers.sdchm.protocol import PATTERNS, quick

@@ -30,12 +30,8 @@ def blocks_of(pieces: Sequence[Array], count: int) -> list[list[Array]]:
 
 
 def sums_of_others(products: Array, folds: NDArray[np.intp]) -> Array:
-    """Return the products, (blocks, ...), summed over all folds but one, shape (folds, ...).
-
-    Of a single fold, its own.
-    """
-    apart = [folds != fold for fold in range(int(folds.max()) + 1)]
-    return np.array([products[out if out.any() else ~out].sum(axis=0) for out in apart])
+    """Return the products, (blocks, ...), summed over all folds but one, shape (folds, ...)."""
+    return np.array([products[folds != fold].sum(axis=0) for fold in range(int(folds.max()) + 1)])
 
 
 def squared_errors(products: Array, weights: Array) -> Array:

@@ -102,7 +102,8 @@ def solve_products(
     bounded = np.zeros(width, dtype=bool) if bounded is None else bounded
     order, first = np.argsort(bounded, kind="stable"), width - np.count_nonzero(bounded)
     own = np.diagonal(products, axis1=1, axis2=2)[:, :width] if effects is None else effects
-    size = np.sqrt(np.broadcast_to(own, (len(products), width))[:, order, np.newaxis])
+    own = np.maximum(np.broadcast_to(own, (len(products), width)), 0.0)
+    size = np.sqrt(own[:, order, np.newaxis])
     size = np.maximum(size, LEAST_EFFECT * size.max(axis=0))
     size[~(size > 0.0)] = 1.0
     damping = np.broadcast_to(ridge, width)[order]

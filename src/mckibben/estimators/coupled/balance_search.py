@@ -152,8 +152,7 @@ class Search:
         for _ in range(MOST_CUTS):
             missing = least - sides[:, others] @ z[others]
             tried[free] = solve(reduced[:, :-1], target, sides[:, free], missing)
-            linear = structure.base + structure.mix @ tried[:n]
-            side, softest = structure.softest(linear)
+            side, softest = structure.softest(structure.base + structure.mix @ tried[:n])
             if softest >= 0.5 * structure.least_stiffness:
                 break
             sides = np.vstack([sides, np.append(side @ structure.mix, np.zeros(z.size - n))])

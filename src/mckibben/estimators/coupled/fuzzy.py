@@ -20,7 +20,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.fields import Channels, rows, vector
 from mckibben.numerics.descent import trust_region
-from mckibben.numerics.least_squares import solve_products
 from mckibben.numerics.statistics import rms
 from mckibben.numerics.swarm import Swarm, particle_swarm
 from mckibben.numerics.tracker import Tracker
@@ -120,11 +119,14 @@ class Consequents:
         """Return consequents from normal equations, shape (rules * terms, outputs)."""
         n_rules = len(gram) // n_terms
         parts = np.hstack([np.tile(np.eye(n_terms), (n_rules, 1)), np.eye(len(gram))])
-        products = parts.T @ np.hstack([gram @ parts, right])
-        effects = np.tile(np.diag(products)[:n_terms], 1 + n_rules)
-        damping = LIGHTEST + np.repeat([0.0, self.ridge], [n_terms, len(gram)])
-        width = n_terms + len(gram)
-        return parts @ solve_products(products[np.newaxis], width, damping, effects=effects)[0]
+        whole = parts.T @ gram @ parts
+        size = np.diag(whole)[:n_terms]
+        unit = np.tile(1.0 / np.sqrt(np.where(size > 0, size, 1.0)), 1 + n_rules)
+        whole *= unit * unit[:, np.newaxis]
+        damping = np.repeat([0.0, self.ridge], [n_terms, len(gram)])
+        whole[np.diag_indices_from(whole)] += damping + LIGHTEST
+        found = np.linalg.solve(whole, unit[:, np.newaxis] * (parts.T @ right))
+        return np.asarray(parts @ (unit[:, np.newaxis] * found))
 
     def fit(self, x: Array, columns: Array, y: Array) -> Array:
         """Return consequents by damped least squares, shape (rules * terms, outputs)."""

@@ -366,9 +366,8 @@ def minimise(
 
 def arx(runs: Sequence[Run], orders: Orders) -> Array:
     """Return the least-squares ARX model: linear, so found at once."""
-    theta = np.zeros(orders.size)
-    e, jacobian, _ = evaluate(theta, orders, runs)
-    return np.asarray(theta - np.linalg.lstsq(jacobian, e, rcond=1e-12)[0])
+    e, jacobian, _ = evaluate(np.zeros(orders.size), orders, runs)
+    return np.asarray(-np.linalg.lstsq(jacobian, e, rcond=1e-12)[0])
 
 
 def filtered(run: Run, numerator: Sequence[float], denominator: Sequence[float]) -> Run:

@@ -98,7 +98,7 @@ UNLIKE = {
 @pytest.mark.filterwarnings("ignore")
 def test_arrays_pass_the_checks_of_scikit_learn(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # the checks have 20 samples at most
-    monkeypatch.setattr("mckibben.estimators.coupled.base.FEWEST_SAMPLES", 2)
+    monkeypatch.setattr("mckibben.estimators.coupled.base.FEWEST_IN_A_ROW", 2)
     made = load("estimators", name)()
     found = check_estimator(made, expected_failed_checks=UNLIKE[name], on_skip=None)
     assert {one["check_name"] for one in found if one["status"] == "xfail"} == set(UNLIKE[name])

@@ -131,7 +131,8 @@ def differences(
     for place in range(at.size) if places is None else places:
         moved = at.copy()
         moved[place] += steps[place]
-        found.append((function(moved) - here) / (moved[place] - at[place]))
+        away = moved[place] - at[place] or steps[place]  # one lost in rounding moves nothing
+        found.append((function(moved) - here) / away)
     return np.stack(found, axis=-1) if found else np.zeros((*here.shape, 0))
 
 

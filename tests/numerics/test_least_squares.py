@@ -99,3 +99,9 @@ def test_bounds_hold_to_the_bit_and_contradictions_are_refused() -> None:
     assert (x[nnls(columns, target)[0] == 0.0] == 0.0).all()
     with pytest.raises(ModelError):
         solve_constrained(columns, target, np.eye(6)[[0, 0]] * [[1.0], [-1.0]], np.ones(2))
+
+
+def test_a_column_of_zeros_has_no_weight() -> None:
+    columns = np.column_stack([np.linspace(1, 2, 50), np.zeros(50), np.cos(np.arange(50.0))])
+    x, _ = solve_bounded(columns, columns @ [2.0, 0.0, 1.0], with_offset=False)
+    np.testing.assert_allclose(x, [2, 0, 1], atol=1e-12)

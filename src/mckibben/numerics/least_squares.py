@@ -195,5 +195,6 @@ def solve_constrained(
 
 
 def _sizes(columns: Array) -> Array:
-    """Return the lengths of columns, with a lower bound to divide by."""
-    return np.asarray(np.maximum(np.sqrt((columns**2).sum(axis=0)), 1e-300))
+    """Return the lengths of columns to divide by, 1 of a column of zeros."""
+    size = np.sqrt((columns**2).sum(axis=0))
+    return np.where(size > 0.0, size, 1.0)

@@ -12,12 +12,8 @@ from numpy.typing import NDArray
 
 from mckibben import ModelWarning
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_law import (
-    DYNAMIC,
-    OWN,
-    coordinate_at,
-    muscle_at,
-)
+from mckibben.blocks.coupled.balance_law import coordinate_at
+from mckibben.blocks.coupled.balance_terms import LINEAR, STIFFNESS
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
@@ -214,7 +210,7 @@ def test_slopes_of_a_balance_are_those_of_differences(change: dict[str, Any]) ->
     alone, none = follow(start, driven, driven, x, held=False, sloped=False)
     np.testing.assert_array_equal(alone, found)
     assert none.shape == (30, 2, 0)
-    for at in linear(block, start):
+    for at in linear(block):
         step = np.zeros(start.size)
         step[at] = 1e-6 * max(abs(start[at]), 0.1)
         slope = (moved(start + step)[0] - moved(start - step)[0]) / (2.0 * step[at])
@@ -222,23 +218,14 @@ def test_slopes_of_a_balance_are_those_of_differences(change: dict[str, Any]) ->
         assert np.quantile(missed, 0.9) < 1e-5 * (np.abs(slope).max() + 1e-6), at
 
 
-def linear(block: Balance, c: Array) -> list[int]:
+def linear(block: Balance) -> list[int]:
     """Return the places of coefficients that forces are linear in."""
-    n, width = len(block.given), block.n_schedules + 3
-    found: list[int] = []
-    for j in range(len(block.driven)):
-        first, met = int(coordinate_at(c, j)), block.n_obstacles * width
-        end = first + len(block.springs[0]) + block.n_loads
-        found += [*range(first, end)]
-        found += [end + i for i in range(met) if i % width > 1]
-    terms = DYNAMIC + len(block.elasticity[0]) + len(block.areas[0])
-    terms += len(block.limits) + len(block.lags)
-    for k in range(n):
-        first = int(muscle_at(c, k)) + OWN + len(block.driven)
-        found += [
-            place for place in range(first, first + terms) if place != first + 2 or block.mass
-        ]
-    return found
+    places = block.places.at
+    found = {name: places[name] for name in (*LINEAR["coordinate"], *LINEAR["muscle"])}
+    found["obstacles"] = found["obstacles"].reshape(-1, block.sizes.obstacle)[:, STIFFNESS:]
+    if not block.mass:
+        del found["mass"]
+    return np.sort(np.concatenate([each.ravel() for each in found.values()])).tolist()
 
 
 @pytest.mark.parametrize("settled", [False, True])
@@ -247,7 +234,7 @@ def test_forces_that_a_held_balance_lacks_are_linear_in_its_coefficients(*, sett
     measured, x = path([-4.0, -4.0], [10.0, 10.0])[:20], np.full((20, 2), 1.0)
     c = block.coefficients(0.1)
     lacking, slopes = follow(c, measured[::-1] + 4.0, measured, x, held=True)
-    places = linear(block, c)
+    places = linear(block)
     own = slopes[:, :, np.array(places) - int(coordinate_at(c, 0))]
     np.testing.assert_allclose(own @ c[places], lacking, atol=1e-9)
 

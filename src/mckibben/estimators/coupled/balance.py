@@ -21,6 +21,7 @@ from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance, balance_in
+from mckibben.blocks.coupled.balance_terms import TABLE
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import rows, vector
 from mckibben.channels import schedules
@@ -93,24 +94,8 @@ FINEST, LONGEST = 0.003, 0.5
 PLACES = (0.6, 0.8, 0.9, 0.97)
 """Candidate positions of obstacles, as shares of the range; for lowering, from its end."""
 
-TERMS = (
-    *("elasticity", "areas", "relaxation", "line", "mass", "obstacle", "springs"),
-    *(
-        "friction_slopes",
-        "asymmetry",
-        "walls",
-        "filling",
-        "venting",
-        "dead",
-        "contact",
-        "muscles",
-        "slack",
-    ),
-)
+TERMS = (*dict.fromkeys(kind.option for kind in TABLE.values() if kind.option), "muscles")
 """Kinds of candidate terms."""
-
-PARTS = {"lags": "relaxation", "places": "obstacle", "pushes": "slack"}
-"""Terms that are part of other terms."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -364,7 +349,7 @@ class BalanceEstimator(CoupledEstimator):
 
         def there(term: Term) -> bool:
             kind, which, _ = term
-            if prior_errors is not None and kind in OF_TRAITS:
+            if prior_errors is not None and TABLE[kind].prior:
                 return True
             if kind == "springs":
                 return which == 0 or (which - 1) % structure.degree == 0
@@ -373,7 +358,7 @@ class BalanceEstimator(CoupledEstimator):
                 return few or which in (len(structure.lags) // 3, 2 * len(structure.lags) // 3)
             if kind in ("elasticity", "areas"):
                 return which < 2
-            return kind in ("loads", "damping", "bladder", "friction") or (
+            return kind in ("loads", "damping", "bladders", "friction") or (
                 kind == "friction_offset" and bool(structure.limits) and self.friction == "pressure"
             )
 
@@ -410,7 +395,7 @@ class BalanceEstimator(CoupledEstimator):
             search = replace(search, active=active)
         added = search.active & ~self._first(structure, prior_errors)
         names = (
-            PARTS.get(t.kind, t.kind) if t.muscle is None else "muscles"
+            TABLE[t.kind].option or t.kind if t.muscle is None else "muscles"
             for t in compress(structure.terms, added)
         )
         self.terms_ = tuple(dict.fromkeys(names))
@@ -471,7 +456,7 @@ class BalanceEstimator(CoupledEstimator):
             return False
         if term.kind in ("filling", "venting") and not structure.bench.step:
             return False
-        return self.may(PARTS.get(term.kind, term.kind)) and term.kind != "pushes"
+        return self.may(TABLE[term.kind].option or term.kind) and term.kind != "pushes"
 
     def _slack(self, search: Search, z: Array) -> tuple[Search, Array]:
         """Return the search with slackening muscles if that reduces errors; otherwise the same."""
@@ -518,9 +503,6 @@ FIRST_OFFSET, TOWARDS, REFINED = 0.1, 60, 3
 """First friction offset of the prior, relative to the highest pressure; maximum number of steps
 from there; number of reweightings of the prior.
 """
-
-OF_TRAITS = ("elasticity", "areas", "friction", "relaxation")
-"""Kinds of terms that a prior covers."""
 
 OWN_HELPS = 0.1
 """Smallest relative reduction of errors by loads of recordings."""

@@ -127,7 +127,7 @@ class Problem:
 
     def acting(self, run: Run, structure: Structure, values: Array) -> Array:
         """Return the pressures acting on muscles, shape (n, muscles)."""
-        shape = tuple(values[structure.nonlinear["filling"].start :].tolist())
+        shape = tuple(values[structure.at["filling"][0] :].tolist())
         if not (shape[0] or shape[2] or shape[3]):
             return run.driven
         key = (run.place, *shape)
@@ -227,9 +227,7 @@ class Problem:
             for number, kind in enumerate(air):
                 whole[:, structure.free(kind).start] = by[:, number - len(air)]
             loads = self.loads_at(structure, run)
-            whole[:, loads] = by[
-                :, [structure.spring(0, j, -1) for j in range(loads.stop - loads.start)]
-            ]
+            whole[:, loads] = by[:, structure.springs[: loads.stop - loads.start, 0, 0]]
             errors.append(before.ravel())
             slopes.append(whole)
         return errors, np.concatenate(slopes)
@@ -363,19 +361,16 @@ class Problem:
             powers = structure.powers(x[:, : len(structure.bench.scheduled)].T)
             own = np.empty_like(q)
             for j in range(structure.m):
-                springs = values[structure.of_coordinate("springs", j)].reshape(-1, 1 + structure.m)
-                own[:, j] = springs[:, 1 + j] @ powers
+                own[:, j] = values[structure.springs[j, :, 1 + j]] @ powers
             scale = structure.bench.scale
             for k, way in enumerate(structure.bench.directions):
                 u = q @ way / scale
-                elastic = polynomial.polyder(
-                    [0.0, 0.0, *values[structure.of_muscle("elasticity", k)]]
-                )
-                narrowing = polynomial.polyder(values[structure.of_muscle("areas", k)])
+                elastic = polynomial.polyder([0.0, 0.0, *values[structure.at["elasticity"][k]]])
+                narrowing = polynomial.polyder(values[structure.at["areas"][k]])
                 stiff = polynomial.polyval(u, elastic) / scale
                 stiff -= p[:, k] * polynomial.polyval(u, narrowing) / scale
-                stiff += float(values[structure.of_muscle("bladder", k)].sum())
-                stiff += 0.3 * float(values[structure.of_muscle("friction", k)].sum())
+                stiff += float(values[structure.at["bladders"][k]].sum())
+                stiff += 0.3 * float(values[structure.at["friction"][k]].sum())
                 own += np.outer(stiff, way**2)
             found.append(own)
         whole = np.concatenate(found)

@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
+from mckibben.blocks.coupled.balance_terms import NONLINEAR, TABLE, Indices
 from mckibben.errors import ModelError
 from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, PriorErrors
 from mckibben.estimators.coupled.balance_problem import MOST_CUTS, Problem, bounded_least_squares
-from mckibben.estimators.coupled.balance_structure import Indices, Structure, Term
+from mckibben.estimators.coupled.balance_structure import Structure, Term
 from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.statistics import autoregression
@@ -52,14 +53,14 @@ NO_GAIN = 1e-6
 SLOW, SLOWEST = 1e-3, 2
 """Relative gain of a slow step, and number of slow steps that end a descent."""
 
-DEVIATIONS = (("areas",), ("elasticity", "bladder"), ("friction",), ("relaxation", "damping"))
+DEVIATIONS = (("areas",), ("elasticity", "bladders"), ("friction",), ("relaxation", "damping"))
 """Kinds in which muscles may differ together."""
 
-NEW_SHAPE = ("asymmetry", "friction_slopes", "walls", "filling", "dead", "contact", "venting")
+NEW_SHAPE = tuple(name for name in NONLINEAR if TABLE[name].option == name)
 """Nonlinear parameters that are added alone."""
 
-POSITIVE_SHAPE = ("friction_offset", "friction_slopes", "walls", "filling", "dead", "contact")
-"""Non-negative nonlinear parameters."""
+POSITIVE_SHAPE = {name for name in NONLINEAR if TABLE[name].least == 0.0} - {"pushes"}
+"""Non-negative nonlinear parameters; forces of slackening start from a model without."""
 
 
 @dataclass
@@ -349,7 +350,7 @@ class Search:
                 whole = range(following, following + more)
                 yield group(*self._with_own(kind, whole, own))
         for kind, which, muscle in terms:
-            if kind not in ("relaxation", "line", "mass") or muscle is not None:
+            if kind not in ("relaxation", "lines", "mass") or muscle is not None:
                 continue
             if (kind, which) in on or (
                 kind == "relaxation" and not self._is_distinct(which, active, z)
@@ -357,13 +358,13 @@ class Search:
                 continue
             lag = [Term("lags", which)] * (kind == "relaxation")
             yield group(*lag, *self._with_own(kind, (which,), own))
-        met = {self.structure.obstacles[which][0] for kind, which in on if kind == "obstacle"}
+        met = {self.structure.obstacles[which][0] for kind, which in on if kind == "obstacles"}
         for which, (side, _) in enumerate(self.structure.obstacles):
             if side not in met:
                 places = [
                     which + j * len(self.structure.obstacles) for j in range(self.structure.m)
                 ]
-                yield group(Term("obstacle", which), *(Term("places", place) for place in places))
+                yield group(Term("obstacles", which), *(Term("places", place) for place in places))
         for which in {w for k, w in ((t.kind, t.which) for t in terms) if k == "springs"}:
             if ("springs", which) not in on:
                 yield group(Term("springs", which))

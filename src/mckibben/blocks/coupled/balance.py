@@ -24,7 +24,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise, product
-from typing import Annotated, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from annotated_types import Gt, Interval
@@ -272,23 +272,21 @@ class Balance(Invertible):
     def _check_sizes(self) -> None:
         """Raise an error for fields of inconsistent sizes."""
         n, m, n_x = len(self.given), len(self.driven), self.n_schedules
-        if n_x < 0:
-            raise ModelError(
-                f"{self.kind!r} has {self.n_loads} loads, and {len(self.scheduled)} "
-                "channels that schedule or load it",
-                remedy="give every load a channel, behind what schedules",
-            )
-        if m > n or (m < n and not self.directions):
-            raise ModelError(
-                f"given of {self.kind!r} are {n} pressures of {m} coordinates",
-                remedy="give a pressure for every coordinate, or, of more muscles, their "
-                "directions",
-            )
-        if self.drive and m == n:
-            raise ModelError(
-                f"{self.kind!r} has a drive, and no more muscles than coordinates",
-                remedy="leave it out: their pressures follow from the coordinates",
-            )
+        self._refuse(
+            n_x < 0,
+            f"has {self.n_loads} loads, and {len(self.scheduled)} channels that schedule or load it",
+            "give every load a channel, behind what schedules",
+        )
+        self._refuse(
+            m > n or (m < n and not self.directions),
+            f"has {n} pressures of {m} coordinates",
+            "give a pressure for every coordinate, or, of more muscles, their directions",
+        )
+        self._refuse(
+            bool(self.drive) and m == n,
+            "has a drive, and no more muscles than coordinates",
+            "leave it out: their pressures follow from the coordinates",
+        )
         shapes: dict[str, tuple[int, ...]] = {"hull": (n, 2)}
         for name in self.parameters:
             count, width = self.sizes.of(TABLE[name].of), self.sizes.number(TABLE[name].width)
@@ -300,53 +298,43 @@ class Balance(Invertible):
         shapes |= {"known": (len(self.scheduled), 2)} if self.known else {}
         for name, (count, *widths) in shapes.items():
             value = getattr(self, name)
-            if len(value) != count:
-                raise ModelError(
-                    f"{name} of {self.kind!r} has {len(value)} entries", remedy=f"give {count}"
-                )
-            if any(len(row) != width for row in value for width in widths):
-                raise ModelError(
-                    f"{name} of {self.kind!r} has rows of {[len(row) for row in value]}",
-                    remedy=f"give {count} rows of {widths[0]}",
-                )
+            each = [len(row) for row in value if widths]
+            self._refuse(
+                len(value) != count or each != count * widths,
+                f"has {name} of {len(value)}{f' rows of {each}' * bool(widths)}",
+                f"give {count}{''.join(f' rows of {width}' for width in widths)}",
+            )
 
     def _check_physics(self) -> None:
         """Raise an error for numbers that would generate energy or have no meaning."""
-        if self.pressure_range is not None and not self.pressure_range[0] < self.pressure_range[1]:
-            raise ModelError(
-                f"pressure_range of {self.kind!r} is {self.pressure_range}",
-                remedy="the lower end first",
-            )
-        at_rest = [row[0] for row in self.areas]
-        positive = {"limits": self.limits, "lags": self.lags, "areas at rest": at_rest}
+        low, high = self.pressure_range or (-np.inf, np.inf)
+        ends = {"hull": self.hull, "pressure_range": ((low, high),)}
+        positive = {"lags": self.lags, "areas at rest": [row[0] for row in self.areas]}
+        for name, pairs in ends.items():
+            wrong = any(not lower < upper for lower, upper in pairs)
+            self._refuse(wrong, f"has the {name} {getattr(self, name)}", "give the lower end first")
         for name, values in positive.items():
-            rises = name != "limits" or all(a < b for a, b in pairwise(values))
-            if any(not value > 0 for value in values) or not rises:
-                raise ModelError(
-                    f"{name} of {self.kind!r} are {values}",
-                    remedy=f"give positive ones{', in increasing order' if name == 'limits' else ''}",
-                )
+            wrong = any(not value > 0 for value in values)
+            self._refuse(wrong, f"has the {name} {values}", "give positive ones")
+        rises = all(a < b for a, b in pairwise((0.0, *self.limits)))
+        wanted = "give positive ones, in increasing order"
+        self._refuse(not rises, f"has the limits {self.limits}", wanted)
         for name in self.parameters:
             numbers = np.array(getattr(self, name) or 0.0, ndmin=2)
             if name == "obstacles" and self.obstacles:
                 numbers = numbers.reshape(-1, self.sizes.obstacle)[:, at.STIFFNESS :]
-            if TABLE[name].least == 0.0 and (numbers < 0).any():
-                raise ModelError(
-                    f"{name} of {self.kind!r} has a number below 0, which would generate energy",
-                    remedy="give none below 0",
-                )
-        if self.mass and self.pushes:
-            raise ModelError(
-                f"{self.kind!r} has mass and muscles that go slack",
-                remedy="give one of mass and pushes",
+            wrong = TABLE[name].least == 0.0 and bool((numbers < 0).any())
+            self._refuse(
+                wrong, f"has {name} below 0, which would generate energy", "give none below 0"
             )
-        if self.held and self.tare:
-            raise ModelError(
-                f"{self.kind!r} has a tare and starts held",
-                remedy="give one of tare and held",
-            )
-        if any(not low < high for low, high in self.hull):
-            raise ModelError(f"hull of {self.kind!r} is {self.hull}", remedy="lower ends first")
+        both = bool(self.mass and self.pushes)
+        self._refuse(both, "has mass and muscles that go slack", "give one of mass and pushes")
+        both = self.held and self.tare
+        self._refuse(both, "has a tare and starts held", "give one of tare and held")
+
+    def _refuse(self, wrong: bool, what: str, remedy: str) -> None:
+        if wrong:
+            raise ModelError(f"{self.kind!r} {what}", remedy=remedy)
 
     def equations(self) -> tuple[str, ...]:
         """Return the force balance with the terms of this model, then area and elasticity."""
@@ -371,11 +359,8 @@ class Balance(Invertible):
             pulls = rf"\sum_k W_{{kj}} \left(p_k A_k(y_k) - R_k\right) = {outer}"
             balance = (pulls, rf"R_k = {inner},\quad y_k = \sum_j W_{{kj}} q_j")
         limit = "r_m (p_k + p_0" + (r" + \sum_i g_i x_i)" if any(self.friction_slopes) else ")")
-        ends = (
-            rf"\pm {limit}"
-            if self.asymmetry is None
-            else rf"{limit}, \text{{down to }} -\rho {limit}"
-        )
+        down = rf", \text{{down to }} -\rho {limit}"
+        ends = rf"\pm {limit}" if self.asymmetry is None else limit + down
         memory = {
             rf"s_{{km}} \text{{ follows }} y_k + w_k p_k \text{{ up to }} {ends}": self.limits,
             r"\dot{q}_{kl} = \dot{y}_k - q_{kl} / \tau_l": self.lags,
@@ -548,6 +533,12 @@ class Balance(Invertible):
         unit = re.sub(r"\b(N|mm|bar)\b", lambda one: own[one[0]], unit).rstrip("/")
         return f"{unit}{' ' if '/' in unit else '/'}{by}" if by else unit
 
+    def is_convention(self, field: str, index: tuple[int, ...]) -> bool:
+        """Return whether a parameter is a side, or sets the unit of force."""
+        unit = "loads" if np.shape(self.loads) == (1, 1) else "areas"
+        side = field == "obstacles" and index[-1] % self.sizes.obstacle == at.SIDE
+        return side or (field == unit and not any(index))
+
     def name_of(self, field: str, index: tuple[int, ...]) -> str:
         """Return the label of a parameter: its muscle, channel, and scheduling input."""
         return self._entry(field, index)[0]
@@ -612,6 +603,34 @@ class Balance(Invertible):
             scheduled=(Channel("pressure_extensor", "bar"), Channel("force", "N")),
             given=tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2)),
         )
+
+
+def resized(
+    balance: Balance, *, area: float = 1.0, length: float = 1.0, pressure: float = 1.0
+) -> Balance:
+    """Return a balance with areas, lengths and pressures times these, and forces in proportion.
+
+    Loads pull as they did.
+    """
+    force = area * pressure
+    sizes = {"": 1.0, "N": force, "N/bar": area, "bar": pressure, "mm": length}
+    sizes |= {"mm/bar": length / pressure}
+    stiffness = force / length
+    tiles = {
+        "springs": [force, *len(balance.driven) * [stiffness]],
+        "obstacles": [1.0, length, *(1 + balance.n_schedules) * [stiffness]],
+    }
+    units = {name: TABLE[name].unit for name in Balance.parameters if name != "loads"}
+    units |= {"limits": "mm/bar", "hull": "mm", "scale": "mm", "preload": "bar", "drive": "bar"}
+    changed: dict[str, Any] = {}
+    for name, unit in units.items():
+        value = np.array(getattr(balance, name) or (), dtype=np.float64)
+        if value.size:
+            by = np.array(tiles.get(name, [sizes.get(unit, stiffness)]))
+            changed[name] = rows(value * np.resize(by, value.shape[-1:]))
+    if balance.pressure_range is not None:
+        changed["pressure_range"] = tuple(pressure * end for end in balance.pressure_range)
+    return replace(balance, **changed)
 
 
 class Placed(NamedTuple):

@@ -334,54 +334,46 @@ class Search:
 
     def _candidates(self, active: Mask, z: Array) -> Iterator[Mask]:
         """Yield candidate groups of terms beyond the active ones."""
-        terms = self.structure.terms
+        terms, structure = self.structure.terms, self.structure
+        free = [term for term, there in zip(terms, active, strict=True) if there]
+        on = {term[:2] for term in free}
+        own = {term.kind for term in free if term.muscle}
 
         def group(*wanted: Term) -> Mask:
             return np.array([term in wanted for term in terms])
 
-        on = {(term.kind, term.which) for term, there in zip(terms, active, strict=True) if there}
-        own = {
-            term.kind for term, there in zip(terms, active, strict=True) if there and term.muscle
-        }
         for kind in ("elasticity", "areas"):
-            known = [which for name, which in on if name == kind]
-            following = max(known, default=0) + 1
-            for more in range(1, 3):
-                whole = range(following, following + more)
-                yield group(*self._with_own(kind, whole, own))
+            following = max((which for name, which in on if name == kind), default=0) + 1
+            for more in (1, 2):
+                yield group(*self._with_own(kind, range(following, following + more), own))
         for kind, which, muscle in terms:
-            if kind not in ("relaxation", "lines", "mass") or muscle is not None:
+            if muscle is not None or (kind, which) in on:
                 continue
-            if (kind, which) in on or (
-                kind == "relaxation" and not self._is_distinct(which, active, z)
-            ):
-                continue
-            lag = [Term("lags", which)] * (kind == "relaxation")
-            yield group(*lag, *self._with_own(kind, (which,), own))
-        met = {self.structure.obstacles[which][0] for kind, which in on if kind == "obstacles"}
-        for which, (side, _) in enumerate(self.structure.obstacles):
+            if kind in ("lines", "mass"):
+                yield group(*self._with_own(kind, (which,), own))
+            elif kind == "relaxation" and self._is_distinct(which, active, z):
+                yield group(Term("lags", which), *self._with_own(kind, (which,), own))
+        count = len(structure.obstacles)
+        met = {structure.obstacles[which][0] for kind, which in on if kind == "obstacles"}
+        for which, (side, _) in enumerate(structure.obstacles):
             if side not in met:
-                places = [
-                    which + j * len(self.structure.obstacles) for j in range(self.structure.m)
-                ]
-                yield group(Term("obstacles", which), *(Term("places", place) for place in places))
-        for which in {w for k, w in ((t.kind, t.which) for t in terms) if k == "springs"}:
-            if ("springs", which) not in on:
-                yield group(Term("springs", which))
-        for which in range(len(self.structure.bench.scheduled)):
-            if ("friction_slopes", which) not in on:
-                yield group(Term("friction_slopes", which))
+                places = (Term("places", which + j * count) for j in range(structure.m))
+                yield group(Term("obstacles", which), *places)
+        for kind in ("springs", "friction_slopes"):
+            for which in dict.fromkeys(term.which for term in terms if term.kind == kind):
+                if (kind, which) not in on:
+                    yield group(Term(kind, which))
         ruled_out = {"friction_slopes", *(() if ("filling", 0) in on else ("venting",))}
         if {("dead", 0), ("contact", 0)} & on:
             ruled_out |= {"dead", "contact"}
         for kind in NEW_SHAPE:
             if (kind, 0) not in on and kind not in ruled_out:
                 yield group(Term(kind))
-        for kinds in DEVIATIONS if self.structure.n > 1 else ():
+        for kinds in DEVIATIONS if structure.n > 1 else ():
             if not own & set(kinds):
                 whiches = [(kind, which) for kind, which in on if kind in kinds]
                 whiches += [("areas", 0)] if "areas" in kinds else []
-                yield group(*(Term(*one, k) for one in whiches for k in range(1, self.structure.n)))
+                yield group(*(Term(*one, k) for one in whiches for k in range(1, structure.n)))
 
     def _is_distinct(self, which: int, active: Mask, z: Array) -> bool:
         """Return whether a time constant is distinct from the free ones, and in order."""

@@ -6,7 +6,7 @@ under an unmeasured load, a constant force on every coordinate.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance_law import coordinate_at
+from mckibben.blocks.coupled.balance_terms import Indices
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Contact, PiecewiseLinear
@@ -281,40 +282,28 @@ class Problem:
         Forces are weighed by stiffness, so that errors are of displacement. Sizes of areas
         at rest are not determined: those of muscles with a coordinate each are 1 at the mean of samples.
         """
-        n, terms = structure.mix.shape[1], structure.terms
-        of_force = structure.bench.of_force
-        fixed = [not active[i] or (terms[i][:2] == ("areas", 0) and not of_force) for i in range(n)]
-        chosen = np.flatnonzero(~np.array(fixed))
-        beyond = np.array([terms[i].kind == "areas" and not of_force for i in chosen])
-        bounded = (structure.not_negative @ structure.mix > 0)[chosen] & np.array(
-            [terms[i].muscle is None for i in chosen]
-        )
-        rows, targets = [], []
+        n, n_terms = structure.mix.shape[1], len(structure.terms)
+        terms, of_force = structure.terms[:n], structure.bench.of_force
+        fixed = [not of_force and term[:2] == ("areas", 0) for term in terms]
+        chosen = np.flatnonzero(active[:n] & ~np.array(fixed))
+        narrowing = np.flatnonzero([terms[i].kind == "areas" and not of_force for i in chosen])
         start = z.copy()
         start[:n] = 0.0
-        for run in self.runs:
-            lacking, slopes = self.followed(structure, start, run, held=True)
-            slopes = slopes[..., : structure.n_linear]
-            loads = self.loads_at(structure, run)
-            own = np.zeros((*lacking.shape, self.size(structure) - len(terms)))
-            for j in range(loads.stop - loads.start):
-                own[:, j, loads.start - len(terms) + j] = 1.0
-            counts = self.counting(run)[:, np.newaxis]
-            targets.append(-lacking * counts)
-            found = np.concatenate([slopes @ structure.mix[:, chosen], own], axis=2)
-            rows.append(found * counts[..., np.newaxis])
-        whole, target = np.concatenate(rows), np.concatenate(targets)
-        bounded = np.append(bounded, np.zeros(whole.shape[2] - bounded.size, dtype=bool))
-        narrowing = np.flatnonzero(beyond)
+        whole, target = self._forces(structure, start, chosen)
+        bounded = np.zeros(whole.shape[2], dtype=bool)
+        bounded[: chosen.size] = (structure.not_negative @ structure.mix > 0)[chosen]
+        bounded[: chosen.size] &= [terms[i].muscle is None for i in chosen]
         means = np.einsum("tjc,tj->c", whole[..., narrowing], target) / float((target**2).sum())
         whole[..., narrowing] -= means * target[..., np.newaxis]
         table = np.concatenate([whole, target[..., np.newaxis]], axis=2)
         weight = np.ones_like(target)
 
-        def put(least: Array) -> None:
+        def put(least: Array) -> Array:
+            """Set the parameters in the unit in which the area is 1; return the coefficients."""
             at_rest = max(1.0 + float(means @ least[narrowing]), LEAST_AT_REST)
             start[chosen] = least[: chosen.size] / at_rest
-            start[len(terms) :] = least[chosen.size :] / at_rest
+            start[n_terms:] = least[chosen.size :] / at_rest
+            return structure.base + structure.mix @ start[:n]
 
         for _ in range(PASSES):
             flat = (table * weight[..., np.newaxis]).reshape(-1, table.shape[2])
@@ -322,34 +311,41 @@ class Problem:
             if not of_force:
                 weight = 1.0 / (self.stiffness(structure, start) * structure.bench.travel)
         # the same within physics, in the unit in which the area is 1 on average
-        scaling = np.zeros(chosen.size)
-        scaling[narrowing] = means
         flat = (table * weight[..., np.newaxis]).reshape(-1, table.shape[2])
         triangle: Array = np.linalg.qr(flat, mode="r")  # type: ignore[assignment]
         size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
-        system = np.vstack(
-            [triangle[:, :-1], np.sqrt(RIDGE) * np.diag(np.where(size > 0.0, size, 1.0))]
-        )
+        ridge = np.sqrt(RIDGE) * np.diag(np.where(size > 0.0, size, 1.0))
+        system = np.vstack([triangle[:, :-1], ridge])
         right = np.append(triangle[:, -1], np.zeros(size.size))
-        sides, bounds = structure.constraints(structure.expanded(start[: len(terms)]))
+        scaling = np.zeros(chosen.size)
+        scaling[narrowing] = means
         mix = structure.mix[:, chosen] + np.outer(structure.base, scaling)
 
-        def asked(side: Array, bound: Array) -> tuple[Array, Array]:
-            on = side @ mix - np.outer(bound, scaling)
-            return np.hstack(
-                [on, np.zeros((len(on), size.size - chosen.size))]
-            ), bound - side @ structure.base
+        def asked(sides: Array, bounds: Array) -> tuple[Array, Array]:
+            on = np.zeros((len(sides), size.size))
+            on[:, : chosen.size] = sides @ mix - np.outer(bounds, scaling)
+            return on, bounds - sides @ structure.base
 
-        sides, bounds = asked(sides, bounds)
-        for _ in range(MOST_CUTS):
-            asks = (sides != 0).any(axis=1)
-            put(constrained_least_squares(system, right, sides[asks], bounds[asks])[0])
-            side, softest = structure.softest(structure.base + structure.mix @ start[:n])
-            if softest >= 0.5 * structure.least_stiffness:
-                break
-            more = asked(side[np.newaxis], np.array([structure.least_stiffness]))
-            sides, bounds = np.vstack([sides, more[0]]), np.append(bounds, more[1])
+        physics = asked(*structure.constraints(structure.expanded(start[:n_terms])))
+        solve_stiff(structure, system, right, physics, asked, put)
         return start
+
+    def _forces(self, structure: Structure, start: Array, chosen: Indices) -> tuple[Array, Array]:
+        """Return derivatives of forces by linear terms and recordings' loads, and their target."""
+        rows, targets = [], []
+        n_terms = len(structure.terms)
+        for run in self.runs:
+            lacking, slopes = self.followed(structure, start, run, held=True)
+            slopes = slopes[..., : structure.n_linear]
+            loads = self.loads_at(structure, run)
+            own = np.zeros((*lacking.shape, self.size(structure) - n_terms))
+            for j in range(loads.stop - loads.start):
+                own[:, j, loads.start - n_terms + j] = 1.0
+            counts = self.counting(run)[:, np.newaxis]
+            targets.append(-lacking * counts)
+            found = np.concatenate([slopes @ structure.mix[:, chosen], own], axis=2)
+            rows.append(found * counts[..., np.newaxis])
+        return np.concatenate(rows), np.concatenate(targets)
 
     def stiffness(self, structure: Structure, z: Array) -> Array:
         """Return the stiffness of every coordinate with stops mostly sliding, shape (k, m)."""
@@ -375,6 +371,36 @@ class Problem:
             found.append(own)
         whole = np.concatenate(found)
         return np.maximum(whole, 0.1 * np.median(np.abs(whole), axis=0))
+
+
+def solve_stiff(
+    structure: Structure,
+    system: Array,
+    right: Array,
+    physics: tuple[Array, Array],
+    asked: Callable[[Array, Array], tuple[Array, Array]],
+    put: Callable[[Array], Array],
+) -> None:
+    """Solve least squares within physics; springs are made stiff where they were found soft.
+
+    Parameters
+    ----------
+    physics : (array, array)
+        Constraints of the solution, ``sides @ solution >= bounds``.
+    asked : callable
+        Returns those of linear coefficients as such.
+    put : callable
+        Sets the solution, and returns the linear coefficients.
+    """
+    sides, bounds = physics
+    for _ in range(MOST_CUTS):
+        asks = (sides != 0).any(axis=1)  # not only of what stays
+        linear = put(constrained_least_squares(system, right, sides[asks], bounds[asks])[0])
+        side, softest = structure.softest(linear)
+        if softest >= 0.5 * structure.least_stiffness:
+            break
+        more = asked(side[np.newaxis], np.array([structure.least_stiffness]))
+        sides, bounds = np.vstack([sides, more[0]]), np.append(bounds, more[1])
 
 
 def bounded_least_squares(

@@ -20,9 +20,8 @@ from mckibben.arrays import Array, Mask
 from mckibben.blocks.coupled.balance_terms import NONLINEAR, TABLE, Indices
 from mckibben.errors import ModelError
 from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, PriorErrors
-from mckibben.estimators.coupled.balance_problem import MOST_CUTS, Problem, bounded_least_squares
+from mckibben.estimators.coupled.balance_problem import Problem, bounded_least_squares, solve_stiff
 from mckibben.estimators.coupled.balance_structure import Structure, Term
-from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.statistics import autoregression
 
@@ -180,22 +179,19 @@ class Search:
         reduced[:, -1] -= triangle[:, :-1][:, ~known] @ z[self.free[~known]]
         system = np.vstack([reduced[:, :-1], np.diag(held)])
         right = np.append(reduced[:, -1], held * z[free])
-        sides, least = self._conditions(z)
-        tried = z.copy()
-        for _ in range(MOST_CUTS):
-            others = np.ones(z.size, dtype=bool)
-            others[free] = False
-            missing = least - sides[:, others] @ z[others]
-            asks = (sides[:, free] != 0).any(axis=1)  # not only of what stays
-            tried[free] = constrained_least_squares(
-                system, right, sides[asks][:, free], missing[asks]
-            )[0]
-            linear = structure.base + structure.mix @ tried[:n]
-            side, softest = structure.softest(linear)
-            if softest >= 0.5 * structure.least_stiffness:
-                break
-            sides = np.vstack([sides, np.append(side @ structure.mix, np.zeros(z.size - n))])
-            least = np.append(least, structure.least_stiffness - side @ structure.base)
+        tried, others = z.copy(), np.setdiff1d(np.arange(z.size), free)
+
+        def of_free(sides: Array, least: Array) -> tuple[Array, Array]:
+            return sides[:, free], least - sides[:, others] @ z[others]
+
+        def asked(sides: Array, least: Array) -> tuple[Array, Array]:
+            return of_free(*self._of_all(sides, least, z.size))
+
+        def put(solution: Array) -> Array:
+            tried[free] = solution
+            return structure.base + structure.mix @ tried[:n]
+
+        solve_stiff(structure, system, right, of_free(*self._conditions(z)), asked, put)
         return tried
 
     def _known(self, free: Indices, size: Array) -> Mask:
@@ -207,9 +203,8 @@ class Search:
         """Return linear constraints of all unknowns: sides @ z >= least."""
         structure = self.structure
         n, n_terms = structure.mix.shape[1], len(structure.terms)
-        sides, least = structure.constraints(structure.expanded(z[:n_terms]))
-        on_all = np.zeros((len(sides), z.size))
-        on_all[:, :n] = sides @ structure.mix
+        physics = structure.constraints(structure.expanded(z[:n_terms]))
+        on_all, least = self._of_all(*physics, z.size)
         low, high, much = structure.nonlinear_bounds()
         shape, far = z[n:n_terms], FAR * much
         bounds = np.append(np.maximum(low, shape - far), -np.minimum(high, shape + far))
@@ -217,12 +212,14 @@ class Search:
         one = np.eye(z.size)
         separations = np.array([one[j] - one[i] for i, j in pairwise(lags)])
         every = [on_all, one[n:n_terms], -one[n:n_terms], separations.reshape(-1, z.size)]
-        asked = [
-            least - sides @ structure.base,
-            bounds,
-            np.full(len(separations), LEAST_SEPARATION),
-        ]
+        asked = [least, bounds, np.full(len(separations), LEAST_SEPARATION)]
         return np.concatenate(every), np.concatenate(asked)
+
+    def _of_all(self, sides: Array, least: Array, size: int) -> tuple[Array, Array]:
+        """Return constraints of linear coefficients as those of all unknowns."""
+        on_all = np.zeros((len(sides), size))
+        on_all[:, : self.structure.mix.shape[1]] = sides @ self.structure.mix
+        return on_all, least - sides @ self.structure.base
 
     # -- choice ----------------------------------------------------------------------------------
 

@@ -48,6 +48,7 @@ from mckibben.blocks.coupled.balance_adaptive import (
     ROW,
     balance_adaptive_start,
     balance_adaptive_step,
+    retune,
 )
 from mckibben.blocks.coupled.balance_law import (
     AT_REST,
@@ -685,8 +686,9 @@ def learnable_balance(balance: Balance) -> Learnable:
     offsets, at_rest = kinds == OFFSET, np.array(balance.areas)[muscles, 0] * top_of(balance)
     fitted, scales = np.where(offsets, 0.0, 1.0), np.where(offsets, at_rest, 1.0)
 
+    table = family_of(balance, adapted, scales)
+
     def numbers(sample_time: float | None) -> Array:
-        table = family_of(balance, adapted, scales)
         return np.concatenate([[m], table.ravel(), balance.coefficients(sample_time)])
 
     return Learnable(
@@ -695,7 +697,7 @@ def learnable_balance(balance: Balance) -> Learnable:
         fitted=fitted,
         scales=scales,
         spread=np.diag(np.where(offsets, 0.1, 0.3) ** 2),
-        with_parameters=lambda theta: Inverse(changed(balance, adapted, theta - fitted)),
+        with_parameters=lambda theta: Inverse(changed(balance, table, theta - fitted)),
         numbers=numbers,
         known=known,
         compensates=True,
@@ -747,26 +749,22 @@ def shares_of(balance: Balance) -> Array:
     return np.asarray(squares / squares.sum(axis=0))
 
 
-def changed(balance: Balance, adapted: list[tuple[int, int]], changes: Array) -> Balance:
-    """Return the balance with changed forces and factors."""
-    n, m = balance.moves.shape
-    table = np.zeros((len(KINDS), n))
-    table[tuple(np.array(adapted).T[::-1])] = changes
-    stiffened = 1.0 + shares_of(balance).T @ table[STIFFNESS]
-    springs = np.array(balance.springs).reshape(m, -1, 1 + m)
-    springs[:, :, 1:] *= np.sqrt(np.outer(stiffened, stiffened))[:, np.newaxis]
-    springs[:, 0, 0] += balance.moves.T @ table[OFFSET]
-    factors = 1.0 + table[:, :, np.newaxis]
-    bladders = np.array(balance.bladders) * factors[STIFFNESS, : len(balance.bladders), 0]
-    return replace(
-        balance,
-        springs=rows(springs.reshape(m, -1)),
-        elasticity=rows(np.array(balance.elasticity) * factors[STIFFNESS]),
-        areas=rows(np.array(balance.areas) * factors[AREA]),
-        friction=rows(np.array(balance.friction) * factors[FRICTION]),
-        relaxation=rows(np.array(balance.relaxation) * factors[RELAXATION]),
-        bladders=vector(bladders),
-    )
+def changed(balance: Balance, table: Array, changes: Array) -> Balance:
+    """Return the balance with changed forces and factors, as rows of `family_of` say."""
+    fitted = balance.coefficients(1.0)
+    c, factors = np.empty_like(fitted), np.empty(len(balance.driven))
+    retune(fitted, table, changes, c, factors)
+    names = ("springs", "elasticity", "areas", "friction", "relaxation", "bladders")
+    numbers = {name: c[balance.places.at[name]] for name in names if getattr(balance, name)}
+    return replace(balance, **fields_of(numbers))
+
+
+def fields_of(numbers: Mapping[str, Array]) -> dict[str, Any]:
+    """Return fields of a balance from their coefficients, a row a coordinate or muscle."""
+    return {
+        name: vector(table[:, 0]) if TABLE[name].width == "one" else rows(table)
+        for name, table in numbers.items()
+    }
 
 
 def ratios(balance: Balance, k: int) -> tuple[float, float]:
@@ -791,11 +789,33 @@ def ratios(balance: Balance, k: int) -> tuple[float, float]:
 
 def softest_of(balance: Balance) -> float:
     """Return the smallest stiffness of the coordinates' springs over all scheduling inputs."""
-    m, n_x = len(balance.driven), balance.n_schedules
-    springs = np.array(balance.springs).reshape(m, -1, 1 + m)[:, :, 1:]
-    ends, least = balance.known[:n_x] or n_x * ((0.0, 0.0),), np.inf
-    for x in product(*(np.linspace(low, high, 3) for low, high in ends)):
-        powers = [1.0, *(v**d for v in x for d in range(1, balance.degree + 1))]
-        matrix = np.tensordot(np.array(powers), springs, (0, 1))
-        least = min(least, float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[0]))
-    return max(least, 0.0)
+    n_x = balance.n_schedules
+    ends = balance.known[:n_x] or n_x * ((0.0, 0.0),)
+    springs = np.array(balance.springs).reshape(len(balance.driven), -1, 1 + len(balance.driven))
+    return max(softest(springs, np.reshape(ends, (-1, 2)), balance.degree)[0], 0.0)
+
+
+def softest(springs: Array, ends: Array, degree: int) -> tuple[float, Array, Array]:
+    """Return the smallest stiffness of springs, shape (m, powers, 1 + m), and where it is.
+
+    Over all combinations of the ``ends`` and middles of what schedules, which are returned with the
+    direction.
+    """
+    found = []
+    for x in corners(ends):
+        matrix = np.tensordot(powers_of(x, degree), springs[:, :, 1:], (0, 1))
+        stiffnesses, directions = np.linalg.eigh(0.5 * (matrix + matrix.T))
+        found.append((float(stiffnesses[0]), x, directions[:, 0]))
+    return min(found, key=lambda candidate: candidate[0])
+
+
+def corners(ends: Array) -> list[Array]:
+    """Return all combinations of ends, shape (s, 2), and of the middles between them."""
+    low, high = ends.T
+    return [low + np.array(s) * (high - low) for s in product((0.0, 0.5, 1.0), repeat=len(low))]
+
+
+def powers_of(x: Array, degree: int) -> Array:
+    """Return the powers of what schedules, shape (1 + powers, ...), that multiply springs."""
+    powers = [v**d for v in x for d in range(1, degree + 1)]
+    return np.array([np.ones(x.shape[1:]), *powers])

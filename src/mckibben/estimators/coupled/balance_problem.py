@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
+from mckibben.blocks.coupled.balance import powers_of
 from mckibben.blocks.coupled.balance_law import coordinate_at
 from mckibben.blocks.coupled.balance_terms import Indices
 from mckibben.blocks.dynamics.air import Air
@@ -270,7 +271,7 @@ class Problem:
         for run in self.runs:
             x, loads = np.split(run.scheduled, [len(structure.bench.scheduled)], axis=1)
             around = np.column_stack([np.ones(len(x)), run.outputs])
-            pulled = np.einsum("qt,jqi,ti->tj", structure.powers(x.T), springs, around)
+            pulled = np.einsum("qt,jqi,ti->tj", powers_of(x.T, structure.degree), springs, around)
             most = max(most, -float((pulled + loads @ np.array(balance.loads).T).min()))
         return most
 
@@ -354,7 +355,7 @@ class Problem:
             places = self.places(run)
             q, x = run.outputs[places], run.scheduled[places]
             p = self.acting(run, structure, values)[places]
-            powers = structure.powers(x[:, : len(structure.bench.scheduled)].T)
+            powers = powers_of(x[:, : len(structure.bench.scheduled)].T, structure.degree)
             own = np.empty_like(q)
             for j in range(structure.m):
                 own[:, j] = values[structure.springs[j, :, 1 + j]] @ powers

@@ -18,14 +18,22 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.coupled import balance_terms as at
-from mckibben.blocks.coupled.balance import GRID, LEAST_LEFT, Balance
+from mckibben.blocks.coupled.balance import (
+    GRID,
+    LEAST_LEFT,
+    Balance,
+    corners,
+    fields_of,
+    powers_of,
+    softest,
+)
 from mckibben.blocks.coupled.balance_terms import (
     LINEAR,
     NEVER,
@@ -143,11 +151,6 @@ class Bench:
         force = self.highest * self.unit
         sizes = {"N": force, "N/bar": self.unit, "bar": self.highest, "mm/bar": self.most_stretch}
         return sizes.get(unit, force / self.scale if unit.startswith("N") else 1.0)
-
-    def corners(self) -> list[Array]:
-        """Return all combinations of the ends and middles of the scheduling inputs."""
-        low, high = self.levels.T
-        return [low + np.array(s) * (high - low) for s in product((0.0, 0.5, 1.0), repeat=len(low))]
 
 
 class Term(NamedTuple):
@@ -369,7 +372,7 @@ class Structure:
             linear[self.at[name]] = self.bench.natural(TABLE[name].unit)
         force = self.bench.natural("N")
         linear[self.at["loads"]] = force / self.bench.heaviest
-        powers = 1.0 / self.powers(self.bench.largest)
+        powers = 1.0 / powers_of(self.bench.largest, self.degree)
         linear[self.springs] = np.outer(powers, [force, *self.m * [self.bench.natural("N/mm")]])
         return np.append(self.mix.T @ linear / self.mix.sum(axis=0), self.nonlinear_bounds()[2])
 
@@ -416,10 +419,7 @@ class Structure:
             "mass": (final and not given["mass"].any()) or not bench.step or not taut,
             "bladders": merged,
         }
-        fields: dict[str, Any] = {
-            name: vector(table[:, 0]) if TABLE[name].width == "one" else rows(table)
-            for name, table in given.items()
-        }
+        fields = fields_of(given)
         fields |= {name: () for name, out in left_out.items() if out}
         growths = shape["friction_slopes"]
         return Balance(
@@ -526,30 +526,19 @@ class Structure:
                     entries = dict(zip(elastic, stiff.tolist(), strict=True)) | {bladder: 1.0}
                     entries |= dict(zip(areas[1:], (-p * narrowing).tolist(), strict=True))
                     add(entries, self.least_stiffness)
-        for x, direction in product(self.bench.corners(), np.eye(self.m)):
+        for x, direction in product(corners(self.bench.levels), np.eye(self.m)):
             matrix.append(self.stiffness_row(x, direction))
             lower.append(self.least_stiffness)
         return np.array(matrix), np.array(lower)
 
-    def powers(self, x: Array) -> Array:
-        """Return the powers of scheduling inputs, shape (1 + powers, ...), that multiply springs."""
-        powers = [v**d for v in x for d in range(1, self.degree + 1)]
-        return np.array([np.ones(x.shape[1:]), *powers])
-
     def stiffness_row(self, x: Array, direction: Array) -> Array:
         """Return the constraint row of the stiffness of springs along a direction."""
         row = np.zeros(self.n_linear)
-        scheduled = self.powers(x)[:, np.newaxis] * direction[:, np.newaxis, np.newaxis]
+        scheduled = powers_of(x, self.degree)[:, np.newaxis] * direction[:, np.newaxis, np.newaxis]
         row[self.springs[:, :, 1:]] = scheduled * direction
         return row
 
     def softest(self, values: Array) -> tuple[Array, float]:
         """Return the constraint row where springs are softest, and the stiffness there."""
-        softest: list[tuple[float, Array, Array]] = []
-        springs = values[self.springs[:, :, 1:]]
-        for x in self.bench.corners():
-            matrix = np.tensordot(self.powers(x), springs, (0, 1))
-            stiffnesses, directions = np.linalg.eigh(0.5 * (matrix + matrix.T))
-            softest.append((float(stiffnesses[0]), x, directions[:, 0]))
-        stiffness, x, direction = min(softest, key=lambda candidate: candidate[0])
+        stiffness, x, direction = softest(values[self.springs], self.bench.levels, self.degree)
         return self.stiffness_row(x, direction), stiffness

@@ -277,23 +277,16 @@ def carry(
 
 @inlined
 def approach(
-    c: Array,
-    state: Array,
-    way: int,
-    q: Array,
-    x: Array,
-    p: Array,
-    copied: Array,
-    inverse: Array,
-    work: Array,
+    c: Array, state: Array, way: int, q: Array, x: Array, p: Array, rows: Array, work: Array
 ) -> None:
     """Approach equilibrium, and fill the last step, yet to be taken, and the inverse of the slopes.
 
     By Newton's method from where coordinates are, or, where that does not end, `solve_equilibrium`.
     """
-    m = int(c[at.N_COORDINATES])
+    n, m = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES])
     residual, step = work[:m], work[m : 2 * m]
     matrix = work[4 * m : 4 * m + m * m].reshape((m, m))
+    inverse, copied = rows[2 * n : 2 * n + m, :m], rows[2 * n + m : 2 * n + 2 * m, :m]
     for turn in range(FEW_STEPS + 1):
         if turn == FEW_STEPS:
             fill(q, state)
@@ -317,7 +310,7 @@ def approach(
 
 
 @inlined
-def move(
+def slopes_at_past(
     c: Array,
     state: Array,
     way: int,
@@ -328,74 +321,62 @@ def move(
     dp: Array,
     past: Array,
     rows: Array,
-    found: Array,
     slopes: Array,
-    work: Array,
+    terms: Array,
 ) -> None:
-    """Advance one step, free or held, with all derivatives.
+    """Fill the derivatives of the forces on coordinates, those of stops and lags with them.
 
-    Slopes of no columns are not computed. ``past`` begins with the slopes of coordinates; ``rows`` has
-    two rows a muscle to compute in.
+    ``rows`` is to compute in: slopes of every muscle's last shortening, then of its force, the inverse
+    and a copy of the slopes of forces, and slopes of what lags are behind. ``terms`` are those of the
+    last muscle.
     """
     n, m, n_l = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES]), int(c[at.N_LAGS])
-    width, sloped = int(c[at.N_TERMS]), slopes.shape[1] > 0
-    step, terms = work[m : 2 * m], work[4 * m + m * m :]
-    copied, inverse = rows[2 * n : 2 * n + m, :m], rows[2 * n + m : 2 * n + 2 * m, :m]
+    width, first = int(c[at.N_TERMS]), coordinate_at(c, 0)
     shape, late = slopes.shape[1] - n_shape(c) - dp.shape[1], rows[2 * n + 2 * m]
-    if held:
-        unbalanced(c, state, way, q, x, p, work)
-        fill(found, work)
-    else:
-        approach(c, state, way, q, x, p, copied, inverse, work)
-    for j in range(m if sloped else 0):
+    for j in range(m):
         by_coupling(c, j, q, x, shape + wall_column(c) + 1 + n, slopes[j])
-    for back in range(n if sloped else 0):
+    for back in range(n):
         k = n - 1 - back
-        ways, y, moved, by_force = (
-            muscle_at(c, k) + at.WAYS,
-            shortening(c, k, q),
-            rows[k],
-            rows[n + k],
-        )
-        if back > 0:  # those of the last muscle are there
+        y, moved, by_force = shortening(c, k, q), rows[k], rows[n + k]
+        if back > 0:
             muscle_force(c, k, state, way, y, p[k], x, terms)
-        moved[:] = 0.0
+        along(c, k, past, moved)
         by_force[:] = 0.0
-        for j in range(m):
-            if c[ways + j] != 0.0:
-                mix(moved, 1.0, c[ways + j], past[j])
-        place = terms_at(c, k) - coordinate_at(c, 0)
-        fill(by_force[place : place + width], terms)
+        own = terms_at(c, k)
+        fill(by_force[own - first : own - first + width], terms)
         own_late, to = late[k * n_l : (k + 1) * n_l], by_force[shape:]
         by_shape(c, k, state, way, y, p[k], x, dp[k], terms, own_late, to)
         if way != AT_REST:
             through_past(c, k, terms, past, moved, by_force)
-        if way == IN_TIME and not held and c[at.RATE] > 0.0 and c[terms_at(c, k) + at.LINE] > 0.0:
+        if way == IN_TIME and not held and c[at.RATE] > 0.0 and c[own + at.LINE] > 0.0:
             through_line(c, k, state, terms, moved, by_force)
         for j in range(m):
-            if c[ways + j] != 0.0:
-                mix(slopes[j], 1.0, c[ways + j], by_force)
-    for j in range(m if not held else 0):
-        q[j] += step[j]
-        found[j] = q[j]
-    update_state(c, state, way, q, p, x)
-    if not sloped:
-        return
-    if not held:
-        for j in range(m):
-            past[j][:] = 0.0
-            for i in range(m):
-                mix(past[j], 1.0, -inverse[j, i], slopes[i])
-        for j in range(m):
-            fill(slopes[j], past[j])
+            pull = c[muscle_at(c, k) + at.WAYS + j]
+            if pull != 0.0:
+                mix(slopes[j], 1.0, pull, by_force)
+
+
+@inlined
+def follow_past(
+    c: Array, state: Array, way: int, p: Array, x: Array, dp: Array, past: Array, rows: Array
+) -> None:
+    """Update the derivatives of the past of all muscles; ``past`` begins with those of coordinates."""
+    n, m, n_l = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES]), int(c[at.N_LAGS])
+    late = rows[2 * n + 2 * m]
     for k in range(n):
-        ways, now = muscle_at(c, k) + at.WAYS, rows[n + k]
-        now[:] = 0.0
-        for j in range(m):
-            if c[ways + j] != 0.0:
-                mix(now, 1.0, c[ways + j], past[j])
-        own_late = late[k * n_l : (k + 1) * n_l]
+        now, own_late = rows[n + k], late[k * n_l : (k + 1) * n_l]
+        along(c, k, past, now)
         carry(c, k, state, way, p[k], x, dp[k], own_late, past, rows[k], now)
+
+
+@kernel
+def along(c: Array, k: int, past: Array, to: Array) -> None:
+    """Fill the derivatives of the shortening of muscle k from those of coordinates."""
+    to[:] = 0.0
+    for j in range(int(c[at.N_COORDINATES])):
+        way = c[muscle_at(c, k) + at.WAYS + j]
+        if way != 0.0:
+            mix(to, 1.0, way, past[j])
 
 
 @kernel
@@ -433,12 +414,13 @@ def follow(
     slopes : array, shape (t / every, m, columns)
         Of no columns if not wanted.
     """
-    n, m = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES])
+    n, m, sloped = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES]), slopes.shape[2] > 0
     n_states = int(c[at.TARE]) + m - at.FRESH
     state, rest = scratch[:n_states], scratch[n_states:]
     q, tare, last = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m]
     p, work = rest[3 * m : 3 * m + n], rest[3 * m + n :]
-    tared = past[past.shape[0] - m :]
+    step, terms = work[m : 2 * m], work[4 * m + m * m :]
+    inverse, tared = rows[2 * n : 2 * n + m, :m], past[past.shape[0] - m :]
     for t in range(-1, driven.shape[0]):
         way = AT_REST if t < 0 else FROM_REST if t == 0 else IN_TIME
         now, place = max(t, 0), max(t, 0) // every
@@ -447,21 +429,27 @@ def follow(
             ahead = 2.0 * q[j] - last[j] if t > 0 else q[j]
             last[j] = q[j]
             q[j] = measured[now, j] if held else ahead
-        move(
-            c,
-            state,
-            way,
-            held,
-            q,
-            x[now],
-            p,
-            dp[now],
-            past,
-            rows,
-            found[place],
-            slopes[place],
-            work,
-        )
+        if held:
+            unbalanced(c, state, way, q, x[now], p, work)
+            fill(found[place], work)
+        else:
+            approach(c, state, way, q, x[now], p, rows, work)
+        if sloped:
+            slopes_at_past(
+                c, state, way, held, q, x[now], p, dp[now], past, rows, slopes[place], terms
+            )
+        for j in range(m if not held else 0):
+            q[j] += step[j]
+            found[place, j] = q[j]
+        update_state(c, state, way, q, p, x[now])
+        for j in range(m if sloped and not held else 0):
+            past[j] = 0.0
+            for i in range(m):
+                mix(past[j], 1.0, -inverse[j, i], slopes[place, i])
+        for j in range(m if sloped and not held else 0):
+            fill(slopes[place, j], past[j])
+        if sloped:
+            follow_past(c, state, way, p, x[now], dp[now], past, rows)
         if held or c[at.TARED] == 0.0:
             continue
         for j in range(m):

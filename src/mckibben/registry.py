@@ -139,6 +139,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "card": "mckibben.report.notebook:card",
         "plot": "mckibben.report.figures:plot",
     },
+    "models": {},
     "papers": {
         "activation-pressure": "mckibben.papers.activation_pressure.run:run",
         "field-models": "mckibben.papers.field_models.run:run",
@@ -176,7 +177,14 @@ PLUGINS: dict[str, dict[str, str]] = {
         "triangle": "mckibben.signals.excitations:triangle",
     },
 }
-"""Group -> name -> ``"module:attribute"``. Adding a plug-in is one line here."""
+"""Group -> name -> ``"module:attribute"``. Adding a plug-in is one line here.
+
+One of ``models`` is a block, with its estimator in the same module: that of its name, with ``Estimator``
+behind.
+"""
+
+OF_MODEL = {"blocks": "", "estimators": "Estimator"}
+"""Groups to which a model belongs, and the end of the name that it has there."""
 
 REPLACED: dict[str, dict[str, str]] = {
     "blocks": {"force-balance": "balance", "force-balance-inverse": "balance"},
@@ -229,4 +237,6 @@ def load(group: str, name: str) -> Any:
 @cache
 def _locations(group: str) -> dict[str, str]:
     outside = {entry.name: entry.value for entry in entry_points(group=f"mckibben.{group}")}
-    return outside | PLUGINS[group]
+    models = _locations("models") if group in OF_MODEL else {}
+    both = {name: f"{place}{OF_MODEL[group]}" for name, place in models.items()}
+    return both | outside | PLUGINS[group]

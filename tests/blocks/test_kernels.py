@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from mckibben import ModelWarning
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_law import coordinate_at
-from mckibben.blocks.coupled.balance_terms import LINEAR, STIFFNESS
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
@@ -27,7 +25,6 @@ from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
 from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach, _output, _solve, everett
 from mckibben.blocks.laws import wander
 from mckibben.blocks.solving import eliminate, solve_near
-from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.mpi_narmax import remembered
 from mckibben.registry import load, names
 from mckibben.system.compiling import Deferred
@@ -173,70 +170,6 @@ def test_slack_muscles_push_as_hard_as_they_can(friction: tuple[tuple[float, ...
         found = block.simulate(inputs, sample_time=0.1)
     expected = TWINS["balance"](block, inputs.tolist(), 0.1)
     np.testing.assert_allclose(found, expected, atol=1e-8)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"pushes": (150.0, 120.0)},
-        {"pushes": (0.5, 0.1)},
-        {"pushes": (), "bladders": (), "mass": (0.01, 0.02)},
-        {"asymmetry": 0.4, "friction_slopes": (0.3,), "obstacles": 2 * ((1.0, 3.0, 2.0, 0.1),)},
-        {"directions": ((1.0, 0.3), (-0.2, 1.0)), "pushes": (), "bladders": ()},
-    ],
-)
-def test_slopes_of_a_balance_are_those_of_differences(change: dict[str, Any]) -> None:
-    """Free from rest, with a tare, through breaks of its stops, beyond its hull, and slack."""
-    block = replace(
-        SLACK,
-        tare=True,
-        hull=((-2.0, 6.0), (-2.0, 8.0)),
-        friction_offset=0.1,
-        lines=(0.3, 0.2),
-        **change,
-    )
-    driven, x = path([0.0, 0.0], [4.0, 4.0])[:30], path([0.0, 0.0], [2.0, 1.0])[:30]
-    driven[:, 1] = driven[::-1, 1]
-    start = block.coefficients(0.1)
-    first = int(coordinate_at(start, 0))
-
-    def moved(c: Array) -> tuple[Array, Array]:
-        return follow(c, driven, driven, x, held=False)
-
-    found, slopes = moved(start)
-    inputs = np.column_stack([driven, x])
-    free = block.inverse().simulate(inputs, sample_time=0.1)
-    np.testing.assert_allclose(found, free, rtol=1e-13)  # Newton's method begins elsewhere if slack
-    alone, none = follow(start, driven, driven, x, held=False, sloped=False)
-    np.testing.assert_array_equal(alone, found)
-    assert none.shape == (30, 2, 0)
-    for at in linear(block):
-        step = np.zeros(start.size)
-        step[at] = 1e-6 * max(abs(start[at]), 0.1)
-        slope = (moved(start + step)[0] - moved(start - step)[0]) / (2.0 * step[at])
-        missed = np.abs(slope - slopes[:, :, at - first])
-        assert np.quantile(missed, 0.9) < 1e-5 * (np.abs(slope).max() + 1e-6), at
-
-
-def linear(block: Balance) -> list[int]:
-    """Return the places of coefficients that forces are linear in."""
-    places = block.places.at
-    found = {name: places[name] for name in (*LINEAR["coordinate"], *LINEAR["muscle"])}
-    found["obstacles"] = found["obstacles"].reshape(-1, block.sizes.obstacle)[:, STIFFNESS:]
-    if not block.mass:
-        del found["mass"]
-    return np.sort(np.concatenate([each.ravel() for each in found.values()])).tolist()
-
-
-@pytest.mark.parametrize("settled", [False, True])
-def test_forces_that_a_held_balance_lacks_are_linear_in_its_coefficients(*, settled: bool) -> None:
-    block = replace(Balance.example(), walls=(0.0, 0.0), lines=(), settled=settled)
-    measured, x = path([-4.0, -4.0], [10.0, 10.0])[:20], np.full((20, 2), 1.0)
-    c = block.coefficients(0.1)
-    lacking, slopes = follow(c, measured[::-1] + 4.0, measured, x, held=True)
-    places = linear(block)
-    own = slopes[:, :, np.array(places) - int(coordinate_at(c, 0))]
-    np.testing.assert_allclose(own @ c[places], lacking, atol=1e-9)
 
 
 def longer_pasts() -> RecurrentFuzzyNetwork:

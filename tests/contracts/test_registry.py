@@ -61,7 +61,7 @@ ON_DISK: dict[str, Callable[[], set[Any]]] = {
 
 @pytest.mark.parametrize("group", PLUGINS)
 def test_what_is_on_disk_is_registered_in_order_and_loads(group: str) -> None:
-    registered = {inspect.unwrap(load(group, name)) for name in PLUGINS[group]}
+    registered = {inspect.unwrap(load(group, name)) for name in names(group)}
     assert all(callable(found) for found in registered)
     if group in ON_DISK:
         assert ON_DISK[group]() == registered

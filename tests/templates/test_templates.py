@@ -16,6 +16,7 @@ from sklearn.model_selection import cross_val_score
 
 from mckibben import PI, ModelError, Recording, check_block, registry
 from mckibben import load as load_model
+from mckibben.blocks.derivatives import derivatives, differentiable
 from mckibben.errors import DataError
 from tests.export.building import build
 from tests.tools import needs
@@ -29,7 +30,7 @@ U = np.interp(np.arange(400), np.arange(0, 400, 37), [0, 4, 1, 3, 2, 5, 0, 2.5, 
 def my_model(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
     """Register the template as its README says, from where it lies, and import it."""
     lines = re.findall(r'"(\w+)": \{[^}]*?"([\w-]+)": "mckibben\.[\w.]+:(\w+)"', README)
-    assert {group for group, *_ in lines} == {"blocks", "estimators"}
+    assert [group for group, *_ in lines] == ["models"]
     for group, kind, name in lines:
         monkeypatch.setitem(registry.PLUGINS[group], kind, f"my_model:{name}")
     monkeypatch.syspath_prepend(TEMPLATES)
@@ -84,6 +85,24 @@ def test_the_estimator_finds_the_block(
     noise = Recording({"pressure": U, "displacement": falling}, 0.01)
     with pytest.raises(ModelError):  # no better than the mean
         estimator().fit(noise)
+
+
+def test_derivatives_are_exact_and_standard_errors_follow(
+    my_model: ModuleType, estimator: Any
+) -> None:
+    truth, noise = my_model.ElasticPlastic(4.0, 2.5, 0.4, (0.0, 5.0)), 0.05
+    assert differentiable(truth)
+    slopes = derivatives(truth, U[:, np.newaxis])[:, 0]
+    play = PI((0.4,), (1.0,), 0.0, (0.0, 5.0)).simulate(U)
+    np.testing.assert_allclose(slopes[:, 0], U, atol=1e-12)
+    np.testing.assert_allclose(slopes[:, 1], U - play, atol=1e-12)
+    scatter = noise * np.random.default_rng(0).standard_normal(U.size)
+    recording = Recording({"pressure": U, "displacement": truth.simulate(U) + scatter}, 0.01)
+    found = estimator().fit(recording)
+    errors = np.array(found.diagnostics_.standard_errors)
+    expected = noise * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    np.testing.assert_allclose(errors, expected, rtol=0.2)
+    assert (np.abs(found.model_.pack() - truth.pack()) < 4.0 * errors).all()
 
 
 @needs("cc")

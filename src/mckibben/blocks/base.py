@@ -318,6 +318,11 @@ class Block(DrawsItself, Parametrised):
         scratch = scratch_of(kernel, self.n_scratch)
         return bound(kernel.batch, numbers, state, *scratch, inputs, outputs)
 
+    complex_step: ClassVar[bool] = True
+    """Whether its free runs are differentiated by complex step: a kernel for complex numbers is compiled
+    with it, which of some takes minutes.
+    """
+
     @property
     def c_kernels(self) -> tuple[Callable[..., Any], ...]:
         """Step and start kernels for translation to C."""

@@ -14,6 +14,7 @@ import ast
 import inspect
 import math
 import textwrap
+import threading
 from collections.abc import Callable
 from functools import cache, reduce
 from typing import Any
@@ -133,6 +134,8 @@ HELPERS: dict[str, Callable[..., Any]] = {
 BY_REAL_PART = ("ceil", "floor", "trunc", "isfinite", "isinf", "isnan")
 """Piecewise constant functions of ``math``, evaluated on real parts."""
 
+_lock = threading.RLock()
+
 PREFIX = "_twin_"
 """Prefix of the helpers' names."""
 
@@ -189,7 +192,6 @@ def _part(node: Any) -> Any:
     return node if isinstance(node, truth) else ast.Attribute(node, "real", ast.Load())
 
 
-@cache
 def twin(kernel: Any) -> Any:
     """Return the complex version of a compiled kernel, compiled at its first call.
 
@@ -198,6 +200,12 @@ def twin(kernel: Any) -> Any:
     kernel : callable
         In the kernel language, or the loop made from one.
     """
+    with _lock:  # one, however many threads ask; and Python 3.11 parses in one at a time
+        return _twin(kernel)
+
+
+@cache
+def _twin(kernel: Any) -> Any:
     assert isinstance(kernel, Deferred)
     function = kernel.py_func
     lines, first = inspect.getsourcelines(function)

@@ -174,6 +174,7 @@ class Inverse(Block):
     rate_dependent = same_as("forward.rate_dependent")
     path_dependent = same_as("forward.inverse_path_dependent")
     scheduling = same_as("forward.scheduling")
+    complex_step = same_as("forward.complex_step")
     n_states = same_as("forward.n_inverse_states")
     n_scratch = same_as("forward.n_inverse_scratch")
     start = same_as("forward.start")

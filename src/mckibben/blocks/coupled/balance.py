@@ -211,6 +211,7 @@ class Balance(Invertible):
     inverse_kernel: ClassVar[Step] = balance_inverse_step
     inverse_start_kernel: ClassVar[Start] = balance_inverse_start
     inverse_path_dependent: ClassVar[bool] = True
+    complex_step: ClassVar[bool] = False
     increasing = ("limits",)
     renamed: ClassVar[Mapping[str, str]] = {"grip": "friction_offset", "grips": "friction_slopes"}
     parameters: ClassVar[tuple[str, ...]] = (

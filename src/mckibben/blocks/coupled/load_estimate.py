@@ -123,6 +123,7 @@ class LoadEstimate(Block):
     kind = "load-estimate"
     ports = ("forward.driven", "forward.given"), ("scheduled",), ("loads",)
     rate_dependent = same_as("forward.rate_dependent")
+    complex_step = same_as("forward.complex_step")
     n_states = same_as("forward.n_states")
     kernel = load_estimate_step
     start_kernel = load_estimate_start

@@ -10,31 +10,24 @@ import numpy as np
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
+from mckibben.blocks.derivatives import DIFFERENCE, derivatives, differences, relative_sizes
 from mckibben.blocks.free_run import run_free
 from mckibben.blocks.running import run_many
 from mckibben.blocks.starts import history, known_state
 from mckibben.metrics import rmse
 from mckibben.recording import Recording
 
-DIFFERENCE = 1e-6
-"""Step of finite differences, relative to the size of a parameter."""
-
 AT_ONCE = 2_000_000
-"""Numbers of outputs of several blocks that are held in memory at once."""
+"""Numbers of derivatives that are held in memory at once."""
 
 Changed = Callable[[Block, int], Block]
-"""Returns a block as it runs over a recording, by the recording's index."""
+"""Returns a block as it runs over a recording, by the recording's index: some parameters shifted."""
 
 
 def as_it_is(block: Block, place: int) -> Block:
     """Return the block itself, for every recording."""
     del place
     return block
-
-
-def relative_sizes(parameters: Array) -> Array:
-    """Return the scales of parameters, with a lower bound."""
-    return np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +103,7 @@ class FreeRuns:
     @cached_property
     def modelled(self) -> list[Array]:
         """Outputs of the block over every recording, shape (n, m) each."""
-        return [table[0] for table in self.simulated([self.block])]
+        return self.simulated(self.block)
 
     @cached_property
     def residual(self) -> Array:
@@ -149,53 +142,53 @@ class FreeRuns:
         pairs = zip(outputs, self.rows, strict=True)
         return np.concatenate([table[rows].ravel() for table, rows in pairs])
 
-    def simulated(self, blocks: Sequence[Block]) -> list[Array]:
-        """Return the outputs of blocks over every recording, shape (blocks, n, m) each."""
+    def simulated(self, block: Block) -> list[Array]:
+        """Return the outputs of a block over every recording, shape (n, m) each."""
         found = []
         for place, (recording, before) in enumerate(zip(self.recordings, self.pasts, strict=True)):
-            own = [self.changed(block, place) for block in blocks]
+            own = self.changed(block, place)
             if recording.periodic:
-                found.append(np.array([run_free(block, recording, self.names) for block in own]))
+                found.append(run_free(own, recording, self.names))
                 continue
             inputs = recording.matrix(channel.name for channel in self.block.inputs)
             whole = np.ascontiguousarray(np.vstack([before, inputs]))
-            states = [known_state(block, self.known[place]) for block in own]
-            if states[0] is None:
-                many = run_many(own, whole, sample_time=recording.sample_time)
-            else:  # each from its own past outputs
-                pairs = zip(own, states, strict=True)
-                step = recording.sample_time
-                many = np.concatenate(
-                    [
-                        run_many([one], whole, sample_time=step, initial=state)
-                        for one, state in pairs
-                    ]
-                )
-            found.append(many[:, len(before) :])
+            state = known_state(own, self.known[place])  # from its own past outputs
+            many = run_many([own], whole, sample_time=recording.sample_time, initial=state)
+            found.append(many[0, len(before) :])
         return found
-
-    def outputs(self, blocks: Sequence[Block]) -> Array:
-        """Return the outputs of blocks at the samples that count, shape (blocks, N)."""
-        tables = self.simulated(blocks)
-        return np.array([self.scored([table[k] for table in tables]) for k in range(len(blocks))])
 
     def slopes(self, places: Sequence[int], kept: Array | slice = slice(None)) -> Array:
         """Return derivatives of the outputs by parameters in units of their sizes, shape (n, k).
 
-        By finite differences, at the outputs ``kept`` of the N that count.
+        At the outputs ``kept`` of the N that count; see `mckibben.blocks.derivatives`.
         """
-        parameters = self.block.pack()
-        sizes = relative_sizes(parameters)
-        base = self.scored(self.modelled)[kept]
-        found = np.empty((base.size, len(places)))
+        sizes, found = relative_sizes(self.block.pack()), []
         many = max(1, AT_ONCE // max(sum(map(len, self.recordings)) * len(self.names), 1))
         for first in range(0, len(places), many):
             some = places[first : first + many]
-            blocks = []
-            for place in some:
-                moved = parameters.copy()
-                moved[place] += DIFFERENCE * sizes[place]
-                blocks.append(self.block.unpack(moved))
-            moved_by = self.outputs(blocks)[:, kept] - base
-            found[:, first : first + len(some)] = moved_by.T / DIFFERENCE
-        return found
+            tables = [self._slopes_over(place, some) for place in range(len(self.recordings))]
+            pairs = zip(tables, self.rows, strict=True)
+            scored = np.concatenate([table[rows].reshape(-1, len(some)) for table, rows in pairs])
+            found.append(scored[kept] * sizes[some])
+        return np.concatenate(found, axis=1)
+
+    def _slopes_over(self, place: int, places: Sequence[int]) -> Array:
+        """Return the derivatives of the outputs over a recording, shape (n, m, k)."""
+        block, known, past = self.changed(self.block, place), self.known[place], self.pasts[place]
+        recording, values = self.recordings[place], block.pack()
+        if recording.periodic:
+
+            def run(moved: Array) -> Array:
+                return run_free(block.unpack(moved), recording, self.names)
+
+            return differences(run, values, DIFFERENCE * relative_sizes(values), places)
+
+        def start(other: Block) -> Array:
+            state = known_state(other, known)
+            assert state is not None
+            return state
+
+        begun = start if known_state(block, known) is not None else None
+        inputs = recording.matrix(channel.name for channel in block.inputs)
+        whole = np.vstack([past, inputs])
+        return derivatives(block, whole, recording.sample_time, begun, places)[len(past) :]

@@ -26,8 +26,9 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
+from mckibben.blocks.derivatives import relative_sizes
 from mckibben.errors import MckibbenError
-from mckibben.estimators.core.free_runs import FreeRuns, as_it_is, relative_sizes
+from mckibben.estimators.core.free_runs import FreeRuns, as_it_is
 from mckibben.estimators.core.uncertainty import LARGEST
 from mckibben.recording import Recording
 
@@ -40,7 +41,7 @@ determines stays about as it is, as the fit's start or bounds would hold it.
 """
 
 MOST_FREE = 150
-"""Number of free parameters up to which slopes are computed by differences."""
+"""Number of free parameters up to which slopes are computed."""
 
 MOST_ROWS = 20_000
 """Number of outputs, evenly spread, on which slopes are computed."""
@@ -166,7 +167,7 @@ def _moved(runs: FreeRuns, slopes: Slopes, step: Array) -> list[Array] | None:
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             other: Block = runs.block.unpack(parameters)
-            tables = [table[0] for table in runs.simulated([other])]
+            tables = runs.simulated(other)
     except MckibbenError:
         return None
     return tables if all(np.isfinite(table).all() for table in tables) else None

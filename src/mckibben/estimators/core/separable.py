@@ -18,6 +18,7 @@ from annotated_types import Ge
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
+from mckibben.blocks.derivatives import differences
 from mckibben.blocks.memoryless import Negative
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Start
@@ -101,15 +102,10 @@ class SeparableEstimator(Estimator):
 
         Shape (samples that count, m); by finite differences of the basis.
         """
-        here = self.matrix(theta, data) @ linear
-        steps = differences(theta, *self.bounds(data))
-        columns = []
-        for index in range(theta.size):
-            moved = theta.copy()
-            moved[index] += steps[index]
-            there = self.matrix(moved, data) @ linear
-            columns.append((there - here) / (moved[index] - theta[index]))
-        return np.column_stack(columns)
+        lower, upper = self.bounds(data)
+        steps = DIFFERENCE * (upper - lower)
+        inside = np.where(theta + steps <= upper, steps, -steps)
+        return differences(lambda moved: self.matrix(moved, data) @ linear, theta, inside)
 
     def jacobian(
         self, theta: Array, matrix: Array, linear: Array | None, data: TrainingData
@@ -291,9 +287,3 @@ class SeparableEstimator(Estimator):
 def counting(data: TrainingData, of_run: Callable[[Run], Array]) -> Array:
     """Return a quantity of every run, shape (n, ...), at the scored samples of all runs."""
     return np.concatenate([of_run(run)[run.counts] for run in data.runs])
-
-
-def differences(theta: Array, lower: Array, upper: Array) -> Array:
-    """Return steps of finite differences within the bounds."""
-    steps = DIFFERENCE * (upper - lower)
-    return np.where(theta + steps <= upper, steps, -steps)

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.derivatives import relative_sizes
 from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import TrainingData, stretches
-from mckibben.estimators.core.free_runs import FreeRuns, relative_sizes
+from mckibben.estimators.core.free_runs import FreeRuns
 from mckibben.statistics import Autoregression, autoregression
 
 LARGEST = 1e150
@@ -52,7 +53,7 @@ def unknown(block: Block) -> Array:
 def covariance_of(runs: FreeRuns, fixed: Sequence[int]) -> tuple[float, Array]:
     """Return the condition of the free parameters of a block, and the covariance of all.
 
-    From finite differences of the free-running output. Parameters that are fixed, or that the data do
+    From derivatives of the free-running output. Parameters that are fixed, or that the data do
     not determine, have NaN; so have those at which the output overflows, and all of a model whose own
     output does.
     """

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import InstanceOf
 
 from mckibben.arrays import Array, Mask
+from mckibben.blocks.derivatives import differences
 from mckibben.channels import LOADS
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
@@ -86,11 +87,10 @@ class PriorErrors:
         if wanted is None:
             return errors, np.zeros((0, terms.size))
 
-        jacobian = np.zeros((here.size, terms.size))
-        for index in np.flatnonzero(wanted).tolist():
-            moved = terms.copy()
-            moved[index] += (step := STEP * scales[index])
-            jacobian[:, index] = (residuals(moved, origin) - here) / step
+        jacobian, places = np.zeros((here.size, terms.size)), np.flatnonzero(wanted).tolist()
+        jacobian[:, places] = differences(
+            lambda moved: residuals(moved, origin), terms, STEP * scales, places
+        )
         jacobian -= np.outer(by_origin, by_origin @ jacobian) / float(by_origin @ by_origin)
         return errors, np.concatenate([jacobian, np.diag(smoothing)])
 

@@ -18,6 +18,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import powers_of
 from mckibben.blocks.coupled.balance_law import coordinate_at
 from mckibben.blocks.coupled.balance_terms import Indices
+from mckibben.blocks.derivatives import differences
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Contact, PiecewiseLinear
@@ -238,18 +239,15 @@ class Problem:
         self, structure: Structure, z: Array, run: Run, kinds: list[str], new: Mask | None
     ) -> Array:
         """Return derivatives of acting pressures by front parameters, shape (t, muscles, kinds)."""
-        n, found = len(structure.terms), []
-        for kind in kinds:
-            place = structure.free(kind).start
+        n, steps = len(structure.terms), np.zeros(z.size)
+        places = [structure.free(kind).start for kind in kinds]
+        for place in places:
             far = FIRST_STEP if new is not None and new[place] else STEP
-            moved = z.copy()
-            moved[place] += (step := self._step(structure, z, place, far))
-            acting = (
-                self.acting(run, structure, structure.expanded(one[:n])) for one in (moved, z)
-            )
-            found.append(np.subtract(*acting) / step)
-        shape = (*run.driven.shape, len(kinds))
-        return np.stack(found, axis=2) if found else np.zeros(shape)
+            steps[place] = self._step(structure, z, place, far)
+        return differences(
+            lambda moved: self.acting(run, structure, structure.expanded(moved[:n])),
+            z, steps, places,
+        )  # fmt: skip
 
     def _step(self, structure: Structure, z: Array, place: int, share: float) -> float:
         """Return the finite-difference step of a parameter, away from its bounds."""

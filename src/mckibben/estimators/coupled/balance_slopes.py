@@ -177,6 +177,17 @@ def by_shape(
                 to[to.size - dp.size + f] += h * wall * dp[f]
 
 
+@inlined
+def by_least_area(c: Array, k: int, y: float, p: float, terms: Array, to: Array) -> None:
+    """Replace a taut muscle's derivatives by its area where that is at its least, relative to rest."""
+    first = terms_at(c, k) + int(c[at.AREA])
+    least, column = LEAST_AREA * c[first], first - coordinate_at(c, 0)
+    taut = terms[int(c[at.N_TERMS]) + at.BLADDER] != 0.0
+    if least > 0.0 and taut and not area(c, k, y)[0] > least:
+        to[column : column + int(c[at.N_AREAS])] = 0.0
+        to[column] = -LEAST_AREA * p
+
+
 # -- derivatives through the past ---------------------------------------------------------------------
 
 
@@ -277,11 +288,20 @@ def carry(
 
 @inlined
 def approach(
-    c: Array, state: Array, way: int, q: Array, x: Array, p: Array, rows: Array, work: Array
+    c: Array,
+    state: Array,
+    way: int,
+    q: Array,
+    x: Array,
+    p: Array,
+    sloped: bool,
+    rows: Array,
+    work: Array,
 ) -> None:
-    """Approach equilibrium, and fill the last step, yet to be taken, and the inverse of the slopes.
+    """Solve for equilibrium by Newton's method from where coordinates are, or by `solve_equilibrium`.
 
-    By Newton's method from where coordinates are, or, where that does not end, `solve_equilibrium`.
+    If slopes are wanted, fill the terms of the last muscle and the inverse of the slopes there: a step
+    before, they would be as far off as the step is long.
     """
     n, m = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES])
     residual, step = work[:m], work[m : 2 * m]
@@ -291,22 +311,23 @@ def approach(
         if turn == FEW_STEPS:
             fill(q, state)
             solve_equilibrium(c, state, way, q, x, p, work)
+            break
         left = unbalanced(c, state, way, q, x, p, work)
-        for i in range(m):
-            for j in range(m):
-                step[j] = 1.0 if i == j else 0.0
-                fill(copied[j], matrix[j])
-            eliminate(copied, step)
-            for j in range(m):
-                inverse[j, i] = step[j]
+        eliminate(matrix, residual)
         for j in range(m):
-            step[j] = 0.0
-            for i in range(m if turn < FEW_STEPS else 0):
-                step[j] -= inverse[j, i] * residual[i]
+            q[j] -= residual[j]
         if left <= CLOSE:
-            return
+            break
+    if not sloped:
+        return
+    unbalanced(c, state, way, q, x, p, work)
+    for i in range(m):
         for j in range(m):
-            q[j] += step[j]
+            step[j] = 1.0 if i == j else 0.0
+            fill(copied[j], matrix[j])
+        eliminate(copied, step)
+        for j in range(m):
+            inverse[j, i] = step[j]
 
 
 @inlined
@@ -314,7 +335,6 @@ def slopes_at_past(
     c: Array,
     state: Array,
     way: int,
-    held: bool,
     q: Array,
     x: Array,
     p: Array,
@@ -344,11 +364,12 @@ def slopes_at_past(
         by_force[:] = 0.0
         own = terms_at(c, k)
         fill(by_force[own - first : own - first + width], terms)
+        by_least_area(c, k, y, p[k], terms, by_force)
         own_late, to = late[k * n_l : (k + 1) * n_l], by_force[shape:]
         by_shape(c, k, state, way, y, p[k], x, dp[k], terms, own_late, to)
         if way != AT_REST:
             through_past(c, k, terms, past, moved, by_force)
-        if way == IN_TIME and not held and c[at.RATE] > 0.0 and c[own + at.LINE] > 0.0:
+        if way == IN_TIME and c[at.RATE] > 0.0 and c[own + at.LINE] > 0.0:
             through_line(c, k, state, terms, moved, by_force)
         for j in range(m):
             pull = c[muscle_at(c, k) + at.WAYS + j]
@@ -402,8 +423,8 @@ def follow(
         Coefficients of the block.
     driven, measured, x : arrays, shapes (t, n), (t, m), (t, s)
         Pressures, coordinates, what schedules and loads.
-    dp : array, shape (t, n, f)
-        How pressures that act move with what acts on them.
+    dp : array, shape (1 + t, n, f)
+        How pressures that act move with what acts on them: none, then those of every sample.
     held : bool
         Whether muscles are where they were measured.
     every : int
@@ -419,12 +440,14 @@ def follow(
     state, rest = scratch[:n_states], scratch[n_states:]
     q, tare, last = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m]
     p, work = rest[3 * m : 3 * m + n], rest[3 * m + n :]
-    step, terms = work[m : 2 * m], work[4 * m + m * m :]
+    terms = work[4 * m + m * m :]
     inverse, tared = rows[2 * n : 2 * n + m, :m], past[past.shape[0] - m :]
     for t in range(-1, driven.shape[0]):
         way = AT_REST if t < 0 else FROM_REST if t == 0 else IN_TIME
         now, place = max(t, 0), max(t, 0) // every
-        fill(p, driven[now] if t >= 0 or (held and c[at.HELD] == 0.0) else p)
+        acts = t >= 0 or (held and c[at.HELD] == 0.0)
+        fill(p, driven[now] if acts else p)
+        by_front = dp[now + 1 if acts else 0]
         for j in range(m):
             ahead = 2.0 * q[j] - last[j] if t > 0 else q[j]
             last[j] = q[j]
@@ -433,13 +456,10 @@ def follow(
             unbalanced(c, state, way, q, x[now], p, work)
             fill(found[place], work)
         else:
-            approach(c, state, way, q, x[now], p, rows, work)
+            approach(c, state, way, q, x[now], p, sloped, rows, work)
         if sloped:
-            slopes_at_past(
-                c, state, way, held, q, x[now], p, dp[now], past, rows, slopes[place], terms
-            )
+            slopes_at_past(c, state, way, q, x[now], p, by_front, past, rows, slopes[place], terms)
         for j in range(m if not held else 0):
-            q[j] += step[j]
             found[place, j] = q[j]
         update_state(c, state, way, q, p, x[now])
         for j in range(m if sloped and not held else 0):
@@ -449,7 +469,7 @@ def follow(
         for j in range(m if sloped and not held else 0):
             fill(slopes[place, j], past[j])
         if sloped:
-            follow_past(c, state, way, p, x[now], dp[now], past, rows)
+            follow_past(c, state, way, p, x[now], by_front, past, rows)
         if held or c[at.TARED] == 0.0:
             continue
         for j in range(m):
@@ -475,6 +495,7 @@ def run(
     n, m, n_l = (int(c[size]) for size in (at.N_MUSCLES, at.N_COORDINATES, at.N_LAGS))
     n_states = int(c[at.TARE]) + m - at.FRESH
     dp = np.zeros((len(driven), n, 0)) if dp is None else dp
+    dp = np.concatenate([np.zeros((1, n, dp.shape[2])), dp])
     n_c = (c.size - coordinate_at(c, 0) + n_shape(c) + dp.shape[2]) * sloped
     kept = -(-len(driven) // every)
     found, slopes = np.empty((kept, m)), np.zeros((kept, m, n_c))

@@ -26,6 +26,7 @@ from annotated_types import Interval
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
+from mckibben.blocks.derivatives import relative_sizes
 from mckibben.blocks.dynamics.narx import (
     Narx,
     NarxNetwork,
@@ -37,7 +38,6 @@ from mckibben.blocks.kernels import kernel
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, SearchEstimator
-from mckibben.estimators.core.free_runs import relative_sizes
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker

@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import ModelError
-from mckibben.blocks import jacobian as module
+from mckibben.blocks import derivatives as module
 from mckibben.blocks.base import Block
 from mckibben.blocks.complex_step import twin
+from mckibben.blocks.derivatives import Tangents, derivatives
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.jacobian import Tangents, jacobian
 from mckibben.blocks.laws import input_limits, wander
 from mckibben.registry import load, names
 from mckibben.system.compiling import deferred
@@ -68,8 +68,7 @@ def test_derivatives_are_those_of_extrapolated_differences(kind: str) -> None:
         inputs = path(block)
         outputs = block.simulate(inputs, sample_time=TIME)
         span = np.ptp(outputs, axis=0).max()
-        tangents = Tangents(block, TIME)
-        same, slopes = tangents.over(inputs, tangents.start(inputs[0]))
+        same, slopes = Tangents(block, TIME).over(inputs)
         np.testing.assert_allclose(same, outputs, rtol=0, atol=1e-12 * max(span, 1e-9))
         smooth = []
         for place, value in enumerate(block.pack().tolist()):
@@ -89,31 +88,49 @@ def test_derivatives_are_those_of_extrapolated_differences(kind: str) -> None:
 def test_the_sizes_of_steps_do_not_matter(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     for block in both_ways(kind):
         inputs = path(block)
-        slopes = jacobian(block, inputs, TIME)
+        slopes = derivatives(block, inputs, TIME)
         largest = np.abs(slopes).max()
         monkeypatch.setattr(module, "STEP", 1e-150)
-        np.testing.assert_allclose(jacobian(block, inputs, TIME), slopes, atol=1e-13 * largest)
+        np.testing.assert_allclose(derivatives(block, inputs, TIME), slopes, atol=1e-13 * largest)
         monkeypatch.setattr(module, "CHANGES", (3e-3, 2e-4))
-        np.testing.assert_allclose(jacobian(block, inputs, TIME), slopes, atol=1e-10 * largest)
+        np.testing.assert_allclose(derivatives(block, inputs, TIME), slopes, atol=1e-10 * largest)
         monkeypatch.undo()
 
 
-def test_stretches_parts_and_starts_given_agree_with_the_whole() -> None:
+def test_some_columns_and_starts_given_agree_with_the_whole() -> None:
     block = load("blocks", "gpi").example()
     inputs = path(block)
-    whole = jacobian(block, inputs)
-    np.testing.assert_array_equal(jacobian(block, inputs, places=[3, 1]), whole[:, :, [3, 1]])
-    tangents = Tangents(block, None)
-    states = tangents.start(inputs[0])
-    pieces = [tangents.over(piece, states)[1] for piece in (inputs[:20], inputs[20:])]
-    np.testing.assert_array_equal(np.concatenate(pieces), whole)
+    whole = derivatives(block, inputs)
+    np.testing.assert_array_equal(derivatives(block, inputs, places=[3, 1]), whole[:, :, [3, 1]])
     given = block.initial_state(inputs[0], "virgin").tolist()
-    started = jacobian(block, inputs, initial=given)
-    np.testing.assert_array_equal(started, jacobian(block, inputs, initial="virgin"))
-    none = Tangents(block, None, ())
-    outputs, nothing = none.over(inputs, none.start(inputs[0]))
-    assert nothing.shape == (len(inputs), 1, 0)
-    np.testing.assert_allclose(outputs, block.simulate(inputs), atol=1e-13)  # sums in order
+    started = derivatives(block, inputs, initial=given)
+    np.testing.assert_array_equal(started, derivatives(block, inputs, initial="virgin"))
+    assert derivatives(block, inputs, places=()).shape == (len(inputs), 1, 0)
+
+
+def test_a_start_that_depends_on_parameters_has_its_derivatives() -> None:
+    block = load("blocks", "gpi").example()
+    inputs = path(block)
+
+    def begun(other: Block) -> Array:
+        return other.initial_state(inputs[0])
+
+    np.testing.assert_allclose(
+        derivatives(block, inputs, initial=begun), derivatives(block, inputs), atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("kind", ["gpi", "creep", "narx-polynomial", "series"])
+def test_what_has_no_complex_step_has_differences(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    block = load("blocks", kind).example()
+    inputs = path(block)
+    exact = derivatives(block, inputs, TIME)
+    monkeypatch.setattr(Block, "complex_step", False)
+    near = derivatives(block, inputs, TIME)
+    assert not np.array_equal(near, exact)
+    np.testing.assert_allclose(near, exact, atol=1e-4 * np.abs(exact).max())
 
 
 @deferred

@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given
 
 from mckibben.blocks.coupled import balance_terms
-from mckibben.blocks.coupled.balance import Balance, resized
+from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_terms import LIMITS, LINEAR, NONLINEAR, TABLE, Sizes
 from mckibben.blocks.fields import rows
 from mckibben.export.c.translator import Translation
+from mckibben.muscles.scaling import resized
 from tests.blocks.balances import STEP, balances
 
 ANY = balances() | balances(heavy=True) | balances(crowded=True) | balances(crowded=True, driven=1)

@@ -607,34 +607,6 @@ class Balance(Invertible):
         )
 
 
-def resized(
-    balance: Balance, *, area: float = 1.0, length: float = 1.0, pressure: float = 1.0
-) -> Balance:
-    """Return a balance with areas, lengths and pressures times these, and forces in proportion.
-
-    Loads pull as they did.
-    """
-    force = area * pressure
-    sizes = {"": 1.0, "N": force, "N/bar": area, "bar": pressure, "mm": length}
-    sizes |= {"mm/bar": length / pressure}
-    stiffness = force / length
-    tiles = {
-        "springs": [force, *len(balance.driven) * [stiffness]],
-        "obstacles": [1.0, length, *(1 + balance.n_schedules) * [stiffness]],
-    }
-    units = {name: TABLE[name].unit for name in Balance.parameters if name != "loads"}
-    units |= {"limits": "mm/bar", "hull": "mm", "scale": "mm", "preload": "bar", "drive": "bar"}
-    changed: dict[str, Any] = {}
-    for name, unit in units.items():
-        value = np.array(getattr(balance, name) or (), dtype=np.float64)
-        if value.size:
-            by = np.array(tiles.get(name, [sizes.get(unit, stiffness)]))
-            changed[name] = rows(value * np.resize(by, value.shape[-1:]))
-    if balance.pressure_range is not None:
-        changed["pressure_range"] = tuple(pressure * end for end in balance.pressure_range)
-    return replace(balance, **changed)
-
-
 class Placed(NamedTuple):
     """A balance, its direction in the model, and the parts before and after it."""
 

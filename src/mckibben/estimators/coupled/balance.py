@@ -19,7 +19,7 @@ from annotated_types import Gt, Interval
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.coupled.balance import Balance, balance_in, resized
+from mckibben.blocks.coupled.balance import Balance, balance_in
 from mckibben.blocks.coupled.balance_terms import TABLE
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import rows, vector
@@ -54,6 +54,7 @@ from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
 from mckibben.estimators.coupled.base import CoupledEstimator, of_channels
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.muscles.scaling import resized
 from mckibben.muscles.traits import TRAVELS
 from mckibben.recording import Recording, listed
 

@@ -290,12 +290,13 @@ def resistance(
     polynomial_terms(c, k, y, p, terms)
     lag_terms(c, k, state, way, y, terms)
     force, slope, size = rubbed - p * a, -p * narrowing, abs(rubbed) + abs(p * a)
+    of_area, stop, lag = int(c[at.AREA]), int(c[at.STOP]), int(c[at.LAG])
     for i in range(width):
-        if i < int(c[at.AREA]) or i >= int(c[at.LAG]):
+        if i < of_area or i >= lag:
             part = c[place + i] * terms[i]
             force += part
             size += abs(part)
-        if i < int(c[at.AREA]) or i >= int(c[at.STOP]):
+        if i < of_area or i >= stop:
             slope += c[place + i] * terms[width + i]
     return force, slope, size
 
@@ -500,12 +501,12 @@ def start_at_rest(c: Array, state: Array, x: Array, q: Array, p: Array, work: Ar
 @kernel
 def held_force(c: Array, k: int, state: Array, way: int, y: float, terms: Array) -> float:
     """Return what muscle k resists with at no pressure, without friction."""
-    place, held = terms_at(c, k), 0.0
+    place, of_area, lag, held = terms_at(c, k), int(c[at.AREA]), int(c[at.LAG]), 0.0
     dynamic_terms(c, k, state, way, y, terms)
     polynomial_terms(c, k, y, 0.0, terms)
     lag_terms(c, k, state, way, y, terms)
     for i in range(int(c[at.N_TERMS])):
-        if i < int(c[at.AREA]) or i >= int(c[at.LAG]):
+        if i < of_area or i >= lag:
             held += c[place + i] * terms[i]
     return held
 

@@ -290,8 +290,7 @@ class Problem:
         start[:n] = 0.0
         whole, target = self._forces(structure, start, chosen)
         bounded = np.zeros(whole.shape[2], dtype=bool)
-        bounded[: chosen.size] = (structure.not_negative @ structure.mix > 0)[chosen]
-        bounded[: chosen.size] &= [terms[i].muscle is None for i in chosen]
+        bounded[: chosen.size] = structure.bounded[chosen]
         means = np.einsum("tjc,tj->c", whole[..., narrowing], target) / float((target**2).sum())
         whole[..., narrowing] -= means * target[..., np.newaxis]
         table = np.concatenate([whole, target[..., np.newaxis]], axis=2)

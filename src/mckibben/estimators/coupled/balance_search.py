@@ -58,9 +58,6 @@ DEVIATIONS = (("areas",), ("elasticity", "bladders"), ("friction",), ("relaxatio
 NEW_SHAPE = tuple(name for name in NONLINEAR if TABLE[name].option == name)
 """Nonlinear parameters that are added alone."""
 
-POSITIVE_SHAPE = {name for name in NONLINEAR if TABLE[name].least == 0.0} - {"pushes"}
-"""Non-negative nonlinear parameters; forces of slackening start from a model without."""
-
 
 @dataclass
 class Search:
@@ -235,7 +232,7 @@ class Search:
         (grams, folds), likely = self._grams(z, wanted, new), self._likely(z, wanted)
         apart = [folds != fold for fold in range(FOLDS)]
         others = np.array([grams[out if out.any() else ~out].sum(axis=0) for out in apart]) + likely
-        bounded = self._bounded(z.size)
+        bounded = np.append(structure.bounded, np.zeros(z.size - n, dtype=bool))
         known: dict[bytes, Array] = {}
 
         def missed(active: Mask) -> Array:
@@ -317,17 +314,6 @@ class Search:
             table[:, : by.shape[1]] = by
             table[:, -1] = by @ z[: by.shape[1]] - far
         return np.asarray(table.T @ table)
-
-    def _bounded(self, size: int) -> Mask:
-        """Return which unknowns are non-negative."""
-        bounded = np.zeros(size, dtype=bool)
-        bounded[: self.structure.mix.shape[1]] = (
-            self.structure.not_negative @ self.structure.mix > 0
-        )
-        for place, term in enumerate(self.structure.terms):
-            shaped = term.kind in POSITIVE_SHAPE
-            bounded[place] = (bounded[place] or shaped) and term.muscle is None
-        return bounded
 
     def _candidates(self, active: Mask, z: Array) -> Iterator[Mask]:
         """Yield candidate groups of terms beyond the active ones."""

@@ -324,6 +324,13 @@ class Structure:
             mask[self.at[name]] = TABLE[name].least == 0.0
         return mask
 
+    @cached_property
+    def bounded(self) -> NDArray[np.bool_]:
+        """Mask of the non-negative free parameters; slackening starts from a model without."""
+        shape = [TABLE[name].least == 0.0 and name != "pushes" for name, _, _ in self.terms]
+        shape[: self.mix.shape[1]] = self.not_negative @ self.mix > 0
+        return np.array(shape) & np.array([muscle is None for _, _, muscle in self.terms])
+
     def expanded(self, free: Array) -> Array:
         """Return all values from the free ones."""
         n = self.mix.shape[1]

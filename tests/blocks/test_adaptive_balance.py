@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben.blocks.adaptive import Adaptive, adaptive
-from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_adaptive import FRICTION, STIFFNESS, adaptable_of, ratios
+from mckibben.blocks.coupled.balance import FRICTION, STIFFNESS, Balance, adaptable_of, ratios
 from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.laws import wander
 from tests.blocks.balances import ALONE, CROWDED, HIGHEST, STEP, balances, in_series

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,9 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.complex_step import STEP, twin
 from mckibben.blocks.coupled import balance_law as law
+from mckibben.blocks.coupled import balance_terms as at
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance_terms import LINEAR
 from mckibben.blocks.fields import rows
 from mckibben.blocks.laws import wander
 from mckibben.estimators.coupled.balance_slopes import run
@@ -125,71 +128,53 @@ def driving(block: Balance) -> tuple[Array, Array, Array, Array]:
 
 def columns(block: Balance, c: Array) -> Iterator[tuple[int, Array]]:
     """Yield every column of slopes that a parameter moves, and how coefficients move with it."""
-    n, m, n_x, n_l = len(block.given), len(block.driven), block.n_schedules, len(block.lags)
-    first, met = int(law.coordinate_at(c, 0)), 3 + n_x
-    size = c.size - first
+    places, column = block.places.at, count(c.size - int(block.places.at["springs"].min()))
+    first, met = int(places["springs"].min()), places["obstacles"].reshape(-1, block.sizes.obstacle)
 
-    def unit(*places: int) -> Array:
+    def unit(*moved: int) -> Array:
         moves = np.zeros(c.size)
-        moves[list(places)] = 1.0
+        moves[list(moved)] = 1.0
         return moves
 
-    ends = [int(law.coordinate_at(c, j + 1)) for j in range(m)]
-    met_at = [
-        ends[j] - met * (block.n_obstacles - i) for j in range(m) for i in range(block.n_obstacles)
-    ]
-    of_coordinates = set(range(first, ends[-1])) - {at + i for at in met_at for i in (0, 1)}
-    muscles = [int(law.muscle_at(c, k)) for k in range(n)]
-    width, before = int(law.n_terms(c)), law.OWN + m
-    of_muscles = {at + before + i for at in muscles for i in range(width)}
-    for place in sorted(of_coordinates | of_muscles):
+    names = {*LINEAR["coordinate"], *LINEAR["muscle"]} - {"obstacles"}
+    linear = [*(places[name] for name in names), met[:, at.STIFFNESS :]]
+    for place in sorted(np.concatenate([each.ravel() for each in linear]).tolist()):
         yield place - first, unit(place)
-    head, n_s = law.HEAD, len(block.limits)
-    yield size, unit(11)
-    for s in range(n_x):
-        yield size + 1 + s, unit(head + n_s + 2 * n_l + s)
-    yield size + 1 + n_x, c[12] * unit(12)
-    for i, lag in enumerate(block.lags):
-        decay, gain, moves = np.exp(-TIME / lag), c[head + n_s + n_l + i], np.zeros(c.size)
-        moves[head + n_s + i] = decay * TIME / lag
-        moves[head + n_s + n_l + i] = gain - decay
-        yield size + 2 + n_x + i, moves
-    yield size + 2 + n_x + n_l, unit(*(at + 2 for at in muscles))
-    for k, at in enumerate(muscles):
-        yield size + 3 + n_x + n_l + k, unit(at + 3)
-    for number, at in enumerate(met_at):
-        yield size + 3 + n_x + n_l + n + number, unit(at + 1)
+    yield next(column), unit(at.OFFSET)
+    for place in places["friction_slopes"].ravel().tolist():
+        yield next(column), unit(place)
+    yield next(column), c[at.RATIO] * unit(at.RATIO)
+    changes = (places[name].ravel().tolist() for name in ("decays", "gains"))
+    own = zip(block.lags, *changes, strict=True)
+    for lag, of_decay, of_gain in own:
+        decay = np.exp(-TIME / lag)
+        moves = decay * TIME / lag * unit(of_decay) + (c[of_gain] - decay) * unit(of_gain)
+        yield next(column), moves
+    yield next(column), unit(*places["walls"].ravel().tolist())
+    for place in (*places["pushes"].ravel(), *met[:, at.PLACE]):
+        yield next(column), unit(place)
 
 
 def stepped(c: Complex, p: Complex, q: Array, x: Array, *, held: bool) -> Complex:
     """Return what `run` finds, by the kernels of the law for complex numbers."""
-    n, m, n_s, n_l = (int(c[i].real) for i in (0, 1, 5, 6))
-    moves = 2 if c[18] != 0.0 else 0
-    state = np.zeros(n * (1 + n_s + n_l + moves) + 2 * m + 2, np.complex128)
-    width = 2 * int(law.n_terms(c.real))
-    x, terms = x.astype(np.complex128), np.zeros(width, np.complex128)
-    matrix, sizes = np.zeros((m, m), np.complex128), np.zeros(m, np.complex128)
-    work = np.zeros(4 * m + m * m + width, np.complex128)
-    here, none, tare = (
-        np.zeros(m, np.complex128),
-        np.zeros(n, np.complex128),
-        np.zeros(m, np.complex128),
-    )
+    m = int(c[at.N_COORDINATES].real)
+    state = np.zeros(int(c[at.TARE].real) + m + 2, np.complex128)
+    x, work = x.astype(np.complex128), np.zeros(int(law.work_size(c.real)), np.complex128)
+    here, none, tare = (np.zeros(size, np.complex128) for size in (m, p.shape[1], m))
     found = np.zeros((len(p), m), np.complex128)
     for t in range(-1, len(p)):
         way = law.AT_REST if t < 0 else law.FROM_REST if t == 0 else law.IN_TIME
         now = max(t, 0)
-        pushed = p[now] if t >= 0 or (held and c[22] == 0.0) else none
+        pushed = p[now] if t >= 0 or (held and c[at.HELD] == 0.0) else none
         if held:
             here = q[now].astype(np.complex128)
-            twin(law.unbalanced)(
-                c, state, way, here, x[now], pushed, found[now], matrix, sizes, terms
-            )
+            twin(law.unbalanced)(c, state, way, here, x[now], pushed, work)
+            found[now] = work[:m]
         else:
             twin(law.solve_equilibrium)(c, state, way, here, x[now], pushed, work)
             found[now] = here
         twin(law.update_state)(c, state, way, here, pushed, x[now])
-        if not held and c[16] != 0.0:
+        if not held and c[at.TARED] != 0.0:
             tare = here.copy() if t < 0 else tare
             found[now] -= tare
     return found

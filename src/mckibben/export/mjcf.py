@@ -22,6 +22,7 @@ import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import Balance, balance_in
+from mckibben.blocks.coupled.balance_terms import TABLE
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.errors import ModelError, require
 from mckibben.export.naming import identifier
@@ -154,11 +155,9 @@ def carried(model: Block) -> Balance:
         and any(balance.friction[0])
         and balance.friction_offset < CONSTANT * highest,
         "friction that differs by direction": balance.asymmetry not in (None, 1.0),
-        "relaxation": any(balance.relaxation[0]),
-        "stretch of the wall": any(balance.walls),
-        "resistance of the line": any(balance.lines),
-        "mass": any(balance.mass),
-        "slackness": bool(balance.pushes),
+    } | {
+        TABLE[name].label: bool(np.any(getattr(balance, name) or 0.0))
+        for name in ("relaxation", "walls", "lines", "mass", "pushes")
     }
     if found := [what for what, there in lacking.items() if there]:
         raise ModelError(f"MJCF does not carry {', '.join(found)}", remedy=again)

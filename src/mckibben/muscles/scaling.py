@@ -9,12 +9,13 @@ about the same.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.fields import rows, vector
+from mckibben.blocks.coupled.balance_terms import TABLE
+from mckibben.blocks.fields import rows
 from mckibben.muscles.sheet import Sheet
 
 
@@ -31,38 +32,32 @@ def scaled(balance: Balance, of: Sheet, to: Sheet) -> Balance:
     length = to.stroke / of.stroke
     pressure = to.max_pressure_bar / of.max_pressure_bar
     area = to.area / of.area if balance.n_loads else 1.0  # else in units of the area at rest
+    return replace(resized(balance, area=area, length=length, pressure=pressure), known=())
+
+
+def resized(
+    balance: Balance, *, area: float = 1.0, length: float = 1.0, pressure: float = 1.0
+) -> Balance:
+    """Return a balance with areas, lengths and pressures times these, and forces in proportion.
+
+    Loads pull as they did.
+    """
     force = area * pressure
-    per_length = force / length
-
-    def times(table: object, by: float | Array) -> tuple[tuple[float, ...], ...]:
-        made: tuple[tuple[float, ...], ...] = rows(by * np.array(table))
-        return made
-
-    springs = np.array(balance.springs)
-    springs[:, 0] *= force
-    springs[:, 1:] *= per_length
-    span = balance.pressure_range
-    return replace(
-        balance,
-        springs=rows(springs),
-        elasticity=times(balance.elasticity, force),
-        areas=times(balance.areas, area),
-        friction=times(balance.friction, per_length),
-        relaxation=times(balance.relaxation, per_length),
-        damping=vector(per_length * np.array(balance.damping)),
-        lines=vector(per_length * np.array(balance.lines)),
-        walls=vector(length / pressure * np.array(balance.walls)),
-        limits=vector(length / pressure * np.array(balance.limits)),
-        friction_offset=balance.friction_offset * pressure,
-        friction_slopes=vector(pressure * np.array(balance.friction_slopes)),
-        obstacles=times(balance.obstacles, np.tile((1.0, length, per_length), balance.n_obstacles)),
-        preload=balance.preload * pressure,
-        drive=times(balance.drive, pressure),
-        hull=times(balance.hull, length),
-        scale=balance.scale * length,
-        bladders=vector(per_length * np.array(balance.bladders)),
-        pushes=vector(force * np.array(balance.pushes)),
-        mass=vector(per_length * np.array(balance.mass)),
-        pressure_range=None if span is None else (span[0] * pressure, span[1] * pressure),
-        known=(),
-    )
+    sizes = {"": 1.0, "N": force, "N/bar": area, "bar": pressure, "mm": length}
+    sizes |= {"mm/bar": length / pressure}
+    stiffness = force / length
+    tiles = {
+        "springs": [force, *len(balance.driven) * [stiffness]],
+        "obstacles": [1.0, length, *(1 + balance.n_schedules) * [stiffness]],
+    }
+    units = {name: TABLE[name].unit for name in Balance.parameters if name != "loads"}
+    units |= {"limits": "mm/bar", "hull": "mm", "scale": "mm", "preload": "bar", "drive": "bar"}
+    changed: dict[str, Any] = {}
+    for name, unit in units.items():
+        value = np.array(getattr(balance, name) or (), dtype=np.float64)
+        if value.size:
+            by = np.array(tiles.get(name, [sizes.get(unit, stiffness)]))
+            changed[name] = rows(value * np.resize(by, value.shape[-1:]))
+    if balance.pressure_range is not None:
+        changed["pressure_range"] = tuple(pressure * end for end in balance.pressure_range)
+    return replace(balance, **changed)

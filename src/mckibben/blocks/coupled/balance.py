@@ -21,9 +21,10 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
-from itertools import pairwise
-from typing import Annotated, ClassVar, NamedTuple, Self
+from itertools import pairwise, product
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from annotated_types import Gt, Interval
@@ -33,22 +34,37 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Block, Ports, Start
 from mckibben.blocks.compose import Series
-from mckibben.blocks.coupled.balance_adaptive import learnable_balance
+from mckibben.blocks.coupled import balance_terms as at
+from mckibben.blocks.coupled.balance_adaptive import (
+    AREA_HIGH,
+    AREA_LOW,
+    BEHIND,
+    BY_AREA,
+    FACTOR_OF,
+    FIRST,
+    FORCE,
+    HIGH,
+    LOW,
+    ROW,
+    balance_adaptive_start,
+    balance_adaptive_step,
+    retune,
+)
 from mckibben.blocks.coupled.balance_law import (
     AT_REST,
     FROM_REST,
     IN_TIME,
     NEARLY,
-    NEVER,
     give_pressures,
     solve_equilibrium,
     start_at_rest,
     start_balance,
     update_state,
 )
-from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.coupled.balance_terms import NEVER, TABLE, Layout, Sizes, layout
+from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector, rows, vector
 from mckibben.blocks.inverse import Inverse, Invertible
-from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.kernels import Step, fill, kernel, step
 from mckibben.blocks.learning import Learnable
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.ranges import unknown
@@ -62,7 +78,7 @@ def balance_step(
 ) -> None:
     """Compute pressures; the last state counts samples that are out of reach."""
     c = coefficients
-    m, n_x = int(c[1]), int(c[2]) + int(c[4])
+    m, n_x = int(c[at.N_COORDINATES]), int(c[at.N_SCHEDULES]) + int(c[at.N_LOADS])
     way = give_pressures(c, state, scratch, inputs, outputs)
     update_state(c, state, way, scratch[:m], outputs, inputs[m : m + n_x])
 
@@ -73,17 +89,17 @@ def balance_inverse_step(
 ) -> None:
     """Compute coordinates; the last state counts samples that were not solved."""
     c = coefficients
-    n, m, n_x = int(c[0]), int(c[1]), int(c[2]) + int(c[4])
+    n, m = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES])
+    n_x = int(c[at.N_SCHEDULES]) + int(c[at.N_LOADS])
     q, p, x = scratch[:m], inputs[:n], inputs[n : n + n_x]
-    for j in range(m):
-        q[j] = state[j]
-    way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
+    fill(q, state)
+    way = FROM_REST if state[at.FRESH] != 0.0 else IN_TIME
     left = solve_equilibrium(c, state, way, q, x, p, scratch[m:])
     update_state(c, state, way, q, p, x)
     for j in range(m):
-        outputs[j] = q[j] - state[state.size - 2 - m + j]
+        outputs[j] = q[j] - state[int(c[at.TARE]) + j]
     if not left < NEARLY:
-        state[state.size - 1] += 1.0
+        state[at.FAILED] += 1.0
 
 
 @kernel
@@ -92,12 +108,17 @@ def balance_inverse_start(
 ) -> None:
     """Start muscles at rest without pressure, or in equilibrium with the first pressures."""
     c = coefficients
-    n, m, n_x = int(c[0]), int(c[1]), int(c[2]) + int(c[4])
+    n, m = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES])
+    n_x = int(c[at.N_SCHEDULES]) + int(c[at.N_LOADS])
     p, x, q = inputs[:n], inputs[n : n + n_x], scratch[:m]
     start_at_rest(c, state, x, q, scratch[m : m + n], scratch[m + n :])
     if virgin:
         solve_equilibrium(c, state, AT_REST, q, x, p, scratch[m + n :])
         update_state(c, state, AT_REST, q, p, x)
+
+
+NEEDED = ("springs", "elasticity", "areas", "friction", "relaxation", "loads", "damping", "walls")
+"""Fields that are not optional."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -202,25 +223,10 @@ class Balance(Invertible):
     notation: ClassVar[Notation] = Notation(
         r"A_k(y) = \sum_i a_{ki} (y / L)^i,\quad E_k(y) = b_k y + \sum_{i \ge 2} e_{ki} "
         "(y / L)^i",
-        springs="S_{ki}",
-        elasticity="e_{ki} from 2 [N]",
-        areas="a_{ki} from 0 [N/bar]",
-        friction="h_{km} [N/mm]",
-        relaxation=r"\kappa_{kl} [N/mm]",
-        loads="C_{kl}",
-        damping="d_k [N s/mm]",
-        lines="l_k [N s/mm]",
-        walls="w_k [mm/bar]",
+        **{name: f"{TABLE[name].symbol} [{TABLE[name].unit}]" for name in parameters},
         limits="r_m [mm/bar]",
-        friction_offset="p_0 [bar]",
         lags=r"\tau_l [s]",
         scale="L [mm]",
-        bladders="b_k [N/mm]",
-        pushes="P_k [N]",
-        mass="m_k [N s^2/mm]",
-        asymmetry=r"\rho",
-        friction_slopes="g_i",
-        obstacles="o_{ki}",
         directions="W_{ki}",
         preload="p_s [bar]",
         drive="D_{ki} [bar]",
@@ -269,128 +275,95 @@ class Balance(Invertible):
     def _check_sizes(self) -> None:
         """Raise an error for fields of inconsistent sizes."""
         n, m, n_x = len(self.given), len(self.driven), self.n_schedules
-        if n_x < 0:
-            raise ModelError(
-                f"{self.kind!r} has {self.n_loads} loads, and {len(self.scheduled)} "
-                "channels that schedule or load it",
-                remedy="give every load a channel, behind what schedules",
+        self._refuse(
+            n_x < 0,
+            f"has {self.n_loads} loads, and {len(self.scheduled)} channels that schedule or load it",
+            "give every load a channel, behind what schedules",
+        )
+        self._refuse(
+            m > n or (m < n and not self.directions),
+            f"has {n} pressures of {m} coordinates",
+            "give a pressure for every coordinate, or, of more muscles, their directions",
+        )
+        self._refuse(
+            bool(self.drive) and m == n,
+            "has a drive, and no more muscles than coordinates",
+            "leave it out: their pressures follow from the coordinates",
+        )
+        shapes: dict[str, tuple[int, ...]] = {"hull": (n, 2)}
+        for name in self.parameters:
+            count, width = self.sizes.of(TABLE[name].of), self.sizes.number(TABLE[name].width)
+            if isinstance(value := getattr(self, name), tuple) and (value or name in NEEDED):
+                of_rows = TABLE[name].of != "all" and TABLE[name].width != "one"
+                shapes[name] = (count, width) if of_rows else (count * width,)
+        shapes |= {"directions": (n, m)} if self.directions else {}
+        shapes |= {"drive": (n, max(len(self.drive[0]), 1 + m))} if self.drive else {}
+        shapes |= {"known": (len(self.scheduled), 2)} if self.known else {}
+        for name, (count, *widths) in shapes.items():
+            value = getattr(self, name)
+            each = [len(row) for row in value if widths]
+            self._refuse(
+                len(value) != count or each != count * widths,
+                f"has {name} of {len(value)}{f' rows of {each}' * bool(widths)}",
+                f"give {count}{''.join(f' rows of {width}' for width in widths)}",
             )
-        if m > n or (m < n and not self.directions):
-            raise ModelError(
-                f"given of {self.kind!r} are {n} pressures of {m} coordinates",
-                remedy="give a pressure for every coordinate, or, of more muscles, their "
-                "directions",
-            )
-        if self.drive and m == n:
-            raise ModelError(
-                f"{self.kind!r} has a drive, and no more muscles than coordinates",
-                remedy="leave it out: their pressures follow from the coordinates",
-            )
-        widths = {
-            "springs": (m, (1 + n_x * self.degree) * (1 + m)),
-            "elasticity": (n, len(self.elasticity[0]) if self.elasticity else 0),
-            "areas": (n, max(len(self.areas[0]) if self.areas else 0, 1)),
-            "friction": (n, len(self.limits)),
-            "relaxation": (n, len(self.lags)),
-            "loads": (m, self.n_loads),
-            "hull": (n, 2),
-        }
-        if self.obstacles:
-            widths["obstacles"] = (m, self.n_obstacles * (3 + n_x))
-        if self.directions:
-            widths["directions"] = (n, m)
-        if self.drive:
-            widths["drive"] = (n, max(len(self.drive[0]), 1 + m))
-        if self.known:
-            widths["known"] = (len(self.scheduled), 2)
-        for name, (count, width) in widths.items():
-            table = getattr(self, name)
-            if len(table) != count or any(len(row) != width for row in table):
-                raise ModelError(
-                    f"{name} of {self.kind!r} has rows of {[len(row) for row in table]}",
-                    remedy=f"give {count} rows of {width}",
-                )
-        optional = ("lines", "bladders", "pushes", "mass")
-        lengths = dict.fromkeys(("damping", "walls", *optional), n) | {"friction_slopes": n_x}
-        for name, count in lengths.items():
-            values = getattr(self, name)
-            if len(values) != count and (values or name in ("damping", "walls")):
-                raise ModelError(
-                    f"{name} of {self.kind!r} has {len(values)} entries", remedy=f"give {count}"
-                )
 
     def _check_physics(self) -> None:
         """Raise an error for numbers that would generate energy or have no meaning."""
-        if self.pressure_range is not None and not self.pressure_range[0] < self.pressure_range[1]:
-            raise ModelError(
-                f"pressure_range of {self.kind!r} is {self.pressure_range}",
-                remedy="the lower end first",
-            )
-        at_rest = [row[0] for row in self.areas]
-        positive = {"limits": self.limits, "lags": self.lags, "areas at rest": at_rest}
+        low, high = self.pressure_range or (-np.inf, np.inf)
+        ends = {"hull": self.hull, "pressure_range": ((low, high),)}
+        positive = {"lags": self.lags, "areas at rest": [row[0] for row in self.areas]}
+        for name, pairs in ends.items():
+            wrong = any(not lower < upper for lower, upper in pairs)
+            self._refuse(wrong, f"has the {name} {getattr(self, name)}", "give the lower end first")
         for name, values in positive.items():
-            rises = name != "limits" or all(a < b for a, b in pairwise(values))
-            if any(not value > 0 for value in values) or not rises:
-                raise ModelError(
-                    f"{name} of {self.kind!r} are {values}",
-                    remedy=f"give positive ones{', in increasing order' if name == 'limits' else ''}",
-                )
-        stiffnesses = np.reshape(self.obstacles, (-1, 3 + self.n_schedules))[:, 2:]
-        named = {name: getattr(self, name) for name in NOT_NEGATIVE} | {"obstacles": stiffnesses}
-        for name, values in named.items():
-            if any(value < 0 for value in np.ravel(values)):
-                raise ModelError(
-                    f"{name} of {self.kind!r} has a number below 0, which would generate energy",
-                    remedy="give none below 0",
-                )
-        if self.mass and self.pushes:
-            raise ModelError(
-                f"{self.kind!r} has mass and muscles that go slack",
-                remedy="give one of mass and pushes",
+            wrong = any(not value > 0 for value in values)
+            self._refuse(wrong, f"has the {name} {values}", "give positive ones")
+        rises = all(a < b for a, b in pairwise((0.0, *self.limits)))
+        wanted = "give positive ones, in increasing order"
+        self._refuse(not rises, f"has the limits {self.limits}", wanted)
+        for name in self.parameters:
+            numbers = np.array(getattr(self, name) or 0.0, ndmin=2)
+            if name == "obstacles" and self.obstacles:
+                numbers = numbers.reshape(-1, self.sizes.obstacle)[:, at.STIFFNESS :]
+            wrong = TABLE[name].least == 0.0 and bool((numbers < 0).any())
+            self._refuse(
+                wrong, f"has {name} below 0, which would generate energy", "give none below 0"
             )
-        if self.held and self.tare:
-            raise ModelError(
-                f"{self.kind!r} has a tare and starts held",
-                remedy="give one of tare and held",
-            )
-        if any(not low < high for low, high in self.hull):
-            raise ModelError(f"hull of {self.kind!r} is {self.hull}", remedy="lower ends first")
+        both = bool(self.mass and self.pushes)
+        self._refuse(both, "has mass and muscles that go slack", "give one of mass and pushes")
+        both = self.held and self.tare
+        self._refuse(both, "has a tare and starts held", "give one of tare and held")
+
+    def _refuse(self, wrong: bool, what: str, remedy: str) -> None:
+        if wrong:
+            raise ModelError(f"{self.kind!r} {what}", remedy=remedy)
 
     def equations(self) -> tuple[str, ...]:
         """Return the force balance with the terms of this model, then area and elasticity."""
-        schedules, y = self.n_schedules > 0, "q" if self.directions else "y"
-        springs = rf"\sum_j S_{{kj}} {y}_j"
-        if schedules:
-            springs = rf"\sum_q x^q \left(S_{{kq0}} + \sum_j S_{{kqj}} {y}_j\right)"
-        on_coordinates = {
-            r"\sum_l C_{kl} F_l": any(map(any, self.loads)),
-            springs if schedules else rf"S_{{k0}} + {springs}": True,
-            rf"\sum_i o_{{ki3}} \left[{y}_k - o_{{ki2}}\right]_{{o_{{ki1}}}}": bool(self.obstacles),
-        }
-        of_muscles = {
-            "E_k(y_k)": True,
-            r"\sum_m h_{km} s_{km}": any(map(any, self.friction)),
-            r"\sum_l \kappa_{kl} q_{kl}": any(map(any, self.relaxation)),
-            r"d_k \dot{y}_k": any(self.damping),
-            r"l_k \left(\frac{A_k}{a_{k0}}\right)^2 \dot{y}_k": any(self.lines),
-            r"m_k \ddot{y}_k": any(self.mass),
-        }
+        springs = r"S_{k0} + \sum_j S_{kj} y_j"
+        if self.n_schedules > 0:
+            springs = r"\sum_q x^q \left(S_{kq0} + \sum_j S_{kqj} y_j\right)"
+        written = {"springs": springs, "elasticity": TABLE["elasticity"].equation}
+        for name in self.parameters:
+            if np.any(getattr(self, name) or 0.0):
+                written.setdefault(name, TABLE[name].equation)
         outer, inner = (
-            " + ".join(term for term, there in terms.items() if there)
-            for terms in (on_coordinates, of_muscles)
+            " + ".join(
+                written[name]
+                for name, term in TABLE.items()
+                if term.of == owner and written.get(name)
+            )
+            for owner in ("coordinate", "muscle")
         )
         balance: tuple[str, ...] = (f"p_k A_k(y_k) = {outer} + {inner}",)
         if self.directions:
-            pulls = (
-                rf"\sum_k W_{{kj}} \left(p_k A_k(y_k) - R_k\right) = {outer.replace('_k', '_j')}"
-            )
+            outer = outer.replace("y_", "q_").replace("_k", "_j")
+            pulls = rf"\sum_k W_{{kj}} \left(p_k A_k(y_k) - R_k\right) = {outer}"
             balance = (pulls, rf"R_k = {inner},\quad y_k = \sum_j W_{{kj}} q_j")
         limit = "r_m (p_k + p_0" + (r" + \sum_i g_i x_i)" if any(self.friction_slopes) else ")")
-        ends = (
-            rf"\pm {limit}"
-            if self.asymmetry is None
-            else rf"{limit}, \text{{down to }} -\rho {limit}"
-        )
+        down = rf", \text{{down to }} -\rho {limit}"
+        ends = rf"\pm {limit}" if self.asymmetry is None else limit + down
         memory = {
             rf"s_{{km}} \text{{ follows }} y_k + w_k p_k \text{{ up to }} {ends}": self.limits,
             r"\dot{q}_{kl} = \dot{y}_k - q_{kl} / \tau_l": self.lags,
@@ -409,6 +382,35 @@ class Balance(Invertible):
         return len(self.scheduled) - self.n_loads
 
     @property
+    def n_obstacles(self) -> int:
+        """Number of obstacles per coordinate."""
+        return self.sizes.obstacles
+
+    @cached_property
+    def sizes(self) -> Sizes:
+        """The numbers of muscles, coordinates, and of all else that a balance has."""
+        width = at.STIFFNESS + 1 + self.n_schedules
+        return Sizes(
+            muscles=len(self.given),
+            coordinates=len(self.driven),
+            schedules=self.n_schedules,
+            degree=self.degree,
+            loads=self.n_loads,
+            stops=len(self.limits),
+            lags=len(self.lags),
+            elastic=len(self.elasticity[0]) if self.elasticity else 0,
+            area=max(len(self.areas[0]) if self.areas else 0, 1),
+            obstacles=len(self.obstacles[0]) // width if self.obstacles else 0,
+            driven=len(self.drive[0]) - 1 if self.drive else 0,
+            moves=2 if self.mass else 0,
+        )
+
+    @property
+    def places(self) -> Layout:
+        """Where the numbers are among coefficients and states."""
+        return layout(self.sizes)
+
+    @property
     def moves(self) -> Array:
         """Shortening of every muscle per coordinate, shape (n, m)."""
         return np.array(self.directions) if self.directions else np.eye(len(self.given))
@@ -420,11 +422,6 @@ class Balance(Invertible):
         return np.stack([ends.min(axis=2).sum(axis=1), ends.max(axis=2).sum(axis=1)], axis=1)
 
     @property
-    def n_obstacles(self) -> int:
-        """Number of obstacles per coordinate."""
-        return len(self.obstacles[0]) // (3 + self.n_schedules) if self.obstacles else 0
-
-    @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
         """Whether there is relaxation, damping or mass."""
         return bool(self.lags) or any(self.damping) or any(self.lines) or any(self.mass)
@@ -432,18 +429,16 @@ class Balance(Invertible):
     @property
     def n_states(self) -> int:
         """States: coordinates, tare; stretch, stops, lags, moves of muscles; start, failed samples."""
-        own = 1 + len(self.limits) + len(self.lags) + (2 if self.mass else 0)
-        return len(self.given) * own + 2 * len(self.driven) + 2
+        return self.places.n_states
 
     @property
     def n_scratch(self) -> int:
-        """Scratch: coordinates, pressures, four vectors and a matrix, terms and shares of a muscle."""
-        n, m, row = len(self.given), len(self.driven), (self.elasticity, self.areas)
-        terms = 4 + sum(len(table[0]) for table in row) + len(self.limits) + len(self.lags)
-        return 3 * n + 5 * m + m * m + 2 * terms + (n * n + n * m + m if self.drive else 0)
+        """Scratch: coordinates, three numbers a muscle, what equilibrium needs, and a drive."""
+        n, m = len(self.given), len(self.driven)
+        return 3 * n + m + self.places.n_work + (n * n + n * m + m if self.drive else 0)
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the coefficients described in `mckibben.blocks.coupled.balance_law`.
+        """Return the coefficients, in the places of `mckibben.blocks.coupled.balance_terms`.
 
         Raises
         ------
@@ -451,44 +446,27 @@ class Balance(Invertible):
             Of a model that depends on rate, without a sample time.
         """
         step = needs_sample_time(self.kind, sample_time) if self.rate_dependent else np.inf
-        n, m, n_x = len(self.given), len(self.driven), self.n_schedules
         low, high = self.pressure_range or (-np.inf, np.inf)
-        middle, ways = np.split(np.reshape(self.drive, (n, -1)), [1], axis=1)
-        head = [
-            *(n, m, n_x, self.degree, self.n_loads, len(self.limits), len(self.lags)),
-            *(len(self.elasticity[0]), len(self.areas[0]), self.n_obstacles, self.scale),
-            *(
-                self.friction_offset,
-                self.asymmetry or 1.0,
-                low,
-                high,
-                1.0 / step,
-                self.tare,
-                not self.settled,
-            ),
-            *(bool(self.mass), self.preload, bool(self.directions), ways.shape[1], self.held),
-        ]
+        middle, ways = np.split(np.reshape(self.drive, (len(self.given), -1)), [1], axis=1)
         lags = np.array(self.lags)
-        gains = lags / step * -np.expm1(-step / lags)
-        shared = (
-            head,
-            self.limits,
-            np.exp(-step / lags),
-            gains,
-            self.friction_slopes or n_x * (0.0,),
-            *((middle.ravel(), (ways @ ways.T).ravel()) if self.drive else ()),
+        values: dict[str, object] = {
+            "decays": np.exp(-step / lags),
+            "gains": lags / step * -np.expm1(-step / lags),
+            "drive": np.append(middle, ways @ ways.T) if self.drive else (),
+            "pushes": self.pushes or len(self.given) * (NEVER,),
+            "directions": self.moves,
+        }
+        c = np.zeros(self.places.size)
+        c[: at.SCALE] = self.places.head
+        c[at.SCALE : at.LIMITS] = (
+            *(self.scale, self.friction_offset, self.asymmetry or 1.0, low, high, 1.0 / step),
+            *(self.tare, not self.settled, self.preload, bool(self.directions), self.held),
         )
-        obstacles = self.obstacles or m * ((),)
-        tables = zip(self.springs, self.loads, obstacles, strict=True)
-        none = n * (0.0,)
-        columns = (self.walls, self.pushes or n * (NEVER,))
-        dynamic = (self.damping, self.lines or none, self.mass or none, self.bladders or none)
-        own = (
-            *(self.hull, np.transpose(columns), self.moves, np.transpose(dynamic)),
-            *(self.elasticity, self.areas, self.friction, self.relaxation),
-        )
-        flat = np.hstack([np.reshape(table, (n, -1)) for table in own])
-        return np.concatenate([*shared, *(np.concatenate(row) for row in tables), flat.ravel()])
+        for name, places in self.places.at.items():
+            value = np.asarray(values[name] if name in values else getattr(self, name))
+            if value.size:  # optional ones that are left out are 0
+                c[places] = value.reshape(places.shape)
+        return c
 
     @cached_property
     def known_inputs(self) -> Array:
@@ -551,63 +529,57 @@ class Balance(Invertible):
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
         """Return the unit of a parameter: forces in N, or in the input's unit for relative areas."""
-        moved, driving = self.driven[0].unit, self.given[0].unit
+        _, unit, by = self._entry(field, index)
+        driving = self.given[0].unit
         force = driving if self.areas[0][0] == 1.0 else "N"
-        if field in ("springs", "obstacles"):
-            width, degree = (1 + len(self.driven), self.degree) if field == "springs" else (1, 1)
-            place = index[-1] if field == "springs" else index[-1] % (3 + self.n_schedules) - 2
-            if place < 0:
-                return moved if place == -1 else ""
-            power, to = divmod(place, width)
-            below = moved * (to > 0 or field == "obstacles")
-            if power > 0:
-                by, order = divmod(power - 1, degree)
-                raised = f"{self.scheduled[by].unit}^{order + 1}".replace("^1", "")
-                below += f"{' ' if below else ''}{raised}"
-            return f"{force}/{below}" if below else force
-        if field == "loads":
-            return f"{force}/{self.scheduled[index[-1] - self.n_loads].unit}"
-        if field == "friction_slopes":
-            return f"{driving}/{self.scheduled[index[-1]].unit}"
-        units = {"N": force, "mm": moved, "bar": driving}
-        declared = super().unit_of(field, index) or ""
-        return re.sub(r"\b(N|mm|bar)\b", lambda unit: units[unit[0]], declared)
+        own = {"N": force, "mm": self.driven[0].unit, "bar": driving}
+        unit = re.sub(r"\b(N|mm|bar)\b", lambda one: own[one[0]], unit).rstrip("/")
+        return f"{unit}{' ' if '/' in unit else '/'}{by}" if by else unit
+
+    def is_convention(self, field: str, index: tuple[int, ...]) -> bool:
+        """Return whether a parameter is a side, or sets the unit of force."""
+        unit = "loads" if np.shape(self.loads) == (1, 1) else "areas"
+        side = field == "obstacles" and index[-1] % self.sizes.obstacle == at.SIDE
+        return side or (field == unit and not any(index))
 
     def name_of(self, field: str, index: tuple[int, ...]) -> str:
         """Return the label of a parameter: its muscle, channel, and scheduling input."""
-        if field in ("friction_offset", "asymmetry"):
-            return field.replace("_", " ")
-        on = self.driven if field in ("springs", "loads", "obstacles") else self.given
-        whose = "coordinate" if self.directions and on is self.driven else "muscle"
-        of = f" of {whose} {index[0] + 1}" if len(on) > 1 else ""
-        if field in ONE_EACH:
-            return f"{ONE_EACH[field]}{of}"
-        place = index[-1]
-        if field == "friction_slopes":
-            return f"friction offset by {self.scheduled[place].name}"
+        return self._entry(field, index)[0]
+
+    def _entry(self, field: str, index: tuple[int, ...]) -> tuple[str, str, str]:
+        """Return a number's label, unit, and by how much of what schedules that is."""
+        if field not in TABLE:
+            return super().name_of(field, index), super().unit_of(field, index) or "", ""
+        term, place, power = TABLE[field], index[-1] if index else 0, 0
+        whose = "coordinate" if self.directions and term.of == "coordinate" else "muscle"
+        of = f" of {whose} {index[0] + 1}" if self.sizes.of(term.of) > 1 else ""
+        name, unit = f"{term.label}{of}", term.unit
         if field == "springs":
-            power, to = divmod(place, 1 + len(on))
-            name = f"{'constant force' if to == 0 else 'spring'}{of}"
+            power, to = divmod(place, 1 + len(self.driven))
+            name = name if to else f"constant force{of}"
             name += f" to {whose} {to}" if to not in (0, index[0] + 1) else ""
-            if power == 0:
-                return name
-            of_scheduled, degree = divmod(power - 1, self.degree)
-            return (
-                f"{name} by {self.scheduled[of_scheduled].name}{f'^{degree + 1}' if degree else ''}"
-            )
-        if field == "loads":
-            return f"share{of} of {self.scheduled[place - self.n_loads].name}"
-        if field == "obstacles":
-            number, place = divmod(place, 3 + self.n_schedules)
-            by = f" by {self.scheduled[place - 3].name}" if place > 2 else ""
-            what = ("side", "place", "stiffness")[min(place, 2)]
-            return f"{what} of obstacle {number + 1}{of}{by}"
-        if field in ("friction", "relaxation"):
-            return f"{'stop' if field == 'friction' else field} {place + 1}{of}"
-        if field == "areas" and place == 0:
-            return f"area{of} at rest"
-        raised = f"^{place + 2 * (field == 'elasticity')}".replace("^1", "")
-        return f"{'area' if field == 'areas' else field}{of} by displacement{raised}"
+            unit = unit if to else "N"
+        elif field == "obstacles":
+            number, place = divmod(place, self.sizes.obstacle)
+            power = max(place - at.STIFFNESS, 0)
+            what, unit = (("side", ""), ("place", "mm"), ("stiffness", unit))[place - power]
+            name = f"{what} of obstacle {number + 1}{of}"
+        elif field == "loads":
+            load = self.scheduled[place - self.n_loads]
+            return f"{name} of {load.name}", unit, load.unit
+        elif field == "friction_slopes":
+            power = 1 + place * self.degree
+        elif field in ("friction", "relaxation"):
+            name = f"{term.label} {place + 1}{of}"
+        elif field in ("elasticity", "areas"):
+            order = place + 2 * (field == "elasticity")
+            raised = f" by displacement^{order}".removesuffix("^1")
+            name += raised if order else " at rest"
+        if not power:
+            return name, unit, ""
+        by, order = divmod(power - 1, 1 if field == "obstacles" else self.degree)
+        channel, raised = self.scheduled[by], f"^{order + 1}" if order else ""
+        return f"{name} by {channel.name}{raised}", unit, f"{channel.unit}{raised}"
 
     @classmethod
     def example(cls) -> Self:
@@ -634,33 +606,6 @@ class Balance(Invertible):
             scheduled=(Channel("pressure_extensor", "bar"), Channel("force", "N")),
             given=tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2)),
         )
-
-
-NOT_NEGATIVE = (
-    *(
-        "friction",
-        "relaxation",
-        "damping",
-        "walls",
-        "lines",
-        "friction_offset",
-        "bladders",
-        "pushes",
-        "mass",
-    ),
-    "friction_slopes",
-)
-"""Fields of non-negative numbers."""
-
-ONE_EACH = {
-    "damping": "damping",
-    "lines": "resistance of the line",
-    "walls": "stretch of the wall",
-    "bladders": "spring of the bladder",
-    "pushes": "force of slackening",
-    "mass": "mass",
-}
-"""Fields with one number per muscle, and their labels."""
 
 
 class Placed(NamedTuple):
@@ -693,3 +638,170 @@ def drive_of(model: Block) -> tuple[Array, Array] | None:
         return None
     drive = np.array(placed.balance.drive)
     return drive[:, 0], drive[:, 1:]
+
+
+# -- what of a balance adapts ----------------------------------------------------------------------
+
+KINDS = range(5)
+OFFSET, STIFFNESS, AREA, FRICTION, RELAXATION = KINDS
+"""Adaptive parameters of a muscle; an added force reduces its pull."""
+
+FACTORS = 0.5, 2.0
+"""Smallest and largest factor on fitted values."""
+
+MOST_FORCE = 0.3
+"""Largest constant force, relative to its scale."""
+
+USUAL_TOP = 10.0
+"""Highest pressure if the model has no limit [bar]."""
+
+LEAST_LEFT = 0.05
+"""Smallest area left after friction, relative to the area at rest, as in identification."""
+
+GRID = 21
+"""Grid points over the known range of a displacement at which constraints are checked."""
+
+
+def learnable_balance(balance: Balance) -> Learnable:
+    """Return the adaptive parameters of a balance: factors of 1, and forces of 0.
+
+    Factors are expected to change by 30 %, forces by 10 % of that of the highest pressure at rest.
+    """
+    m, adapted, known = len(balance.driven), adaptable_of(balance), balance.known_coordinates
+    muscles, kinds = np.array(adapted).T
+    offsets, at_rest = kinds == OFFSET, np.array(balance.areas)[muscles, 0] * top_of(balance)
+    fitted, scales = np.where(offsets, 0.0, 1.0), np.where(offsets, at_rest, 1.0)
+
+    table = family_of(balance, adapted, scales)
+
+    def numbers(sample_time: float | None) -> Array:
+        return np.concatenate([[m], table.ravel(), balance.coefficients(sample_time)])
+
+    return Learnable(
+        balance_adaptive_step,
+        balance_adaptive_start,
+        fitted=fitted,
+        scales=scales,
+        spread=np.diag(np.where(offsets, 0.1, 0.3) ** 2),
+        with_parameters=lambda theta: Inverse(changed(balance, table, theta - fitted)),
+        numbers=numbers,
+        known=known,
+        compensates=True,
+        n_more_states=m + m * fitted.size,
+        n_more_scratch=m * fitted.size + 2 * m * m + 2 * m + balance.coefficients(1.0).size,
+    )
+
+
+def adaptable_of(balance: Balance) -> list[tuple[int, int]]:
+    """Return muscle and kind of every adaptive parameter."""
+    found = []
+    for k in range(len(balance.given)):
+        lasting = any(balance.friction[k]), any(balance.relaxation[k])
+        there = (True, True, k > 0 or balance.n_loads > 0, *lasting)
+        found += [(k, kind) for kind in KINDS if there[kind]]
+    return found
+
+
+def top_of(balance: Balance) -> float:
+    """Return the highest pressure."""
+    reach = balance.pressure_range
+    return USUAL_TOP if reach is None else max(abs(reach[0]), abs(reach[1]))
+
+
+def family_of(balance: Balance, adapted: list[tuple[int, int]], scales: Array) -> Array:
+    """Return a row per parameter, shape (k, `ROW` + m)."""
+    ends = at.ELASTIC, *balance.places.head[at.AREA : at.N_TERMS + 1]
+    table = np.zeros((len(adapted), ROW + len(balance.driven)))
+    for row, (k, kind), scale in zip(table, adapted, scales, strict=True):
+        friction, stiffness = ratios(balance, k)
+        row[FACTOR_OF], row[LOW:ROW] = k, (*FACTORS, -NEVER, NEVER, -1)
+        if kind == OFFSET:
+            row[FORCE], row[LOW : HIGH + 1] = 1.0, (-MOST_FORCE * scale, MOST_FORCE * scale)
+            continue
+        row[FIRST : BEHIND + 1] = ends[kind - 1 : kind + 1]
+        if kind == STIFFNESS:  # with the muscle's own spring
+            row[FIRST], row[AREA_LOW] = at.BLADDER, 1.0 / stiffness
+            row[ROW:] = shares_of(balance)[k]
+        elif kind == FRICTION:
+            row[AREA_HIGH] = friction
+        if kind in (STIFFNESS, FRICTION) and (k, AREA) in adapted:
+            row[BY_AREA] = adapted.index((k, AREA))
+    return table
+
+
+def shares_of(balance: Balance) -> Array:
+    """Return each muscle's share in the springs of the coordinates, shape (n, m)."""
+    squares = balance.moves**2
+    return np.asarray(squares / squares.sum(axis=0))
+
+
+def changed(balance: Balance, table: Array, changes: Array) -> Balance:
+    """Return the balance with changed forces and factors, as rows of `family_of` say."""
+    fitted = balance.coefficients(1.0)
+    c, factors = np.empty_like(fitted), np.empty(len(balance.driven))
+    retune(fitted, table, changes, c, factors)
+    names = ("springs", "elasticity", "areas", "friction", "relaxation", "bladders")
+    numbers = {name: c[balance.places.at[name]] for name in names if getattr(balance, name)}
+    return replace(balance, **fields_of(numbers))
+
+
+def fields_of(numbers: Mapping[str, Array]) -> dict[str, Any]:
+    """Return fields of a balance from their coefficients, a row a coordinate or muscle."""
+    return {
+        name: vector(table[:, 0]) if TABLE[name].width == "one" else rows(table)
+        for name, table in numbers.items()
+    }
+
+
+def ratios(balance: Balance, k: int) -> tuple[float, float]:
+    """Return the bounds on friction over area, and on area over stiffness, as factors.
+
+    At least 1: what was fitted may be. Springs of coordinates add what they have for all muscles
+    whatever their factors: f w w' is at most f diag(w w'), times how many coordinates one moves.
+    """
+    u = np.linspace(balance.hull[k][0], balance.hull[k][1], GRID) / balance.scale
+    area = np.polynomial.Polynomial(balance.areas[k])
+    elasticity = np.polynomial.Polynomial([0.0, 0.0, *balance.elasticity[k]])
+    rubbed = float(np.dot(balance.friction[k], np.array(balance.limits) + balance.walls[k]))
+    left = float(area(u).min()) - LEAST_LEFT * balance.areas[k][0]
+    moved, most = np.count_nonzero(balance.moves[k]), (balance.moves**2).sum(axis=0).max()
+    own = softest_of(balance) / (moved * most) + (balance.bladders[k] if balance.bladders else 0.0)
+    stiff = elasticity.deriv()(u) / balance.scale + own
+    lost = top_of(balance) * area.deriv()(u) / balance.scale
+    loses = lost > 0.0
+    least = float(np.min(stiff[loses] / lost[loses], initial=NEVER))
+    return max(left / rubbed, 1.0) if rubbed > 0.0 else NEVER, max(least, 1.0)
+
+
+def softest_of(balance: Balance) -> float:
+    """Return the smallest stiffness of the coordinates' springs over all scheduling inputs."""
+    n_x = balance.n_schedules
+    ends = balance.known[:n_x] or n_x * ((0.0, 0.0),)
+    springs = np.array(balance.springs).reshape(len(balance.driven), -1, 1 + len(balance.driven))
+    return max(softest(springs, np.reshape(ends, (-1, 2)), balance.degree)[0], 0.0)
+
+
+def softest(springs: Array, ends: Array, degree: int) -> tuple[float, Array, Array]:
+    """Return the smallest stiffness of springs, shape (m, powers, 1 + m), and where it is.
+
+    Over all combinations of the ``ends`` and middles of what schedules, which are returned with the
+    direction.
+    """
+    found = []
+    for x in corners(ends):
+        matrix = np.tensordot(powers_of(x, degree), springs[:, :, 1:], (0, 1))
+        stiffnesses, directions = np.linalg.eigh(0.5 * (matrix + matrix.T))
+        found.append((float(stiffnesses[0]), x, directions[:, 0]))
+    return min(found, key=lambda candidate: candidate[0])
+
+
+def corners(ends: Array) -> list[Array]:
+    """Return all combinations of ends, shape (s, 2), and of the middles between them."""
+    low, high = ends.T
+    return [low + np.array(s) * (high - low) for s in product((0.0, 0.5, 1.0), repeat=len(low))]
+
+
+def powers_of(x: Array, degree: int) -> Array:
+    """Return the powers of what schedules, shape (1 + powers, ...), that multiply springs."""
+    powers = [v**d for v in x for d in range(1, degree + 1)]
+    return np.array([np.ones(x.shape[1:]), *powers])

@@ -25,6 +25,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Board
 from mckibben.blocks.compose import Composition, PerChannel, Series
+from mckibben.blocks.coupled import balance_terms as at
 from mckibben.blocks.coupled.balance import Balance, balance_in
 from mckibben.blocks.coupled.balance_law import (
     AT_REST,
@@ -49,15 +50,15 @@ def load_estimate_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Compute loads; the pseudo-inverse follows the balance's coefficients."""
-    m = int(coefficients[1])
-    q, loads = scratch[:m], scratch[scratch.size - outputs.size :]
+    c = coefficients
+    n, m = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES])
+    n_x = int(c[at.N_SCHEDULES]) + int(c[at.N_LOADS])
+    q, x, loads = scratch[:m], scratch[scratch.size - n_x :], scratch[scratch.size - outputs.size :]
     for j in range(m):
-        q[j] = inputs[j] + state[state.size - 2 - m + j]
-    way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
-    estimate(coefficients, state, way, q, inputs, loads, scratch)
-    n, n_x = int(coefficients[0]), int(coefficients[2]) + int(coefficients[4])
-    x = scratch[scratch.size - n_x :]
-    update_state(coefficients, state, way, q, inputs[m : m + n], x)
+        q[j] = inputs[j] + state[int(c[at.TARE]) + j]
+    way = FROM_REST if state[at.FRESH] != 0.0 else IN_TIME
+    estimate(c, state, way, q, inputs, loads, scratch)
+    update_state(c, state, way, q, inputs[m : m + n], x)
     fill(outputs, loads)
 
 
@@ -66,15 +67,14 @@ def estimate(
     c: Array, state: Array, way: int, q: Array, inputs: Array, loads: Array, scratch: Array
 ) -> None:
     """Fill the loads in equilibrium at given coordinates."""
-    n, m, n_x, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[4])
-    residual, sizes = scratch[m : 2 * m], scratch[2 * m : 3 * m]
-    x = scratch[scratch.size - n_x - n_loads :]
-    matrix, terms = scratch[3 * m : 3 * m + m * m].reshape((m, m)), scratch[3 * m + m * m :]
+    n, m = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES])
+    n_x, n_loads = int(c[at.N_SCHEDULES]), int(c[at.N_LOADS])
+    x, residual = scratch[scratch.size - n_x - n_loads :], scratch[m : 2 * m]
     for i in range(n_x):
         x[i] = inputs[m + n + i]
     for i in range(n_loads):
         loads[i] = 0.0
-    unbalanced(c, state, way, q, x, inputs[m : m + n], residual, matrix, sizes, terms)
+    unbalanced(c, state, way, q, x, inputs[m : m + n], scratch[m:])
     solving = c[c.size - n_loads * m :]
     for i in range(n_loads):
         for j in range(m):
@@ -87,22 +87,22 @@ def load_estimate_start(
 ) -> None:
     """Start as the balance does, under the frictionless loads of the first sample."""
     c = coefficients
-    n, m, n_x, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[4])
+    n, m = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES])
+    n_x, n_loads = int(c[at.N_SCHEDULES]), int(c[at.N_LOADS])
     q, p, x = scratch[:m], scratch[m : m + n], scratch[scratch.size - n_x - n_loads :]
     loads = x[n_x:]
-    for i in range(state.size):
-        state[i] = 0.0
+    state[:] = 0.0
     fill(q, inputs)
     estimate(c, state, AT_REST, q, inputs, loads, scratch)
-    if c[22] != 0.0:
+    if c[at.HELD] != 0.0:
         start_held(c, state, x, q, p)
     else:
         for i in range(n_loads):
-            loads[i] = loads[i] if c[16] == 0.0 else 0.0
+            loads[i] = loads[i] if c[at.TARED] == 0.0 else 0.0
         start_at_rest(c, state, x, q, p, scratch[m + n :])
     if virgin:
         for j in range(m):
-            q[j] = inputs[j] + state[state.size - 2 - m + j]
+            q[j] = inputs[j] + state[int(c[at.TARE]) + j]
         update_state(c, state, AT_REST, q, inputs[m : m + n], x)
 
 

@@ -7,7 +7,6 @@ of what was left out (`mckibben.estimators.coupled.balance_search`).
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -21,6 +20,7 @@ from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance, balance_in
+from mckibben.blocks.coupled.balance_terms import TABLE
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import rows, vector
 from mckibben.blocks.free_runs import FreeRuns
@@ -53,6 +53,7 @@ from mckibben.estimators.coupled.balance_problem import coarser, compared, front
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
 from mckibben.estimators.coupled.base import CoupledEstimator
+from mckibben.muscles.scaling import resized
 from mckibben.muscles.traits import TRAVELS
 from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording, listed
@@ -93,24 +94,8 @@ FINEST, LONGEST = 0.003, 0.5
 PLACES = (0.6, 0.8, 0.9, 0.97)
 """Candidate positions of obstacles, as shares of the range; for lowering, from its end."""
 
-TERMS = (
-    *("elasticity", "areas", "relaxation", "line", "mass", "obstacle", "springs"),
-    *(
-        "friction_slopes",
-        "asymmetry",
-        "walls",
-        "filling",
-        "venting",
-        "dead",
-        "contact",
-        "muscles",
-        "slack",
-    ),
-)
+TERMS = (*dict.fromkeys(kind.option for kind in TABLE.values() if kind.option), "muscles")
 """Kinds of candidate terms."""
-
-PARTS = {"lags": "relaxation", "places": "obstacle", "pushes": "slack"}
-"""Terms that are part of other terms."""
 
 
 class BalanceEstimator(CoupledEstimator):
@@ -305,12 +290,26 @@ class BalanceEstimator(CoupledEstimator):
         structure = search.structure
         values = structure.expanded(z[: len(structure.terms)])
         balance = in_newtons(structure.block(values, final=True))
+        self._keep_loads(search, z, data, balance.areas[0][0])
+        fronts = [front(structure, values, channel) for channel in data.inputs]
+        balance, before = self._limited(balance, fronts, data)
+        parts = [*before, balance.inverse(), *behind]
+        return parts[0] if len(parts) == 1 else Series(tuple(parts))
+
+    def _keep_loads(self, search: Search, z: Array, data: TrainingData, area: float) -> None:
+        """Set the constant loads of recordings, in the unit of forces that an area sets."""
+        structure = search.structure
         self.loads_ = np.zeros((1 + max(run.index for run in data.runs), structure.m))
         for run in data.runs:
             place = search.problem.loads_at(structure, run)
             if place.stop > place.start:
-                self.loads_[run.index] = z[place] * balance.areas[0][0]
-        static = [b for b in front(structure, values, data.inputs[0]) if not b.rate_dependent]
+                self.loads_[run.index] = z[place] * area
+
+    def _limited(
+        self, balance: Balance, fronts: list[list[Block]], data: TrainingData
+    ) -> tuple[Balance, list[Block]]:
+        """Return a balance within the recorded ranges, and the blocks before it."""
+        static = [block for block in fronts[0] if not block.rate_dependent]
 
         def acting_in_muscles(given: Array) -> Array:
             for block in static:
@@ -322,20 +321,19 @@ class BalanceEstimator(CoupledEstimator):
             given_range = float(data.lowest.min()), float(data.highest.max())
             low, high = acting_in_muscles(np.array(given_range)).tolist()
             balance = replace(balance, pressure_range=(low, high))
-        if structure.n > structure.m and self.drive == "recorded":
+        n, m = balance.moves.shape
+        if n > m and self.drive == "recorded":
             pressures = [acting_in_muscles(given) for given in data.stacked("driven").T]
             drive = drive_of(np.column_stack(pressures))
-            if structure.m < drive.shape[1] <= structure.n:  # not any, and enough to balance along
+            if m < drive.shape[1] <= n:  # not any, and enough to balance along
                 balance = replace(balance, drive=rows(drive))
         names = [channel.name for channel in data.scheduled]
         x = data.stacked("scheduled")[:, [names.index(name) for name in balance.scheduling]]
         balance = replace(balance, known=rows(np.column_stack([x.min(axis=0), x.max(axis=0)])))
-
-        acting = zip(*(front(structure, values, one) for one in data.inputs), strict=True)
-        limited = (tuple(_within(given_range, block) for block in one) for one in acting)
-        before = [one[0] if len(one) == 1 else PerChannel(one) for one in limited]
-        parts = [*before, balance.inverse(), *behind]
-        return parts[0] if len(parts) == 1 else Series(tuple(parts))
+        stages = (
+            tuple(_within(given_range, b) for b in stage) for stage in zip(*fronts, strict=True)
+        )
+        return balance, [stage[0] if len(stage) == 1 else PerChannel(stage) for stage in stages]
 
     def widest(self, bench: Bench, *, timed: bool) -> Structure:
         """Return the structure with all candidate terms."""
@@ -375,7 +373,7 @@ class BalanceEstimator(CoupledEstimator):
 
         def there(term: Term) -> bool:
             kind, which, _ = term
-            if prior_errors is not None and kind in OF_TRAITS:
+            if prior_errors is not None and TABLE[kind].prior:
                 return True
             if kind == "springs":
                 return which == 0 or (which - 1) % structure.degree == 0
@@ -384,9 +382,9 @@ class BalanceEstimator(CoupledEstimator):
                 return few or which in (len(structure.lags) // 3, 2 * len(structure.lags) // 3)
             if kind in ("elasticity", "areas"):
                 return which < 2
-            return kind in ("loads", "damping", "bladder", "friction") or (
-                kind == "friction_offset" and bool(structure.limits) and self.friction == "pressure"
-            )
+            if kind == "friction_offset":
+                return bool(structure.limits) and self.friction == "pressure"
+            return not TABLE[kind].option
 
         return np.array([term.muscle is None and there(term) for term in structure.terms])
 
@@ -398,19 +396,42 @@ class BalanceEstimator(CoupledEstimator):
         tracker: Tracker,
     ) -> tuple[Search, Array]:
         """Return the search with the selected terms, and their values."""
-        few = compared(coarser(data, FEW), FEW, of_force=structure.bench.of_force)
-        search = Search(few, structure, self._first(structure, prior_errors), prior_errors)
+        of_force, first = structure.bench.of_force, self._first(structure, prior_errors)
+        few = compared(coarser(data, FEW), FEW, of_force=of_force)
+        search = Search(few, structure, first, prior_errors)
         z = self._balanced(search, tracker)
         if prior_errors is not None:
             starts = (search.descend(one, TOWARDS, Tracker()) for one in (z, self._likely(search)))
             z = min(starts, key=search.cost)
-        tried = np.array([self._tried(structure, term) for term in structure.terms])
-        last = np.array([term.kind in LAST for term in structure.terms])
         pushed = structure.n > 1 or any(held(data, run) for run in data.runs)
+        search, z = self._chosen(search, z, pushed, tracker)
+        names = (
+            TABLE[t.kind].option or t.kind if t.muscle is None else "muscles"
+            for t in compress(structure.terms, search.active & ~first)
+        )
+        self.terms_ = tuple(dict.fromkeys(names))
+        search, z = search.narrowed(z)
+        if structure.n == 1 and self.unknown_load is None:
+            search, z = self._own_loads(search, z, data)
+        z = search.descend(z, self.steps, tracker.part(0.5, 0.7))
+        whole = compared(coarser(data, MOST_SAMPLES), MOST, of_force=of_force)
+        search = replace(search, problem=whole)
+        for _ in range(1 if prior_errors is None else REFINED):
+            search = search.weighed(z)
+            z = search.descend(z, min(self.steps, LAST_STEPS), tracker.part(0.7, 0.9))
+        return search, z
+
+    def _chosen(
+        self, search: Search, z: Array, pushed: bool, tracker: Tracker
+    ) -> tuple[Search, Array]:
+        """Return the search with terms added by rounds, between descents, and their values."""
+        terms = search.structure.terms
+        tried = np.array([self._tried(search.structure, term) for term in terms])
+        last = np.array([term.kind in LAST for term in terms])
         for number in range(ROUNDS):
             part = tracker.part(0.08 * number, 0.08 * (number + 1))
             z = search.descended(z, min(self.steps, STEPS_BETWEEN), part)
-            if number == 0 and not few.all_at_rest:
+            if number == 0 and not search.problem.all_at_rest:
                 search, z = self._long_held(search, z)
             if number == 0 and self.may("slack") and pushed:
                 search, z = self._slack(search, z)
@@ -419,21 +440,6 @@ class BalanceEstimator(CoupledEstimator):
             if (active == search.active).all() or number == ROUNDS - 1:
                 break
             search = replace(search, active=active)
-        added = search.active & ~self._first(structure, prior_errors)
-        names = (
-            PARTS.get(t.kind, t.kind) if t.muscle is None else "muscles"
-            for t in compress(structure.terms, added)
-        )
-        self.terms_ = tuple(dict.fromkeys(names))
-        search, z = search.narrowed(z)
-        if structure.n == 1 and self.unknown_load is None:
-            search, z = self._own_loads(search, z, data)
-        z = search.descend(z, self.steps, tracker.part(0.5, 0.7))
-        whole = compared(coarser(data, MOST_SAMPLES), MOST, of_force=structure.bench.of_force)
-        search = replace(search, problem=whole)
-        for _ in range(1 if prior_errors is None else REFINED):
-            search = search.weighed(z)
-            z = search.descend(z, min(self.steps, LAST_STEPS), tracker.part(0.7, 0.9))
         return search, z
 
     def _long_held(self, search: Search, z: Array) -> tuple[Search, Array]:
@@ -482,7 +488,7 @@ class BalanceEstimator(CoupledEstimator):
             return False
         if term.kind in ("filling", "venting") and not structure.bench.step:
             return False
-        return self.may(PARTS.get(term.kind, term.kind)) and term.kind != "pushes"
+        return self.may(TABLE[term.kind].option or term.kind) and term.kind != "pushes"
 
     def _slack(self, search: Search, z: Array) -> tuple[Search, Array]:
         """Return the search with slackening muscles if that reduces errors; otherwise the same."""
@@ -527,9 +533,6 @@ FIRST_OFFSET, TOWARDS, REFINED = 0.1, 60, 3
 from there; number of reweightings of the prior.
 """
 
-OF_TRAITS = ("elasticity", "areas", "friction", "relaxation")
-"""Kinds of terms that a prior covers."""
-
 OWN_HELPS = 0.1
 """Smallest relative reduction of errors by loads of recordings."""
 
@@ -539,13 +542,17 @@ def _within(given_range: tuple[float, float] | None, block: Block) -> Block:
     return replace(block, input_range=given_range) if isinstance(block, Air) else block
 
 
+FIXED = ("gain", "offset", "hysteresis", "dead_time")
+"""Parameters of the front and of sensors that are not found."""
+
+
 def fixed_in(block: Block) -> tuple[int, ...]:
-    """Return the indices of sides, of a front's gain, and of the unit of force."""
-    names = block.parameter_names
-    shares = [name for name in names if name.startswith("share of ")]
-    unit = shares[0] if len(shares) == 1 else r"area( of muscle 1)? at rest"
-    given = re.compile(rf"gain|offset|hysteresis|dead time|side of obstacle .*|{unit}")
-    return tuple(place for place, name in enumerate(names) if given.fullmatch(name))
+    """Return the indices of parameters that are not found, or set a side or the unit of force."""
+    return tuple(
+        place
+        for place, (part, field, index) in enumerate(block.numbers())
+        if (part.is_convention(field, index) if isinstance(part, Balance) else field in FIXED)
+    )
 
 
 def _loaded(loads: Array, model: Block, place: int) -> Block:
@@ -569,16 +576,4 @@ def in_newtons(balance: Balance) -> Balance:
     share = abs(balance.loads[0][0]) if np.shape(balance.loads) == (1, 1) else 0.0
     if not share > 0.0:
         return balance
-
-    def scaled(name: str) -> Array:
-        return np.array(getattr(balance, name), dtype=np.float64) / share
-
-    tables = ("springs", "elasticity", "areas", "friction", "relaxation", "loads")
-    single = ("damping", "lines", "bladders", "pushes", "mass")
-    changed: dict[str, Any] = {name: rows(scaled(name)) for name in tables}
-    changed |= {name: vector(scaled(name)) for name in single}
-    obstacles = np.reshape(balance.obstacles, (-1, 3 + balance.n_schedules)).copy()
-    obstacles[:, 2:] /= share
-    return replace(
-        balance, obstacles=rows(obstacles.reshape(np.shape(balance.obstacles))), **changed
-    )
+    return replace(resized(balance, area=1.0 / share), loads=rows(np.array(balance.loads) / share))

@@ -6,8 +6,9 @@ under an unmeasured load, a constant force on every coordinate.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -15,7 +16,9 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block, run_many
+from mckibben.blocks.coupled.balance import powers_of
 from mckibben.blocks.coupled.balance_law import coordinate_at
+from mckibben.blocks.coupled.balance_terms import Indices
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Contact, PiecewiseLinear
@@ -124,7 +127,7 @@ class Problem:
 
     def acting(self, run: Run, structure: Structure, values: Array) -> Array:
         """Return the pressures acting on muscles, shape (n, muscles)."""
-        shape = tuple(values[structure.nonlinear["filling"].start :].tolist())
+        shape = tuple(values[structure.at["filling"][0] :].tolist())
         if not (shape[0] or shape[2] or shape[3]):
             return run.driven
         key = (run.place, *shape)
@@ -224,9 +227,7 @@ class Problem:
             for number, kind in enumerate(air):
                 whole[:, structure.free(kind).start] = by[:, number - len(air)]
             loads = self.loads_at(structure, run)
-            whole[:, loads] = by[
-                :, [structure.spring(0, j, -1) for j in range(loads.stop - loads.start)]
-            ]
+            whole[:, loads] = by[:, structure.springs[: loads.stop - loads.start, 0, 0]]
             errors.append(before.ravel())
             slopes.append(whole)
         return errors, np.concatenate(slopes)
@@ -265,7 +266,7 @@ class Problem:
         for run in self.runs:
             x, loads = np.split(run.scheduled, [len(structure.bench.scheduled)], axis=1)
             around = np.column_stack([np.ones(len(x)), run.outputs])
-            pulled = np.einsum("qt,jqi,ti->tj", structure.powers(x.T), springs, around)
+            pulled = np.einsum("qt,jqi,ti->tj", powers_of(x.T, structure.degree), springs, around)
             most = max(most, -float((pulled + loads @ np.array(balance.loads).T).min()))
         return most
 
@@ -277,40 +278,27 @@ class Problem:
         Forces are weighed by stiffness, so that errors are of displacement. Sizes of areas
         at rest are not determined: those of muscles with a coordinate each are 1 at the mean of samples.
         """
-        n, terms = structure.mix.shape[1], structure.terms
-        of_force = structure.bench.of_force
-        fixed = [not active[i] or (terms[i][:2] == ("areas", 0) and not of_force) for i in range(n)]
-        chosen = np.flatnonzero(~np.array(fixed))
-        beyond = np.array([terms[i].kind == "areas" and not of_force for i in chosen])
-        bounded = (structure.not_negative @ structure.mix > 0)[chosen] & np.array(
-            [terms[i].muscle is None for i in chosen]
-        )
-        rows, targets = [], []
+        n, n_terms = structure.mix.shape[1], len(structure.terms)
+        terms, of_force = structure.terms[:n], structure.bench.of_force
+        fixed = [not of_force and term[:2] == ("areas", 0) for term in terms]
+        chosen = np.flatnonzero(active[:n] & ~np.array(fixed))
+        narrowing = np.flatnonzero([terms[i].kind == "areas" and not of_force for i in chosen])
         start = z.copy()
         start[:n] = 0.0
-        for run in self.runs:
-            lacking, slopes = self.followed(structure, start, run, held=True)
-            slopes = slopes[..., : structure.n_linear]
-            loads = self.loads_at(structure, run)
-            own = np.zeros((*lacking.shape, self.size(structure) - len(terms)))
-            for j in range(loads.stop - loads.start):
-                own[:, j, loads.start - len(terms) + j] = 1.0
-            counts = self.counting(run)[:, np.newaxis]
-            targets.append(-lacking * counts)
-            found = np.concatenate([slopes @ structure.mix[:, chosen], own], axis=2)
-            rows.append(found * counts[..., np.newaxis])
-        whole, target = np.concatenate(rows), np.concatenate(targets)
-        bounded = np.append(bounded, np.zeros(whole.shape[2] - bounded.size, dtype=bool))
-        narrowing = np.flatnonzero(beyond)
+        whole, target = self._forces(structure, start, chosen)
+        bounded = np.zeros(whole.shape[2], dtype=bool)
+        bounded[: chosen.size] = structure.bounded[chosen]
         means = np.einsum("tjc,tj->c", whole[..., narrowing], target) / float((target**2).sum())
         whole[..., narrowing] -= means * target[..., np.newaxis]
         table = np.concatenate([whole, target[..., np.newaxis]], axis=2)
         weight = np.ones_like(target)
 
-        def put(least: Array) -> None:
+        def put(least: Array) -> Array:
+            """Set the parameters in the unit in which the area is 1; return the coefficients."""
             at_rest = max(1.0 + float(means @ least[narrowing]), LEAST_AT_REST)
             start[chosen] = least[: chosen.size] / at_rest
-            start[len(terms) :] = least[chosen.size :] / at_rest
+            start[n_terms:] = least[chosen.size :] / at_rest
+            return structure.base + structure.mix @ start[:n]
 
         for _ in range(PASSES):
             flat = (table * weight[..., np.newaxis]).reshape(-1, table.shape[2])
@@ -319,29 +307,38 @@ class Problem:
             if not of_force:
                 weight = 1.0 / (self.stiffness(structure, start) * structure.bench.travel)
         # the same within physics, in the unit in which the area is 1 on average
-        scaling = np.zeros(chosen.size)
-        scaling[narrowing] = means
         flat = (table * weight[..., np.newaxis]).reshape(-1, table.shape[2])
         triangle: Array = np.linalg.qr(flat, mode="r")  # type: ignore[assignment]
-        sides, bounds = structure.constraints(structure.expanded(start[: len(terms)]))
+        scaling = np.zeros(chosen.size)
+        scaling[narrowing] = means
         mix = structure.mix[:, chosen] + np.outer(structure.base, scaling)
 
-        def asked(side: Array, bound: Array) -> tuple[Array, Array]:
-            on = side @ mix - np.outer(bound, scaling)
-            return np.hstack(
-                [on, np.zeros((len(on), bounded.size - chosen.size))]
-            ), bound - side @ structure.base
+        def asked(sides: Array, bounds: Array) -> tuple[Array, Array]:
+            on = np.zeros((len(sides), bounded.size))
+            on[:, : chosen.size] = sides @ mix - np.outer(bounds, scaling)
+            return on, bounds - sides @ structure.base
 
-        sides, bounds = asked(sides, bounds)
-        by, right = triangle[:, :-1], triangle[:, -1]
-        for _ in range(MOST_CUTS):
-            put(solve_constrained(by, right, sides, bounds, ridge=RIDGE))
-            side, softest = structure.softest(structure.base + structure.mix @ start[:n])
-            if softest >= 0.5 * structure.least_stiffness:
-                break
-            more = asked(side[np.newaxis], np.array([structure.least_stiffness]))
-            sides, bounds = np.vstack([sides, more[0]]), np.append(bounds, more[1])
+        solve = partial(solve_constrained, triangle[:, :-1], triangle[:, -1], ridge=RIDGE)
+        physics = asked(*structure.constraints(structure.expanded(start[:n_terms])))
+        solve_stiff(structure, solve, physics, asked, put)
         return start
+
+    def _forces(self, structure: Structure, start: Array, chosen: Indices) -> tuple[Array, Array]:
+        """Return derivatives of forces by linear terms and recordings' loads, and their target."""
+        rows, targets = [], []
+        n_terms = len(structure.terms)
+        for run in self.runs:
+            lacking, slopes = self.followed(structure, start, run, held=True)
+            slopes = slopes[..., : structure.n_linear]
+            loads = self.loads_at(structure, run)
+            own = np.zeros((*lacking.shape, self.size(structure) - n_terms))
+            for j in range(loads.stop - loads.start):
+                own[:, j, loads.start - n_terms + j] = 1.0
+            counts = self.counting(run)[:, np.newaxis]
+            targets.append(-lacking * counts)
+            found = np.concatenate([slopes @ structure.mix[:, chosen], own], axis=2)
+            rows.append(found * counts[..., np.newaxis])
+        return np.concatenate(rows), np.concatenate(targets)
 
     def stiffness(self, structure: Structure, z: Array) -> Array:
         """Return the stiffness of every coordinate with stops mostly sliding, shape (k, m)."""
@@ -350,26 +347,52 @@ class Problem:
             places = self.places(run)
             q, x = run.outputs[places], run.scheduled[places]
             p = self.acting(run, structure, values)[places]
-            powers = structure.powers(x[:, : len(structure.bench.scheduled)].T)
+            powers = powers_of(x[:, : len(structure.bench.scheduled)].T, structure.degree)
             own = np.empty_like(q)
             for j in range(structure.m):
-                springs = values[structure.of_coordinate("springs", j)].reshape(-1, 1 + structure.m)
-                own[:, j] = springs[:, 1 + j] @ powers
+                own[:, j] = values[structure.springs[j, :, 1 + j]] @ powers
             scale = structure.bench.scale
             for k, way in enumerate(structure.bench.directions):
                 u = q @ way / scale
-                elastic = polynomial.polyder(
-                    [0.0, 0.0, *values[structure.of_muscle("elasticity", k)]]
-                )
-                narrowing = polynomial.polyder(values[structure.of_muscle("areas", k)])
+                elastic = polynomial.polyder([0.0, 0.0, *values[structure.at["elasticity"][k]]])
+                narrowing = polynomial.polyder(values[structure.at["areas"][k]])
                 stiff = polynomial.polyval(u, elastic) / scale
                 stiff -= p[:, k] * polynomial.polyval(u, narrowing) / scale
-                stiff += float(values[structure.of_muscle("bladder", k)].sum())
-                stiff += 0.3 * float(values[structure.of_muscle("friction", k)].sum())
+                stiff += float(values[structure.at["bladders"][k]].sum())
+                stiff += 0.3 * float(values[structure.at["friction"][k]].sum())
                 own += np.outer(stiff, way**2)
             found.append(own)
         whole = np.concatenate(found)
         return np.maximum(whole, 0.1 * np.median(np.abs(whole), axis=0))
+
+
+def solve_stiff(
+    structure: Structure,
+    solve: Callable[[Array, Array], Array],
+    physics: tuple[Array, Array],
+    asked: Callable[[Array, Array], tuple[Array, Array]],
+    put: Callable[[Array], Array],
+) -> None:
+    """Solve least squares within physics; springs are made stiff where they were found soft.
+
+    Parameters
+    ----------
+    solve : callable
+        Returns the solution within constraints, ``sides @ solution >= bounds``.
+    physics : (array, array)
+        Constraints to begin with.
+    asked : callable
+        Returns those of linear coefficients as such.
+    put : callable
+        Sets the solution, and returns the linear coefficients.
+    """
+    sides, bounds = physics
+    for _ in range(MOST_CUTS):
+        side, softest = structure.softest(put(solve(sides, bounds)))
+        if softest >= 0.5 * structure.least_stiffness:
+            break
+        more = asked(side[np.newaxis], np.array([structure.least_stiffness]))
+        sides, bounds = np.vstack([sides, more[0]]), np.append(bounds, more[1])
 
 
 def compared(data: TrainingData, most: int, *, of_force: bool = False) -> Problem:

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
+from mckibben.blocks.coupled.balance_terms import NONLINEAR, TABLE, Indices
 from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, PriorErrors
-from mckibben.estimators.coupled.balance_problem import MOST_CUTS, Problem
-from mckibben.estimators.coupled.balance_structure import Indices, Structure, Term
+from mckibben.estimators.coupled.balance_problem import Problem, solve_stiff
+from mckibben.estimators.coupled.balance_structure import Structure, Term
 from mckibben.numerics.blocks import blocks_of, squared_errors, sums_of_others
 from mckibben.numerics.descent import LIGHTEST, levenberg_marquardt
 from mckibben.numerics.least_squares import solve_constrained, solve_products
@@ -45,14 +46,11 @@ FAR, LEAST_SEPARATION = 0.5, 0.7
 NO_GAIN = 1e-6
 """Gain of a term, relative to the squared errors, that is rounding."""
 
-DEVIATIONS = (("areas",), ("elasticity", "bladder"), ("friction",), ("relaxation", "damping"))
+DEVIATIONS = (("areas",), ("elasticity", "bladders"), ("friction",), ("relaxation", "damping"))
 """Kinds in which muscles may differ together."""
 
-NEW_SHAPE = ("asymmetry", "friction_slopes", "walls", "filling", "dead", "contact", "venting")
+NEW_SHAPE = tuple(name for name in NONLINEAR if TABLE[name].option == name)
 """Nonlinear parameters that are added alone."""
-
-POSITIVE_SHAPE = ("friction_offset", "friction_slopes", "walls", "filling", "dead", "contact")
-"""Non-negative nonlinear parameters."""
 
 
 @dataclass
@@ -144,19 +142,21 @@ class Search:
         known = self._known(free, size)
         free, reduced = free[known], triangle[:, np.append(known, True)]
         target = reduced[:, :-1] @ z[free] - reduced[:, -1]
-        others = np.ones(z.size, dtype=bool)
-        others[free] = False
-        solve = partial(solve_constrained, ridge=max(damping, LIGHTEST), near=z[free])
-        sides, least = self._conditions(z)
-        tried = z.copy()
-        for _ in range(MOST_CUTS):
-            missing = least - sides[:, others] @ z[others]
-            tried[free] = solve(reduced[:, :-1], target, sides[:, free], missing)
-            side, softest = structure.softest(structure.base + structure.mix @ tried[:n])
-            if softest >= 0.5 * structure.least_stiffness:
-                break
-            sides = np.vstack([sides, np.append(side @ structure.mix, np.zeros(z.size - n))])
-            least = np.append(least, structure.least_stiffness - side @ structure.base)
+        tried, others = z.copy(), np.setdiff1d(np.arange(z.size), free)
+
+        def of_free(sides: Array, least: Array) -> tuple[Array, Array]:
+            return sides[:, free], least - sides[:, others] @ z[others]
+
+        def asked(sides: Array, least: Array) -> tuple[Array, Array]:
+            return of_free(*self._of_all(sides, least, z.size))
+
+        def put(solution: Array) -> Array:
+            tried[free] = solution
+            return structure.base + structure.mix @ tried[:n]
+
+        ridge = max(damping, LIGHTEST)
+        solve = partial(solve_constrained, reduced[:, :-1], target, ridge=ridge, near=z[free])
+        solve_stiff(structure, solve, of_free(*self._conditions(z)), asked, put)
         return tried
 
     def _known(self, free: Indices, size: Array) -> Mask:
@@ -168,9 +168,8 @@ class Search:
         """Return linear constraints of all unknowns: sides @ z >= least."""
         structure = self.structure
         n, n_terms = structure.mix.shape[1], len(structure.terms)
-        sides, least = structure.constraints(structure.expanded(z[:n_terms]))
-        on_all = np.zeros((len(sides), z.size))
-        on_all[:, :n] = sides @ structure.mix
+        physics = structure.constraints(structure.expanded(z[:n_terms]))
+        on_all, least = self._of_all(*physics, z.size)
         low, high, much = structure.nonlinear_bounds()
         shape, far = z[n:n_terms], FAR * much
         bounds = np.append(np.maximum(low, shape - far), -np.minimum(high, shape + far))
@@ -178,12 +177,14 @@ class Search:
         one = np.eye(z.size)
         separations = np.array([one[j] - one[i] for i, j in pairwise(lags)])
         every = [on_all, one[n:n_terms], -one[n:n_terms], separations.reshape(-1, z.size)]
-        asked = [
-            least - sides @ structure.base,
-            bounds,
-            np.full(len(separations), LEAST_SEPARATION),
-        ]
+        asked = [least, bounds, np.full(len(separations), LEAST_SEPARATION)]
         return np.concatenate(every), np.concatenate(asked)
+
+    def _of_all(self, sides: Array, least: Array, size: int) -> tuple[Array, Array]:
+        """Return constraints of linear coefficients as those of all unknowns."""
+        on_all = np.zeros((len(sides), size))
+        on_all[:, : self.structure.mix.shape[1]] = sides @ self.structure.mix
+        return on_all, least - sides @ self.structure.base
 
     # -- choice ----------------------------------------------------------------------------------
 
@@ -198,7 +199,7 @@ class Search:
         wanted = (np.any(groups, axis=0) & new) | self.active
         (grams, folds), likely = self._grams(z, wanted, new), self._likely(z, wanted)
         others = sums_of_others(grams, folds) + likely
-        bounded = self._bounded(z.size)
+        bounded = np.append(structure.bounded, np.zeros(z.size - n, dtype=bool))
         known: dict[bytes, Array] = {}
 
         def missed(active: Mask) -> Array:
@@ -282,67 +283,48 @@ class Search:
             table[:, -1] = by @ z[: by.shape[1]] - far
         return np.asarray(table.T @ table)
 
-    def _bounded(self, size: int) -> Mask:
-        """Return which unknowns are non-negative."""
-        bounded = np.zeros(size, dtype=bool)
-        bounded[: self.structure.mix.shape[1]] = (
-            self.structure.not_negative @ self.structure.mix > 0
-        )
-        for place, term in enumerate(self.structure.terms):
-            shaped = term.kind in POSITIVE_SHAPE
-            bounded[place] = (bounded[place] or shaped) and term.muscle is None
-        return bounded
-
     def _candidates(self, active: Mask, z: Array) -> Iterator[Mask]:
         """Yield candidate groups of terms beyond the active ones."""
-        terms = self.structure.terms
+        terms, structure = self.structure.terms, self.structure
+        free = [term for term, there in zip(terms, active, strict=True) if there]
+        on = {term[:2] for term in free}
+        own = {term.kind for term in free if term.muscle}
 
         def group(*wanted: Term) -> Mask:
             return np.array([term in wanted for term in terms])
 
-        on = {(term.kind, term.which) for term, there in zip(terms, active, strict=True) if there}
-        own = {
-            term.kind for term, there in zip(terms, active, strict=True) if there and term.muscle
-        }
         for kind in ("elasticity", "areas"):
-            known = [which for name, which in on if name == kind]
-            following = max(known, default=0) + 1
-            for more in range(1, 3):
-                whole = range(following, following + more)
-                yield group(*self._with_own(kind, whole, own))
+            following = max((which for name, which in on if name == kind), default=0) + 1
+            for more in (1, 2):
+                yield group(*self._with_own(kind, range(following, following + more), own))
         for kind, which, muscle in terms:
-            if kind not in ("relaxation", "line", "mass") or muscle is not None:
+            if muscle is not None or (kind, which) in on:
                 continue
-            if (kind, which) in on or (
-                kind == "relaxation" and not self._is_distinct(which, active, z)
-            ):
-                continue
-            lag = [Term("lags", which)] * (kind == "relaxation")
-            yield group(*lag, *self._with_own(kind, (which,), own))
-        met = {self.structure.obstacles[which][0] for kind, which in on if kind == "obstacle"}
-        for which, (side, _) in enumerate(self.structure.obstacles):
+            if kind in ("lines", "mass"):
+                yield group(*self._with_own(kind, (which,), own))
+            elif kind == "relaxation" and self._is_distinct(which, active, z):
+                yield group(Term("lags", which), *self._with_own(kind, (which,), own))
+        count = len(structure.obstacles)
+        met = {structure.obstacles[which][0] for kind, which in on if kind == "obstacles"}
+        for which, (side, _) in enumerate(structure.obstacles):
             if side not in met:
-                places = [
-                    which + j * len(self.structure.obstacles) for j in range(self.structure.m)
-                ]
-                yield group(Term("obstacle", which), *(Term("places", place) for place in places))
-        for which in {w for k, w in ((t.kind, t.which) for t in terms) if k == "springs"}:
-            if ("springs", which) not in on:
-                yield group(Term("springs", which))
-        for which in range(len(self.structure.bench.scheduled)):
-            if ("friction_slopes", which) not in on:
-                yield group(Term("friction_slopes", which))
+                places = (Term("places", which + j * count) for j in range(structure.m))
+                yield group(Term("obstacles", which), *places)
+        for kind in ("springs", "friction_slopes"):
+            for which in dict.fromkeys(term.which for term in terms if term.kind == kind):
+                if (kind, which) not in on:
+                    yield group(Term(kind, which))
         ruled_out = {"friction_slopes", *(() if ("filling", 0) in on else ("venting",))}
         if {("dead", 0), ("contact", 0)} & on:
             ruled_out |= {"dead", "contact"}
         for kind in NEW_SHAPE:
             if (kind, 0) not in on and kind not in ruled_out:
                 yield group(Term(kind))
-        for kinds in DEVIATIONS if self.structure.n > 1 else ():
+        for kinds in DEVIATIONS if structure.n > 1 else ():
             if not own & set(kinds):
                 whiches = [(kind, which) for kind, which in on if kind in kinds]
                 whiches += [("areas", 0)] if "areas" in kinds else []
-                yield group(*(Term(*one, k) for one in whiches for k in range(1, self.structure.n)))
+                yield group(*(Term(*one, k) for one in whiches for k in range(1, structure.n)))
 
     def _is_distinct(self, which: int, active: Mask, z: Array) -> bool:
         """Return whether a time constant is distinct from the free ones, and in order."""

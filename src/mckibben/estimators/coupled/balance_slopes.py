@@ -17,25 +17,25 @@ import math
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.coupled import balance_terms as at
 from mckibben.blocks.coupled.balance_law import (
     AT_REST,
-    DYNAMIC,
     FROM_REST,
-    HEAD,
     IN_TIME,
     LEAST_AREA,
-    OWN,
     area,
     coordinate_at,
     friction_pressure,
+    lag_gain,
     muscle_at,
     muscle_force,
-    n_terms,
     shortening,
     solve_equilibrium,
     terms_at,
     unbalanced,
     update_state,
+    within_hull,
+    work_size,
 )
 from mckibben.blocks.kernels import fill, inlined, kernel
 from mckibben.blocks.solving import eliminate
@@ -52,32 +52,38 @@ def mix(to: Array, kept: float, share: float, row: Array) -> None:
         to[i] = kept * to[i] + share * row[i]
 
 
+# -- columns of the shape, in the order of the table of terms --------------------------------------
+
+
 @kernel
-def clear(to: Array) -> None:
-    """Fill with zeros."""
-    for i in range(to.size):
-        to[i] = 0.0
+def ratio_column(c: Array) -> int:
+    """Return the column of the ratio of limits; before are friction's offset and growths, then lags."""
+    return 1 + int(c[at.N_SCHEDULES])
+
+
+@kernel
+def wall_column(c: Array) -> int:
+    """Return the column of the walls; forces of slackening follow, then places of obstacles."""
+    return ratio_column(c) + 1 + int(c[at.N_LAGS])
 
 
 @kernel
 def n_shape(c: Array) -> int:
-    """Return the number of derivative columns of nonlinear parameters, before the front's."""
-    return walls_at(c) + 1 + int(c[0]) + int(c[1]) * int(c[9])
+    """Return the number of columns, before the front's."""
+    places = int(c[at.N_COORDINATES]) * int(c[at.N_OBSTACLES])
+    return wall_column(c) + 1 + int(c[at.N_MUSCLES]) + places
 
 
-@kernel
-def walls_at(c: Array) -> int:
-    """Return the column of the walls among those; forces of slackening follow, then obstacles."""
-    return 2 + int(c[2]) + int(c[6])
+# -- derivatives of forces at a given past -----------------------------------------------------------
 
 
 @inlined
 def by_coupling(c: Array, j: int, q: Array, x: Array, places: int, slopes: Array) -> None:
     """Fill derivatives of the force on coordinate j by its coefficients and obstacle positions."""
-    m, n_x, degree, n_loads = int(c[1]), int(c[2]), int(c[3]), int(c[4])
-    first = coordinate_at(c, 0)
+    m, n_x, n_loads = int(c[at.N_COORDINATES]), int(c[at.N_SCHEDULES]), int(c[at.N_LOADS])
+    degree, n_met, first = int(c[at.DEGREE]), int(c[at.N_OBSTACLES]), coordinate_at(c, 0)
     place = coordinate_at(c, j) - first
-    clear(slopes)
+    slopes[:] = 0.0
     power = 1.0
     for order in range(1 + n_x * degree):
         if order > 0:
@@ -89,17 +95,17 @@ def by_coupling(c: Array, j: int, q: Array, x: Array, places: int, slopes: Array
     for i in range(n_loads):
         slopes[place + i] = x[n_x + i]
     place += n_loads
-    for number in range(int(c[9])):
-        at = first + place
-        beyond = q[j] - c[at + 1]
-        if c[at] * beyond > 0.0:
-            slopes[place + 2] = beyond
-            stiffness = c[at + 2]
+    for number in range(n_met):
+        own = first + place
+        beyond = q[j] - c[own + at.PLACE]
+        if c[own + at.SIDE] * beyond > 0.0:
+            slopes[place + at.STIFFNESS] = beyond
+            stiffness = c[own + at.STIFFNESS]
             for s in range(n_x):
-                slopes[place + 3 + s] = x[s] * beyond
-                stiffness += c[at + 3 + s] * x[s]
-            slopes[places + j * int(c[9]) + number] = -stiffness
-        place += 3 + n_x
+                slopes[place + at.STIFFNESS + 1 + s] = x[s] * beyond
+                stiffness += c[own + at.STIFFNESS + 1 + s] * x[s]
+            slopes[places + j * n_met + number] = -stiffness
+        place += at.STIFFNESS + 1 + n_x
 
 
 @kernel
@@ -107,15 +113,14 @@ def by_limit(
     c: Array, i: int, s: float, p: float, x: Array, dp: Array, share: float, to: Array
 ) -> None:
     """Add a share of a sliding stop's derivatives by nonlinear parameters, from column 0 on."""
-    n_x = int(c[2])
-    upper = c[HEAD + i]
+    upper = c[at.LIMITS + i]
     if s < 0.0:
-        upper *= -c[12]
-        to[1 + n_x] += share * s
+        upper *= -c[at.RATIO]
+        to[ratio_column(c)] += share * s
     if not friction_pressure(c, p, x) > 0.0:
         return
     to[0] += share * upper
-    for j in range(n_x):
+    for j in range(int(c[at.N_SCHEDULES])):
         to[1 + j] += share * upper * x[j]
     for f in range(dp.size):
         to[to.size - dp.size + f] += share * upper * dp[f]
@@ -132,74 +137,89 @@ def by_shape(
     x: Array,
     dp: Array,
     terms: Array,
-    slopes: Array,
     late: Array,
     to: Array,
 ) -> None:
     """Add a taut muscle's derivatives by nonlinear parameters at fixed past, and fill those of lags.
 
-    ``terms`` and ``slopes`` are its own; ``to`` begins with the shape; ``late`` has a number a lag.
+    ``terms`` and behind them slopes are its own; ``to`` begins with the shape; ``late`` has a number a
+    lag.
     """
-    n, m, n_s, n_l = int(c[0]), int(c[1]), int(c[5]), int(c[6])
-    place, first = muscle_at(c, k) + OWN + m, n_terms(c) - n_l - n_s
-    taut = slopes[3] != 0.0
+    n_l, width, first, walls = (
+        int(c[at.N_LAGS]),
+        int(c[at.N_TERMS]),
+        int(c[at.STOP]),
+        wall_column(c),
+    )
+    place, past = terms_at(c, k), int(c[at.LAGGING]) + k * n_l
+    taut = terms[width + at.BLADDER] != 0.0
     moved = y - shortening(c, k, state)
     for i in range(n_l):
         late[i] = 0.0
         if way == IN_TIME:
-            decay, gain = c[HEAD + n_s + i], c[HEAD + n_s + n_l + i]
-            past = state[m + n + n * n_s + k * n_l + i]
-            late[i] = -decay * math.log(decay) * past + (gain - decay) * moved
+            decay, gain = c[int(c[at.DECAYS]) + i], c[int(c[at.GAINS]) + i]
+            late[i] = -decay * math.log(decay) * state[past + i] + (gain - decay) * moved
             if taut:
-                to[2 + int(c[2]) + i] += c[place + first + n_s + i] * late[i]
+                to[ratio_column(c) + 1 + i] += c[place + int(c[at.LAG]) + i] * late[i]
     if not taut:
-        to[walls_at(c) + 1 + k] += 1.0
+        to[walls + 1 + k] += 1.0
         return
-    a, wall = area(c, k, y)[0], c[muscle_at(c, k) + 2]
+    a, wall = area(c, k, y)[0], c[muscle_at(c, k) + at.WALL]
     for f in range(dp.size):
         to[to.size - dp.size + f] -= a * dp[f]
-    for i in range(n_s if way != AT_REST else 0):
+    for i in range(int(c[at.N_STOPS]) if way != AT_REST else 0):
         h = c[place + first + i]
-        if slopes[first + i] == 0.0:
+        if terms[width + first + i] == 0.0:
             by_limit(c, i, terms[first + i], p, x, dp, h, to)
         else:
-            to[walls_at(c)] += h * p
+            to[walls] += h * p
             for f in range(dp.size):
                 to[to.size - dp.size + f] += h * wall * dp[f]
 
 
 @inlined
-def by_least_area(c: Array, k: int, y: float, p: float, slopes: Array, to: Array) -> None:
+def by_least_area(c: Array, k: int, y: float, p: float, terms: Array, to: Array) -> None:
     """Replace a taut muscle's derivatives by its area where that is at its least, relative to rest."""
-    first = terms_at(c, k) + DYNAMIC + int(c[7])
+    first = terms_at(c, k) + int(c[at.AREA])
     least, column = LEAST_AREA * c[first], first - coordinate_at(c, 0)
-    if least > 0.0 and slopes[3] != 0.0 and not area(c, k, y)[0] > least:
-        clear(to[column : column + int(c[8])])
+    taut = terms[int(c[at.N_TERMS]) + at.BLADDER] != 0.0
+    if least > 0.0 and taut and not area(c, k, y)[0] > least:
+        to[column : column + int(c[at.N_AREAS])] = 0.0
         to[column] = -LEAST_AREA * p
 
 
+# -- derivatives through the past ---------------------------------------------------------------------
+
+
 @inlined
-def through_past(c: Array, k: int, slopes: Array, past: Array, moved: Array, to: Array) -> None:
+def through_past(c: Array, k: int, terms: Array, past: Array, moved: Array, to: Array) -> None:
     """Add derivatives of the force of muscle k through its past, given in ``past``.
 
-    ``slopes`` are those of its terms by its shortening, and ``moved`` those of its last shortening.
+    ``terms`` and behind them slopes are its own, and ``moved`` those of its last shortening.
     """
-    n, n_s, n_l, m = int(c[0]), int(c[5]), int(c[6]), int(c[1])
-    place = muscle_at(c, k) + OWN + m
-    first = n_terms(c) - n_l - n_s
-    carried = c[place] * slopes[0] + c[place + 1] * slopes[1] + c[place + 2] * slopes[2]
+    n, n_s, n_l, width = (
+        int(c[at.N_MUSCLES]),
+        int(c[at.N_STOPS]),
+        int(c[at.N_LAGS]),
+        int(c[at.N_TERMS]),
+    )
+    place, slopes, stop, lag = terms_at(c, k), terms[width:], int(c[at.STOP]), int(c[at.LAG])
+    heavy = c[place + at.MASS] * slopes[at.MASS]
+    carried = (
+        c[place + at.DAMPING] * slopes[at.DAMPING] + c[place + at.LINE] * slopes[at.LINE] + heavy
+    )
     for i in range(n_s):
-        if slopes[first + i] != 0.0:
-            mix(to, 1.0, c[place + first + i], past[m + k * n_s + i])
+        if slopes[stop + i] != 0.0:
+            mix(to, 1.0, c[place + stop + i], past[int(c[at.STOPS]) - n + k * n_s + i])
     for i in range(n_l):
-        kappa = c[place + first + n_s + i]
-        carried += kappa * slopes[first + n_s + i]
-        if slopes[3] != 0.0:
-            mix(to, 1.0, kappa * c[HEAD + n_s + i], past[m + n * n_s + k * n_l + i])
-    if c[18] != 0.0 and slopes[2] != 0.0:
-        row = m + n * (n_s + n_l) + 2 * k
-        mix(to, 1.0, -1.5 * c[place + 2] * slopes[2], past[row])
-        mix(to, 1.0, 0.5 * c[place + 2] * slopes[2], past[row + 1])
+        kappa, row = c[place + lag + i], int(c[at.LAGGING]) - n + k * n_l + i
+        carried += kappa * slopes[lag + i]
+        if slopes[at.BLADDER] != 0.0:
+            mix(to, 1.0, kappa * c[int(c[at.DECAYS]) + i], past[row])
+    if c[at.N_MOVES] != 0.0 and slopes[at.MASS] != 0.0:
+        row = int(c[at.MOVED]) - n + 2 * k
+        mix(to, 1.0, -1.5 * c[place + at.MASS] * slopes[at.MASS], past[row])
+        mix(to, 1.0, 0.5 * c[place + at.MASS] * slopes[at.MASS], past[row + 1])
     mix(to, 1.0, -carried, moved)
 
 
@@ -209,20 +229,19 @@ def through_line(c: Array, k: int, state: Array, terms: Array, moved: Array, to:
 
     ``terms`` are its own, and ``moved`` the derivatives of its last shortening.
     """
-    own, before = muscle_at(c, k), shortening(c, k, state)
-    first = terms_at(c, k) + DYNAMIC + int(c[7])
-    inside = min(max(before, c[own]), c[own + 1])
+    before, own = shortening(c, k, state), terms_at(c, k)
+    first, inside = own + int(c[at.AREA]), within_hull(c, k, before)
     a, narrowing = area(c, k, inside)
     if not a > LEAST_AREA * c[first]:
         return
-    pull = 2.0 * c[terms_at(c, k) + 1] * terms[1] / a
+    pull = 2.0 * c[own + at.LINE] * terms[at.LINE] / a
     if inside == before:
         mix(to, 1.0, pull * narrowing, moved)
     column, power = first - coordinate_at(c, 0), 1.0
     to[column] -= pull * a / c[first]
-    for i in range(int(c[8])):
+    for i in range(int(c[at.N_AREAS])):
         to[column + i] += pull * power
-        power *= inside / c[10]
+        power *= inside / c[at.SCALE]
 
 
 @inlined
@@ -240,29 +259,31 @@ def carry(
     now: Array,
 ) -> None:
     """Update the derivatives of the past of muscle k to the current state."""
-    n, m, n_s, n_l = int(c[0]), int(c[1]), int(c[5]), int(c[6])
+    n, n_s, n_l = int(c[at.N_MUSCLES]), int(c[at.N_STOPS]), int(c[at.N_LAGS])
     grown = friction_pressure(c, p, x) if way != AT_REST else 0.0
     shape = now.size - n_shape(c) - dp.size
     for i in range(n_s):
-        s, upper = state[m + n + k * n_s + i], c[HEAD + i] * grown
-        if not -c[12] * upper < s < upper:
-            row = m + k * n_s + i
+        place = int(c[at.STOPS]) + k * n_s + i
+        s, upper, row = state[place], c[at.LIMITS + i] * grown, place - n
+        if not -c[at.RATIO] * upper < s < upper:
             mix(past[row], 0.0, -1.0, now)
-            past[row, shape + walls_at(c)] -= p
+            past[row, shape + wall_column(c)] -= p
             for f in range(dp.size):
-                past[row, now.size - dp.size + f] -= c[muscle_at(c, k) + 2] * dp[f]
+                past[row, now.size - dp.size + f] -= c[muscle_at(c, k) + at.WALL] * dp[f]
             if way != AT_REST:
                 by_limit(c, i, s, p, x, dp, 1.0, past[row, shape:])
     mix(moved, -1.0, 1.0, now)
     for i in range(n_l if way != AT_REST else 0):
-        row = m + n * n_s + k * n_l + i
-        gain = c[HEAD + n_s + n_l + i] if way == IN_TIME else c[17]
-        mix(past[row], c[HEAD + n_s + i], gain, moved)
-        past[row, shape + 2 + int(c[2]) + i] += late[i]
-    if c[18] != 0.0 and way == IN_TIME:
-        row = m + n * (n_s + n_l) + 2 * k
+        row = int(c[at.LAGGING]) - n + k * n_l + i
+        mix(past[row], c[int(c[at.DECAYS]) + i], lag_gain(c, i, way), moved)
+        past[row, shape + ratio_column(c) + 1 + i] += late[i]
+    if c[at.N_MOVES] != 0.0 and way == IN_TIME:
+        row = int(c[at.MOVED]) - n + 2 * k
         fill(past[row + 1], past[row])
         fill(past[row], moved)
+
+
+# -- samples -----------------------------------------------------------------------------------------
 
 
 @inlined
@@ -274,8 +295,7 @@ def approach(
     x: Array,
     p: Array,
     sloped: bool,
-    copied: Array,
-    inverse: Array,
+    rows: Array,
     work: Array,
 ) -> None:
     """Solve for equilibrium by Newton's method from where coordinates are, or by `solve_equilibrium`.
@@ -283,15 +303,16 @@ def approach(
     If slopes are wanted, fill the terms of the last muscle and the inverse of the slopes there: a step
     before, they would be as far off as the step is long.
     """
-    m = int(c[1])
-    residual, step, sizes = work[:m], work[m : 2 * m], work[3 * m : 4 * m]
-    matrix, terms = work[4 * m : 4 * m + m * m].reshape((m, m)), work[4 * m + m * m :]
+    n, m = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES])
+    residual, step = work[:m], work[m : 2 * m]
+    matrix = work[4 * m : 4 * m + m * m].reshape((m, m))
+    inverse, copied = rows[2 * n : 2 * n + m, :m], rows[2 * n + m : 2 * n + 2 * m, :m]
     for turn in range(FEW_STEPS + 1):
         if turn == FEW_STEPS:
             fill(q, state)
             solve_equilibrium(c, state, way, q, x, p, work)
             break
-        left = unbalanced(c, state, way, q, x, p, residual, matrix, sizes, terms)
+        left = unbalanced(c, state, way, q, x, p, work)
         eliminate(matrix, residual)
         for j in range(m):
             q[j] -= residual[j]
@@ -299,7 +320,7 @@ def approach(
             break
     if not sloped:
         return
-    unbalanced(c, state, way, q, x, p, residual, matrix, sizes, terms)
+    unbalanced(c, state, way, q, x, p, work)
     for i in range(m):
         for j in range(m):
             step[j] = 1.0 if i == j else 0.0
@@ -310,80 +331,73 @@ def approach(
 
 
 @inlined
-def move(
+def slopes_at_past(
     c: Array,
     state: Array,
     way: int,
-    held: bool,
     q: Array,
     x: Array,
     p: Array,
     dp: Array,
     past: Array,
     rows: Array,
-    found: Array,
     slopes: Array,
-    work: Array,
+    terms: Array,
 ) -> None:
-    """Advance one step, free or held, with all derivatives.
+    """Fill the derivatives of the forces on coordinates, those of stops and lags with them.
 
-    Slopes of no columns are not computed. ``past`` begins with the slopes of coordinates; ``rows`` has
-    two rows a muscle to compute in.
+    ``rows`` is to compute in: slopes of every muscle's last shortening, then of its force, the inverse
+    and a copy of the slopes of forces, and slopes of what lags are behind. ``terms`` are those of the
+    last muscle.
     """
-    n, m, width, sloped = int(c[0]), int(c[1]), n_terms(c), slopes.shape[1] > 0
-    terms = work[4 * m + m * m :]
-    values, by_y = terms[:width], terms[width : 2 * width]
-    copied, inverse = rows[2 * n : 2 * n + m, :m], rows[2 * n + m : 2 * n + 2 * m, :m]
+    n, m, n_l = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES]), int(c[at.N_LAGS])
+    width, first = int(c[at.N_TERMS]), coordinate_at(c, 0)
     shape, late = slopes.shape[1] - n_shape(c) - dp.shape[1], rows[2 * n + 2 * m]
-    if held:
-        matrix, sizes = work[4 * m : 4 * m + m * m].reshape((m, m)), work[3 * m : 4 * m]
-        unbalanced(c, state, way, q, x, p, found, matrix, sizes, terms)
-    else:
-        approach(c, state, way, q, x, p, sloped, copied, inverse, work)
-    for j in range(m if sloped else 0):
-        by_coupling(c, j, q, x, shape + walls_at(c) + 1 + n, slopes[j])
-    for back in range(n if sloped else 0):
+    for j in range(m):
+        by_coupling(c, j, q, x, shape + wall_column(c) + 1 + n, slopes[j])
+    for back in range(n):
         k = n - 1 - back
-        own, y, moved, by_force = muscle_at(c, k) + OWN, shortening(c, k, q), rows[k], rows[n + k]
-        if back > 0:  # those of the last muscle are there
-            muscle_force(c, k, state, way, y, p[k], x, values, by_y)
-        clear(moved)
-        clear(by_force)
-        for j in range(m):
-            if c[own + j] != 0.0:
-                mix(moved, 1.0, c[own + j], past[j])
-        place = own + m - coordinate_at(c, 0)
-        fill(by_force[place : place + width], values)
-        by_least_area(c, k, y, p[k], by_y, by_force)
-        own_late, to = late[k * int(c[6]) : (k + 1) * int(c[6])], by_force[shape:]
-        by_shape(c, k, state, way, y, p[k], x, dp[k], values, by_y, own_late, to)
+        y, moved, by_force = shortening(c, k, q), rows[k], rows[n + k]
+        if back > 0:
+            muscle_force(c, k, state, way, y, p[k], x, terms)
+        along(c, k, past, moved)
+        by_force[:] = 0.0
+        own = terms_at(c, k)
+        fill(by_force[own - first : own - first + width], terms)
+        by_least_area(c, k, y, p[k], terms, by_force)
+        own_late, to = late[k * n_l : (k + 1) * n_l], by_force[shape:]
+        by_shape(c, k, state, way, y, p[k], x, dp[k], terms, own_late, to)
         if way != AT_REST:
-            through_past(c, k, by_y, past, moved, by_force)
-        if way == IN_TIME and c[15] > 0.0 and c[terms_at(c, k) + 1] > 0.0:
-            through_line(c, k, state, values, moved, by_force)
+            through_past(c, k, terms, past, moved, by_force)
+        if way == IN_TIME and c[at.RATE] > 0.0 and c[own + at.LINE] > 0.0:
+            through_line(c, k, state, terms, moved, by_force)
         for j in range(m):
-            if c[own + j] != 0.0:
-                mix(slopes[j], 1.0, c[own + j], by_force)
-    for j in range(m if not held else 0):
-        found[j] = q[j]
-    update_state(c, state, way, q, p, x)
-    if not sloped:
-        return
-    if not held:
-        for j in range(m):
-            clear(past[j])
-            for i in range(m):
-                mix(past[j], 1.0, -inverse[j, i], slopes[i])
-        for j in range(m):
-            fill(slopes[j], past[j])
+            pull = c[muscle_at(c, k) + at.WAYS + j]
+            if pull != 0.0:
+                mix(slopes[j], 1.0, pull, by_force)
+
+
+@inlined
+def follow_past(
+    c: Array, state: Array, way: int, p: Array, x: Array, dp: Array, past: Array, rows: Array
+) -> None:
+    """Update the derivatives of the past of all muscles; ``past`` begins with those of coordinates."""
+    n, m, n_l = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES]), int(c[at.N_LAGS])
+    late = rows[2 * n + 2 * m]
     for k in range(n):
-        own, now = muscle_at(c, k) + OWN, rows[n + k]
-        clear(now)
-        for j in range(m):
-            if c[own + j] != 0.0:
-                mix(now, 1.0, c[own + j], past[j])
-        own_late = late[k * int(c[6]) : (k + 1) * int(c[6])]
+        now, own_late = rows[n + k], late[k * n_l : (k + 1) * n_l]
+        along(c, k, past, now)
         carry(c, k, state, way, p[k], x, dp[k], own_late, past, rows[k], now)
+
+
+@kernel
+def along(c: Array, k: int, past: Array, to: Array) -> None:
+    """Fill the derivatives of the shortening of muscle k from those of coordinates."""
+    to[:] = 0.0
+    for j in range(int(c[at.N_COORDINATES])):
+        way = c[muscle_at(c, k) + at.WAYS + j]
+        if way != 0.0:
+            mix(to, 1.0, way, past[j])
 
 
 @kernel
@@ -421,25 +435,42 @@ def follow(
     slopes : array, shape (t / every, m, columns)
         Of no columns if not wanted.
     """
-    n, m = int(c[0]), int(c[1])
-    n_states = scratch.size - 3 * m - 2 * n - 5 * m - m * m - 2 * n_terms(c)
+    n, m, sloped = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES]), slopes.shape[2] > 0
+    n_states = int(c[at.TARE]) + m - at.FRESH
     state, rest = scratch[:n_states], scratch[n_states:]
     q, tare, last = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m]
     p, work = rest[3 * m : 3 * m + n], rest[3 * m + n :]
-    tared = past[past.shape[0] - m :]
+    terms = work[4 * m + m * m :]
+    inverse, tared = rows[2 * n : 2 * n + m, :m], past[past.shape[0] - m :]
     for t in range(-1, driven.shape[0]):
         way = AT_REST if t < 0 else FROM_REST if t == 0 else IN_TIME
         now, place = max(t, 0), max(t, 0) // every
-        acts = t >= 0 or (held and c[22] == 0.0)
+        acts = t >= 0 or (held and c[at.HELD] == 0.0)
         fill(p, driven[now] if acts else p)
+        by_front = dp[now + 1 if acts else 0]
         for j in range(m):
             ahead = 2.0 * q[j] - last[j] if t > 0 else q[j]
             last[j] = q[j]
             q[j] = measured[now, j] if held else ahead
-        by_front = dp[now + 1 if acts else 0]
-        to, by = found[place], slopes[place]
-        move(c, state, way, held, q, x[now], p, by_front, past, rows, to, by, work)
-        if held or c[16] == 0.0:
+        if held:
+            unbalanced(c, state, way, q, x[now], p, work)
+            fill(found[place], work)
+        else:
+            approach(c, state, way, q, x[now], p, sloped, rows, work)
+        if sloped:
+            slopes_at_past(c, state, way, q, x[now], p, by_front, past, rows, slopes[place], terms)
+        for j in range(m if not held else 0):
+            found[place, j] = q[j]
+        update_state(c, state, way, q, p, x[now])
+        for j in range(m if sloped and not held else 0):
+            past[j] = 0.0
+            for i in range(m):
+                mix(past[j], 1.0, -inverse[j, i], slopes[place, i])
+        for j in range(m if sloped and not held else 0):
+            fill(slopes[place, j], past[j])
+        if sloped:
+            follow_past(c, state, way, p, x[now], by_front, past, rows)
+        if held or c[at.TARED] == 0.0:
             continue
         for j in range(m):
             if t < 0:
@@ -461,17 +492,16 @@ def run(
     sloped: bool = True,
 ) -> tuple[Array, Array]:
     """Return the results of `follow` at every n-th sample, and the derivatives."""
-    n, m, n_s, n_l = (int(c[i]) for i in (0, 1, 5, 6))
-    moves = 2 if c[18] else 0
-    n_states = n * (1 + n_s + n_l + moves) + 2 * m + 2
+    n, m, n_l = (int(c[size]) for size in (at.N_MUSCLES, at.N_COORDINATES, at.N_LAGS))
+    n_states = int(c[at.TARE]) + m - at.FRESH
     dp = np.zeros((len(driven), n, 0)) if dp is None else dp
     dp = np.concatenate([np.zeros((1, n, dp.shape[2])), dp])
     n_c = (c.size - coordinate_at(c, 0) + n_shape(c) + dp.shape[2]) * sloped
     kept = -(-len(driven) // every)
     found, slopes = np.empty((kept, m)), np.zeros((kept, m, n_c))
-    past = np.zeros((2 * m + n * (n_s + n_l + moves), n_c))
+    past = np.zeros((n_states + at.FRESH - n, n_c))
     rows = np.zeros((2 * n + 2 * m + 1, max(n_c, m, n * n_l)))
-    scratch = np.zeros(n_states + 3 * m + 2 * n + 5 * m + m * m + 2 * n_terms(c))
+    scratch = np.zeros(n_states + 3 * m + n + work_size(c))
     p, y, x, dp = (np.ascontiguousarray(one) for one in (driven, measured, x, dp))
     follow(c, p, y, x, dp, held, every, past, rows, scratch, found, slopes)
     return found, slopes

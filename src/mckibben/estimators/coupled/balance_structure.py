@@ -21,15 +21,30 @@ from itertools import product
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_adaptive import GRID, LEAST_LEFT
-from mckibben.blocks.coupled.balance_law import NEVER, OWN
+from mckibben.blocks.coupled import balance_terms as at
+from mckibben.blocks.coupled.balance import (
+    GRID,
+    LEAST_LEFT,
+    Balance,
+    corners,
+    fields_of,
+    powers_of,
+    softest,
+)
+from mckibben.blocks.coupled.balance_terms import (
+    LINEAR,
+    NEVER,
+    NONLINEAR,
+    TABLE,
+    Indices,
+    Sizes,
+    layout,
+)
 from mckibben.blocks.fields import Channel, rows, vector
 
-Indices = NDArray[np.intp]
 Item = TypeVar("Item")
 
 LEAST_AREA = 1e-9
@@ -43,15 +58,6 @@ MOST_STRETCH = {False: 0.1, True: 1.0}
 errors are of force. At a held length stops feel only its ratio to their travel, and noise of the length
 is the less motion to them the larger it is.
 """
-
-LOGARITHMIC = ("lags", "asymmetry", "venting")
-"""Nonlinear parameters that are stored as logarithms."""
-
-OF_MUSCLES = ("damping", "line", "mass", "bladder", "elasticity", "areas", "friction", "relaxation")
-"""Kinds of linear coefficients of muscles."""
-
-NOT_NEGATIVE = ("damping", "line", "mass", "bladder", "friction", "relaxation")
-"""Kinds of linear coefficients of muscles that are non-negative."""
 
 
 @dataclass(frozen=True)
@@ -140,10 +146,11 @@ class Bench:
         most = np.abs(self.levels).max(axis=1)
         return np.where(most > 0, most, 1.0)
 
-    def corners(self) -> list[Array]:
-        """Return all combinations of the ends and middles of the scheduling inputs."""
-        low, high = self.levels.T
-        return [low + np.array(s) * (high - low) for s in product((0.0, 0.5, 1.0), repeat=len(low))]
+    def natural(self, unit: str) -> float:
+        """Return the natural size of a unit."""
+        force = self.highest * self.unit
+        sizes = {"N": force, "N/bar": self.unit, "bar": self.highest, "mm/bar": self.most_stretch}
+        return sizes.get(unit, force / self.scale if unit.startswith("N") else 1.0)
 
 
 class Term(NamedTuple):
@@ -200,71 +207,54 @@ class Structure:
         return len(self.bench.scheduled)
 
     @cached_property
-    def _coordinate(self) -> dict[str, slice]:
-        widths = {"springs": (1 + self.n_x * self.degree) * (1 + self.m)}
-        widths |= {
-            "loads": len(self.bench.loaded),
-            "obstacles": len(self.obstacles) * (3 + self.n_x),
-        }
-        return _slices(widths)
+    def sizes(self) -> Sizes:
+        """The numbers of all that the balance has."""
+        return Sizes(
+            muscles=self.n,
+            coordinates=self.m,
+            schedules=self.n_x,
+            degree=self.degree,
+            loads=len(self.bench.loaded),
+            stops=len(self.limits),
+            lags=len(self.lags),
+            elastic=self.n_elastic,
+            area=self.n_area,
+            obstacles=len(self.obstacles),
+        )
 
     @cached_property
-    def _muscle(self) -> dict[str, slice]:
-        widths = {"own": OWN + self.m, "damping": 1, "line": 1, "mass": 1, "bladder": 1}
-        widths |= {"elasticity": self.n_elastic, "areas": self.n_area}
-        return _slices(widths | {"friction": len(self.limits), "relaxation": len(self.lags)})
+    def at(self) -> dict[str, Indices]:
+        """Indices of the values: of linear ones a row a coordinate or muscle, of others a vector."""
+        places = layout(self.sizes)
+        first = places.head[at.COORDINATES]
+        found = {name: index - first for name, index in places.at.items()}
+        end = places.size - first
+        for name in NONLINEAR:
+            # all muscles have one stretch of the wall
+            count = 1 if name == "walls" else self.sizes.of(TABLE[name].of)
+            found[name] = end + np.arange(count * self.sizes.number(TABLE[name].width))
+            end += found[name].size
+        return found
 
-    def of_coordinate(self, name: str, j: int) -> Indices:
-        """Return the indices of a coordinate's coefficients of a kind."""
-        part, width = self._coordinate[name], self._coordinate["obstacles"].stop
-        return np.arange(part.start, part.stop) + j * width
-
-    def of_muscle(self, name: str, k: int) -> Indices:
-        """Return the indices of a muscle's coefficients of a kind."""
-        part, width = self._muscle[name], self._muscle["relaxation"].stop
-        first = self.m * self._coordinate["obstacles"].stop + k * width
-        return np.arange(part.start, part.stop) + first
+    @cached_property
+    def springs(self) -> Indices:
+        """Indices of springs, shape (m, powers, 1 + m): a constant, then to every coordinate."""
+        return self.at["springs"].reshape(self.m, -1, 1 + self.m)
 
     @cached_property
     def n_linear(self) -> int:
         """Number of linear coefficients, including unused ones."""
-        return (
-            self.m * self._coordinate["obstacles"].stop + self.n * self._muscle["relaxation"].stop
-        )
-
-    def spring(self, q: int, j: int, i: int) -> int:
-        """Return the index of the spring from coordinate j to i, or of its constant for i = -1."""
-        return int(self.of_coordinate("springs", j)[q * (1 + self.m) + 1 + i])
-
-    @cached_property
-    def nonlinear(self) -> dict[str, slice]:
-        """Positions of the nonlinear parameters in the values.
-
-        Friction offset [bar], and its slopes by scheduling inputs; logarithms
-        of the ratio of friction limits and of the lags; stretch of walls [mm/bar]; forces at which
-        muscles go slack (pushes); positions of obstacles (places); time constant of filling [s],
-        logarithm of the ratio of venting to filling, dead zone [bar], and the pressure over which
-        contact builds up [bar].
-        """
-        widths = {
-            "friction_offset": 1,
-            "friction_slopes": self.n_x,
-            "asymmetry": 1,
-            "lags": len(self.lags),
-        }
-        widths |= {"walls": 1, "pushes": self.n, "places": self.m * len(self.obstacles)}
-        widths |= {"filling": 1, "venting": 1, "dead": 1, "contact": 1}
-        return _slices(widths, self.n_linear)
+        return int(self.at[NONLINEAR[0]][0])
 
     @property
     def size(self) -> int:
         """Number of values."""
-        return self.nonlinear["contact"].stop
+        return self.n_linear + sum(self.at[name].size for name in NONLINEAR)
 
     def nonlinear_values(self, values: Array, name: str) -> Array:
         """Return the nonlinear parameters of a kind."""
-        part = values[self.nonlinear[name]]
-        return np.exp(part) if name in LOGARITHMIC else part
+        part = values[self.at[name]]
+        return np.exp(part) if TABLE[name].log else part
 
     # -- free parameters -------------------------------------------------------------------------
 
@@ -272,35 +262,33 @@ class Structure:
     def _columns(self) -> list[tuple[Term, list[int]]]:
         """All linear terms, and the indices of their coefficients."""
         columns: list[tuple[Term, list[int]]] = []
-        for q, j in product(range(1 + self.n_x * self.degree), range(self.m)):
+        for q, j in product(range(self.springs.shape[1]), range(self.m)):
             if q or not self.bench.tare:  # relative coordinates have no constant force
-                columns.append((Term("springs", q), [self.spring(q, j, -1)]))
+                columns.append((Term("springs", q), [int(self.springs[j, q, 0])]))
             for i in range(j, self.m):
-                both = {self.spring(q, j, i), self.spring(q, i, j)}
+                both = {int(self.springs[j, q, 1 + i]), int(self.springs[i, q, 1 + j])}
                 columns.append((Term("springs", q), sorted(both)))
         for j in range(self.m):
             if not self.bench.of_force:
-                loads = self.of_coordinate("loads", j).tolist()
-                columns += [(Term("loads", j), [index]) for index in loads]
-            table = self.of_coordinate("obstacles", j).reshape(-1, 3 + self.n_x)
-            for number, stiffnesses in enumerate(table[:, 2:].tolist()):
-                columns += [(Term("obstacle", number), [index]) for index in stiffnesses]
-        for kind in OF_MUSCLES:
-            indices = [self.of_muscle(kind, k).tolist() for k in range(self.n)]
-            for which, shared in enumerate(zip(*indices, strict=True)):
+                columns += [(Term("loads", j), [index]) for index in self.at["loads"][j].tolist()]
+            for number, index in self._stiffnesses(j):
+                columns.append((Term("obstacles", number), [index]))
+        for kind in LINEAR["muscle"]:
+            for which, shared in enumerate(self.at[kind].T.tolist()):
                 if kind != "areas" or which or self.bench.of_force:
-                    columns.append((Term(kind, which), list(shared)))
+                    columns.append((Term(kind, which), shared))
                 columns += [(Term(kind, which, k), [shared[k]]) for k in range(1, self.n)]
         return columns
+
+    def _stiffnesses(self, j: int) -> list[tuple[int, int]]:
+        """Return number and index of every stiffness of the obstacles of a coordinate."""
+        table = self.at["obstacles"][j].reshape(-1, self.sizes.obstacle)[:, at.STIFFNESS :]
+        return [(number, index) for number, row in enumerate(table.tolist()) for index in row]
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
         """Candidate terms, linear first, then nonlinear."""
-        nonlinear = [
-            Term(name, which)
-            for name, part in self.nonlinear.items()
-            for which in range(part.stop - part.start)
-        ]
+        nonlinear = [Term(name, which) for name in NONLINEAR for which in range(self.at[name].size)]
         return (*(term for term, _ in self._columns), *nonlinear)
 
     @cached_property
@@ -316,25 +304,32 @@ class Structure:
         """Linear coefficients if all free ones are 0: areas at rest, or that of the load, are 1."""
         values = np.zeros(self.n_linear)
         if self.bench.of_force:
-            values[self.of_coordinate("loads", 0)] = 1.0
-        for k in range(0 if self.bench.of_force else self.n):
-            values[self.of_muscle("areas", k)[0]] = 1.0
+            values[self.at["loads"][0]] = 1.0
+        else:
+            values[self.at["areas"][:, 0]] = 1.0
         return values
 
     def free(self, name: str) -> slice:
         """Return the positions of a kind of nonlinear parameter among the free ones."""
-        part, shift = self.nonlinear[name], self.mix.shape[1] - self.n_linear
-        return slice(part.start + shift, part.stop + shift)
+        shift = self.mix.shape[1] - self.n_linear
+        size = self.at[name].size
+        first = int(self.at[name][0]) + shift if size else 0
+        return slice(first, first + size)
 
     @cached_property
     def not_negative(self) -> NDArray[np.bool_]:
         """Mask of the non-negative linear coefficients."""
         mask = np.zeros(self.n_linear, dtype=bool)
-        for kind, k in product(NOT_NEGATIVE, range(self.n)):
-            mask[self.of_muscle(kind, k)] = True
-        for j in range(self.m):
-            mask[self.of_coordinate("obstacles", j)] = True
+        for name in (*LINEAR["coordinate"], *LINEAR["muscle"]):
+            mask[self.at[name]] = TABLE[name].least == 0.0
         return mask
+
+    @cached_property
+    def bounded(self) -> NDArray[np.bool_]:
+        """Mask of the non-negative free parameters; slackening starts from a model without."""
+        shape = [TABLE[name].least == 0.0 and name != "pushes" for name, _, _ in self.terms]
+        shape[: self.mix.shape[1]] = self.not_negative @ self.mix > 0
+        return np.array(shape) & np.array([muscle is None for _, _, muscle in self.terms])
 
     def expanded(self, free: Array) -> Array:
         """Return all values from the free ones."""
@@ -371,7 +366,7 @@ class Structure:
     def keys(self) -> list[tuple[object, ...]]:
         """Keys of the terms across structures: limits, lags and obstacles by their initial values."""
         by: dict[str, Sequence[object]] = {"friction": self.limits, "relaxation": self.lags}
-        by |= {"lags": self.lags, "obstacle": self.obstacles, "places": self.m * self.obstacles}
+        by |= {"lags": self.lags, "obstacles": self.obstacles, "places": self.m * self.obstacles}
         return [
             (kind, by[kind][which] if kind in by else which, muscle)
             for kind, which, muscle in self.terms
@@ -379,42 +374,31 @@ class Structure:
 
     def scales(self) -> Array:
         """Return the scales of all free parameters, relative to an area at rest of 1."""
-        bench = self.bench
-        force = bench.highest * bench.unit
-        stiff = force / bench.scale
-        linear = np.full(self.n_linear, stiff)
-        powers = 1.0 / self.powers(bench.largest)
-        for j in range(self.m):
-            springs = np.outer(powers, [force, *self.m * [stiff]])
-            linear[self.of_coordinate("springs", j)] = springs.ravel()
-            linear[self.of_coordinate("loads", j)] = force / bench.heaviest
-        for k in range(self.n):
-            linear[self.of_muscle("elasticity", k)] = force
-            linear[self.of_muscle("areas", k)] = bench.unit
+        linear = np.zeros(self.n_linear)
+        for name in (*LINEAR["coordinate"], *LINEAR["muscle"]):
+            linear[self.at[name]] = self.bench.natural(TABLE[name].unit)
+        force = self.bench.natural("N")
+        linear[self.at["loads"]] = force / self.bench.heaviest
+        powers = 1.0 / powers_of(self.bench.largest, self.degree)
+        linear[self.springs] = np.outer(powers, [force, *self.m * [self.bench.natural("N/mm")]])
         return np.append(self.mix.T @ linear / self.mix.sum(axis=0), self.nonlinear_bounds()[2])
 
     def nonlinear_bounds(self) -> tuple[Array, Array, Array]:
         """Return lower and upper bounds of the nonlinear parameters, and their scales."""
-        bench = self.bench
-        per_x = bench.highest / bench.largest
-        (shortest, longest), log_ratio = np.log(bench.lag_range), np.log(5.0)
-        bounds: dict[str, tuple[ArrayLike, ArrayLike, ArrayLike]] = {
-            "friction_offset": (0.0, 4.0 * bench.highest, bench.highest),
-            "friction_slopes": (0.0, 4.0 * per_x, per_x),
-            "asymmetry": (-log_ratio, log_ratio, 1.0),
-            "lags": (shortest, longest, 1.0),
-            "walls": (0.0, bench.most_stretch, 0.2 * bench.most_stretch),
-            "pushes": (0.0, 1.1 * NEVER, bench.highest * bench.unit),
-            "places": (-np.inf, np.inf, 0.2 * bench.travel.repeat(len(self.obstacles))),
-            "filling": (0.0, 2.0, max(4.0 * bench.step, 1e-9)),
-            "venting": (-log_ratio, log_ratio, 1.0),
-            "dead": (0.0, 0.5 * bench.highest, 0.1 * bench.highest),
-            "contact": (0.0, 0.5 * bench.highest, 0.1 * bench.highest),
-        }
-        lower, upper, scales = np.zeros((3, self.size - self.n_linear))
-        for name, part in self.nonlinear.items():
-            here = slice(part.start - self.n_linear, part.stop - self.n_linear)
-            lower[here], upper[here], scales[here] = map(np.asarray, bounds[name])
+        bench, n = self.bench, self.n_linear
+        lower, upper, scales = np.zeros((3, self.size - n))
+        for name in NONLINEAR:
+            kind, here = TABLE[name], self.at[name] - n
+            natural = np.full(here.size, bench.natural(kind.unit))
+            if name == "friction_slopes":
+                natural = bench.highest / bench.largest
+            elif name == "places":
+                natural = bench.travel.repeat(len(self.obstacles))
+            lower[here], upper[here] = kind.least * natural, kind.most * natural
+            scales[here] = kind.scale * natural
+        lags = self.at["lags"] - n
+        lower[lags], upper[lags] = np.log(bench.lag_range)
+        scales[self.at["filling"] - n] = max(4.0 * bench.step, 1e-9)
         return lower, upper, scales
 
     # -- block -----------------------------------------------------------------------------------
@@ -425,45 +409,36 @@ class Structure:
         The ``final`` one has no terms without effect, and the springs of muscles that cannot go slack
         are added to those of their coordinates.
         """
-        bench, m, n = self.bench, self.m, self.n
-        muscles = {
-            name: np.array([values[self.of_muscle(name, k)] for k in range(n)])
-            for name in self._muscle
-        }
-        muscles |= {name: np.maximum(muscles[name], 0.0) for name in NOT_NEGATIVE}
-        muscles["areas"][:, 0] = np.maximum(muscles["areas"][:, 0], LEAST_AREA * bench.unit)
-        springs = np.array([values[self.of_coordinate("springs", j)] for j in range(m)])
-        bladders, pushes = muscles["bladder"][:, 0], self.nonlinear_values(values, "pushes")
-        taut = bool((pushes >= NEVER).all())
+        bench, n = self.bench, self.n
+        given = {name: values[self.at[name]] for name in (*LINEAR["muscle"], "springs", "loads")}
+        for name in LINEAR["muscle"]:
+            if TABLE[name].least == 0.0:
+                given[name] = np.maximum(given[name], 0.0)
+        given["areas"][:, 0] = np.maximum(given["areas"][:, 0], LEAST_AREA * bench.unit)
+        shape = {name: self.nonlinear_values(values, name) for name in NONLINEAR}
+        taut, ratio = bool((shape["pushes"] >= NEVER).all()), float(shape["asymmetry"][0])
         merged = final and taut and not bench.directed
         if merged:
-            springs[np.arange(m), 1 + np.arange(m)] += bladders
-        friction_slopes = self.nonlinear_values(values, "friction_slopes")
-        ratio = float(self.nonlinear_values(values, "asymmetry")[0])
-        sides = [[side] for side, _ in self.obstacles]
-        obstacles = [
-            np.hstack([sides, self.obstacle_values(values, j)]).ravel()
-            for j in range(m if sides else 0)
-        ]
-        heavy = not final or muscles["mass"].any()
+            own = np.arange(self.m)
+            given["springs"][own, 1 + own] += given["bladders"][:, 0]
+        left_out = {
+            "lines": final and not given["lines"].any(),
+            "mass": (final and not given["mass"].any()) or not bench.step or not taut,
+            "bladders": merged,
+        }
+        fields = fields_of(given)
+        fields |= {name: () for name, out in left_out.items() if out}
+        growths = shape["friction_slopes"]
         return Balance(
-            springs=rows(springs),
-            elasticity=rows(muscles["elasticity"]),
-            areas=rows(muscles["areas"]),
-            friction=rows(muscles["friction"]),
-            relaxation=rows(muscles["relaxation"]),
-            loads=rows(np.array([values[self.of_coordinate("loads", j)] for j in range(m)])),
-            damping=vector(muscles["damping"][:, 0]),
-            lines=vector(muscles["line"][:, 0]) if not final or muscles["line"].any() else (),
-            walls=vector(np.full(n, self.nonlinear_values(values, "walls")[0])),
-            bladders=() if merged else vector(bladders),
-            pushes=() if taut else vector(pushes),
+            **fields,
+            walls=vector(np.full(n, shape["walls"][0])),
+            pushes=() if taut else vector(shape["pushes"]),
             limits=self.limits,
-            friction_offset=float(self.nonlinear_values(values, "friction_offset")[0]),
-            friction_slopes=vector(friction_slopes) if not final or friction_slopes.any() else (),
+            friction_offset=float(shape["friction_offset"][0]),
+            friction_slopes=vector(growths) if not final or growths.any() else (),
             asymmetry=None if final and ratio == 1.0 else ratio,
-            obstacles=rows(np.array(obstacles)),
-            lags=vector(self.nonlinear_values(values, "lags")),
+            obstacles=rows(self._obstacles(values)) if self.obstacles else (),
+            lags=vector(shape["lags"]),
             hull=rows(bench.hull),
             scale=bench.scale,
             degree=self.degree,
@@ -472,26 +447,25 @@ class Structure:
             given=bench.given,
             tare=bench.tare,
             settled=self.settled,
-            mass=vector(muscles["mass"][:, 0]) if heavy and bench.step and taut else (),
             directions=rows(bench.directions) if bench.directed else (),
             preload=bench.preload if bench.directed else 0.0,
             held=bench.of_force,
         )
 
-    def obstacle_values(self, values: Array, j: int) -> Array:
-        """Return the position and stiffnesses of each obstacle of a coordinate, shape (k, 2 + s)."""
-        table = values[self.of_coordinate("obstacles", j)].reshape(-1, 3 + self.n_x)
-        positions = self.nonlinear_values(values, "places").reshape(self.m, len(table))[j]
-        return np.column_stack([positions, np.maximum(table[:, 2:], 0.0)])
+    def _obstacles(self, values: Array) -> Array:
+        """Return side, position and stiffnesses of the obstacles, a row a coordinate."""
+        table = values[self.at["obstacles"]].reshape(self.m, -1, self.sizes.obstacle)
+        table[..., at.SIDE] = [side for side, _ in self.obstacles]
+        table[..., at.PLACE] = self.nonlinear_values(values, "places").reshape(self.m, -1)
+        table[..., at.STIFFNESS :] = np.maximum(table[..., at.STIFFNESS :], 0.0)
+        return table.reshape(self.m, -1)
 
     def coefficients(self, values: Array, sample_time: float | None) -> Array:
         """Return the coefficients of the block, those of inactive terms included."""
         c = self.block(values).coefficients(sample_time)
-        linear = c[c.size - self.n_linear :]
         least = 1e-12 * self.bench.unit * self.bench.highest / self.bench.scale
-        for k in range(self.n):
-            line = self.of_muscle("line", k)
-            linear[line] = np.maximum(values[line], least)
+        lines = self.at["lines"]
+        c[lines + (c.size - self.n_linear)] = np.maximum(values[lines], least)
         return c
 
     def reduced(self, active: Collection[Term]) -> Structure:
@@ -511,7 +485,7 @@ class Structure:
             n_area=highest("areas", 1),
             limits=chosen("friction", self.limits),
             lags=chosen("relaxation", self.lags),
-            obstacles=chosen("obstacle", self.obstacles),
+            obstacles=chosen("obstacles", self.obstacles),
             degree=self.degree if squares else 1,
         )
 
@@ -543,9 +517,9 @@ class Structure:
         reduction = -(np.array(self.limits) * max(1.0, ratio) + wall)
         for k in range(self.n):
             areas, friction, elastic = (
-                self.of_muscle(kind, k).tolist() for kind in ("areas", "friction", "elasticity")
+                self.at[kind][k].tolist() for kind in ("areas", "friction", "elasticity")
             )
-            bladder = int(self.of_muscle("bladder", k)[0])
+            bladder = int(self.at["bladders"][k, 0])
             add({areas[0]: 1.0}, 0.1 * self.bench.unit)
             order, power = np.arange(1, self.n_area), np.arange(2, 2 + self.n_elastic)
             low, high = self.bench.hull[k].tolist()
@@ -559,38 +533,19 @@ class Structure:
                     entries = dict(zip(elastic, stiff.tolist(), strict=True)) | {bladder: 1.0}
                     entries |= dict(zip(areas[1:], (-p * narrowing).tolist(), strict=True))
                     add(entries, self.least_stiffness)
-        for x, direction in product(self.bench.corners(), np.eye(self.m)):
+        for x, direction in product(corners(self.bench.levels), np.eye(self.m)):
             matrix.append(self.stiffness_row(x, direction))
             lower.append(self.least_stiffness)
         return np.array(matrix), np.array(lower)
 
-    def powers(self, x: Array) -> Array:
-        """Return the powers of scheduling inputs, shape (1 + powers, ...), that multiply springs."""
-        powers = [v**d for v in x for d in range(1, self.degree + 1)]
-        return np.array([np.ones(x.shape[1:]), *powers])
-
     def stiffness_row(self, x: Array, direction: Array) -> Array:
         """Return the constraint row of the stiffness of springs along a direction."""
         row = np.zeros(self.n_linear)
-        for q, power in enumerate(self.powers(x)):
-            for j, i in product(range(self.m), repeat=2):
-                row[self.spring(q, j, i)] += power * direction[j] * direction[i]
+        scheduled = powers_of(x, self.degree)[:, np.newaxis] * direction[:, np.newaxis, np.newaxis]
+        row[self.springs[:, :, 1:]] = scheduled * direction
         return row
 
     def softest(self, values: Array) -> tuple[Array, float]:
         """Return the constraint row where springs are softest, and the stiffness there."""
-        softest: list[tuple[float, Array, Array]] = []
-        springs = np.array([values[self.of_coordinate("springs", j)] for j in range(self.m)])
-        springs = springs.reshape(self.m, -1, 1 + self.m)[:, :, 1:]
-        for x in self.bench.corners():
-            matrix = np.tensordot(self.powers(x), springs, (0, 1))
-            stiffnesses, directions = np.linalg.eigh(0.5 * (matrix + matrix.T))
-            softest.append((float(stiffnesses[0]), x, directions[:, 0]))
-        stiffness, x, direction = min(softest, key=lambda candidate: candidate[0])
+        stiffness, x, direction = softest(values[self.springs], self.bench.levels, self.degree)
         return self.stiffness_row(x, direction), stiffness
-
-
-def _slices(widths: dict[str, int], first: int = 0) -> dict[str, slice]:
-    """Return consecutive slices of these widths."""
-    ends = np.cumsum([first, *widths.values()]).tolist()
-    return {name: slice(a, b) for name, a, b in zip(widths, ends[:-1], ends[1:], strict=True)}

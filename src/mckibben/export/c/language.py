@@ -101,6 +101,8 @@ class Source:
         value = getattr(node, "value", None)
         if isinstance(node, ast.Name) and node.id not in self.locals:
             value = self.globals.get(node.id)
+        elif isinstance(node, ast.Attribute):  # of a module
+            value = getattr(self.globals.get(ast.unparse(node.value)), node.attr, None)
         return value if isinstance(value, bool | int | float) else None
 
     def single(self, name: str) -> float | None:

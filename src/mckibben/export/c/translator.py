@@ -609,6 +609,9 @@ class _Translator:
                 return Value(f"{test} ? {texts[0]} : {texts[1]}", CHOICE, kind)
             case ast.Attribute(value=ast.Name(id="np" | "math"), attr="inf" | "nan" | "pi" as name):
                 return self._written(getattr(math, name), node)
+            case ast.Attribute(attr=name) if self.source.number(node) is not None:
+                text = self._written(self.source.number(node) or 0, node).text
+                return Value(self.whole.constant(name, text))
             case ast.Attribute(attr="size"):
                 return self.view(node.value).size.value()
             case ast.Subscript():

@@ -161,8 +161,7 @@ def solve_constrained(
     from scipy.optimize import nnls
 
     p, asks = columns.shape[1], sides.any(axis=1)
-    size = np.sqrt((columns**2).sum(axis=0))
-    size[~(size > 0.0)] = 1.0
+    size = _sizes(columns)
     damping = np.sqrt(ridge) * np.eye(p)
     right = np.append(target, np.zeros(p) if near is None else damping @ (size * near))
     table = np.column_stack([np.vstack([columns / size, damping]), right])
@@ -194,5 +193,6 @@ def solve_constrained(
 
 
 def _sizes(columns: Array) -> Array:
-    """Return the lengths of columns, with a lower bound to divide by."""
-    return np.asarray(np.maximum(np.sqrt((columns**2).sum(axis=0)), 1e-300))
+    """Return the lengths of columns, to divide by: 1 of those that are 0."""
+    size = np.sqrt((columns**2).sum(axis=0))
+    return np.where(size > 0.0, size, 1.0)

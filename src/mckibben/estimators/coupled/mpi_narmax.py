@@ -90,10 +90,6 @@ class MPINarmaxEstimator(CoupledEstimator):
     method: Literal["pso", "ls"] = "pso"
     ridge: Annotated[float, Gt(0)] = 1e-4
 
-    @property
-    def penalty(self) -> float:
-        return self.ridge
-
     def fixed(self, block: Block) -> tuple[int, ...]:
         """Return the indices of parameters fixed by the hysteresis fit, and of even sets."""
         hysteresis, network = block.parts  # type: ignore[attr-defined]

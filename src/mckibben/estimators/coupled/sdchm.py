@@ -120,12 +120,8 @@ class SDCHMEstimator(CoupledEstimator):
 
     @property
     def pairs(self) -> bool:
-        """Whether these settings need one output per input, for the hysteresis of every muscle."""
+        """Whether every muscle has a hysteresis, for which each needs an output."""
         return self.memory is not None
-
-    @property
-    def penalty(self) -> float:
-        return self.ridge
 
     def fixed(self, block: Block) -> tuple[int, ...]:
         """Return the indices of the unit gains, and of parameters fixed by the hysteresis fits."""

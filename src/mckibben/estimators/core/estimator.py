@@ -575,10 +575,7 @@ class Estimator(ABC):
         return tuple(place for place in unknown if place not in excluded)
 
     def free_runs(
-        self,
-        block: Block,
-        recordings: Sequence[Recording],
-        rows: Sequence[Mask] | None = None,
+        self, block: Block, recordings: Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> FreeRuns:
         """Return the free runs of a block over recordings."""
         return FreeRuns.of(block, recordings, rows)

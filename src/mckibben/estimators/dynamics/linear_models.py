@@ -74,10 +74,7 @@ class PredictionErrorEstimator(Estimator):
 
     purpose = "rate"
     inverse_kind = "exact where stable"
-    param_grid: ClassVar[Grid] = {
-        "n_poles": (1, 2, 3),
-        "n_zeros": (1, 2, 3),
-    }
+    param_grid: ClassVar[Grid] = {"n_poles": (1, 2, 3), "n_zeros": (1, 2, 3)}
     needs_time = True
     begins_measured = True
     effort = 0.02

@@ -107,11 +107,7 @@ class NarxEstimator(SearchEstimator):
     )
     cannot = "Memory limited to its lags; no inverse."
     caution = "a polynomial of past values is unbounded beyond them"
-    param_grid: ClassVar[Grid] = {
-        "output_lags": (1, 2),
-        "input_lags": (1, 2),
-        "n_terms": (8, 16),
-    }
+    param_grid: ClassVar[Grid] = {"output_lags": (1, 2), "input_lags": (1, 2), "n_terms": (8, 16)}
     needs_time = True
     effort = 0.6
 

@@ -38,10 +38,7 @@ TIMES = (0.1, 10.0)
 
 
 def extract_hysteresis(
-    recordings: Recording | Sequence[Recording],
-    law: Block,
-    *,
-    output: str = "force_hysteresis",
+    recordings: Recording | Sequence[Recording], law: Block, *, output: str = "force_hysteresis"
 ) -> list[Recording]:
     """Return recordings with the residual of a static law as output: f_h = f - f_st.
 

@@ -39,10 +39,7 @@ NEEDS: dict[Purpose | None, tuple[str, str]] = {
         "Dynamics: lag, creep and rate dependence",
         "The response depends on speed, or continues while pressure is constant.",
     ),
-    "several": (
-        "Several muscles and loads",
-        "Coupled muscles, or a muscle under a varying load.",
-    ),
+    "several": ("Several muscles and loads", "Coupled muscles, or a muscle under a varying load."),
     "force": (
         "Force and activation pressure",
         "Force from pressure and length, or pressure from a desired contraction under a force.",

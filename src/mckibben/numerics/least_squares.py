@@ -162,8 +162,7 @@ def solve_constrained(
     from scipy.optimize import nnls
 
     p, asks = columns.shape[1], sides.any(axis=1)
-    size = np.sqrt((columns**2).sum(axis=0))
-    size[~(size > 0.0)] = 1.0
+    size = _sizes(columns)
     damping = np.sqrt(ridge) * np.eye(p)
     right = np.append(target, np.zeros(p) if near is None else damping @ (size * near))
     table = np.column_stack([np.vstack([columns / size, damping]), right])

@@ -73,6 +73,16 @@ class TrainingData:
         return np.where(found > MOVES_AT_ALL * spans, found, spans)
 
     @property
+    def input_span(self) -> float:
+        """Range of the first input over all runs."""
+        return float(self.highest[0] - self.lowest[0])
+
+    @property
+    def output_span(self) -> float:
+        """Range of the scored outputs."""
+        return float(np.ptp(self.target))
+
+    @property
     def input_range(self) -> tuple[float, float]:
         """Lowest and highest value of the first input over all runs."""
         return float(self.lowest[0]), float(self.highest[0])
@@ -266,3 +276,41 @@ def _check(recording: Recording, first: Recording, names: Sequence[str]) -> None
 def _is_absolute(recording: Recording, channel: str) -> bool:
     references = recording.meta.get("pressure_reference")
     return isinstance(references, Mapping) and references.get(channel) == "absolute"
+
+
+def recorded(
+    given: Any,
+    inputs: Sequence[str] | None,
+    y: Any,
+    outputs: Sequence[str] | None,
+    sample_time: float | None,
+) -> list[Recording]:
+    """Return recordings as a list, or arrays of inputs and outputs as one of the named channels."""
+    if y is None:
+        return listed(given)
+    columns = by_channel(given, inputs, "pressure") | by_channel(y, outputs, "displacement")
+    return [Recording(columns, sample_time)]
+
+
+def by_channel(given: Any, names: Sequence[str] | None, quantity: str) -> dict[str, Array]:
+    """Return an array, shape (n,) or (n, channels), by channel; without names those of a quantity.
+
+    Raises
+    ------
+    ValueError
+        On what `sklearn.utils.check_array` refuses, such as complex, sparse and infinite values.
+    DataError
+        If there are other than as many columns as channels.
+    """
+    from sklearn.utils import check_array
+
+    columns = check_array(given, dtype=float, ensure_2d=False)
+    columns = columns.reshape(len(columns), -1)
+    n = columns.shape[1]
+    usual = [f"{quantity}_{k + 1}" for k in range(n)] if n > 1 else [quantity]
+    if n != len(names or usual):
+        raise DataError(
+            f"arrays of shape {columns.shape} are not the channels {', '.join(names or usual)}",
+            remedy="name the columns: mckibben.Recording({'pressure_1': ...}, sample_time)",
+        )
+    return dict(zip(names or usual, columns.T, strict=True))

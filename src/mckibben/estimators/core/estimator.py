@@ -22,8 +22,8 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.free_runs import FreeRuns, as_it_is
 from mckibben.channels import Channels, Names, channels_of, quantity
-from mckibben.errors import DataError, MckibbenError, ModelError, ModelWarning
-from mckibben.estimators.core.data import TrainingData, training_data
+from mckibben.errors import MckibbenError, ModelError, ModelWarning
+from mckibben.estimators.core.data import TrainingData, by_channel, recorded, training_data
 from mckibben.estimators.core.leaving_out import stepped
 from mckibben.estimators.core.uncertainty import covariance_of, unknown, vanishing
 from mckibben.numerics.tracker import Progress, Tracker
@@ -181,7 +181,7 @@ class Estimator(ABC):
     """Whether recordings must have time."""
 
     made_for: ClassVar[tuple[str, str] | None] = None
-    """Kinds of input and output channels that it models; None for any."""
+    """Kinds of its input and output channels, whose defaults they are; None for any."""
 
     input_settings: ClassVar[tuple[str, ...]] = ()
     """Settings that name further input channels, of the block as well."""
@@ -196,6 +196,8 @@ class Estimator(ABC):
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
+        if made_for := vars(cls).get("made_for"):
+            cls.input, cls.output = made_for
         own, base = get_annotations(cls), next(filter(is_dataclass, cls.__mro__[1:]))
         known = {setting.name for setting in fields(base)}
         if changed := known & vars(cls).keys() - own.keys():  # defaults, of the types of the base
@@ -215,8 +217,7 @@ class Estimator(ABC):
         ValueError
             On a name that is none of them.
         """
-        unknown = settings.keys() - set(self._names())
-        if unknown:
+        if unknown := settings.keys() - set(self._names()):
             raise ValueError(
                 f"{sorted(unknown)[0]!r} is no setting of {type(self).__name__}: "
                 f"choose among {', '.join(self._names())}."
@@ -241,7 +242,7 @@ class Estimator(ABC):
 
     @classmethod
     def _names(cls) -> list[str]:
-        return sorted(field.name for field in fields(cls))
+        return sorted(setting.name for setting in fields(cls))
 
     @classmethod
     def resolved(
@@ -396,21 +397,16 @@ class Estimator(ABC):
         ModelError
             On settings out of range, or if the model found is no better than the mean of the output.
         """
-        every = listed(recordings) if y is None else [self._recording(recordings, y, sample_time)]
+        inputs, outputs = ((a,) if isinstance(a, str) else a for a in (self.input, self.output))
+        if inputs is not None:
+            scheduling = self.get_params().get("scheduling") or ()
+            inputs = (*inputs, *self._further_inputs(), *scheduling)
+        every = recorded(recordings, inputs, y, outputs, sample_time)
         fitted = copy(self)  # a fit that fails or is interrupted leaves no traces
         with one_blas_thread(), telling(progress, "fitting") as tell:
             fitted._fit(every, rows, tell)
         vars(self).update(vars(fitted))
         return self
-
-    def _recording(self, u: Any, y: ArrayLike, sample_time: float | None) -> Recording:
-        """Return arrays as a recording, with the channels of the settings."""
-        scheduling = self.get_params().get("scheduling") or ()
-        inputs, outputs = ((a,) if isinstance(a, str) else a for a in (self.input, self.output))
-        if inputs is not None:
-            inputs = (*inputs, *self._further_inputs(), *scheduling)
-        given = by_channel(u, inputs, "pressure") | by_channel(y, outputs, "displacement")
-        return Recording(given, sample_time)
 
     def _fit(
         self,
@@ -520,11 +516,7 @@ class Estimator(ABC):
         inputs, given = (
             [c.name for c in side] for side in (self.fitted.inputs, self.fitted.outputs)
         )
-        if y is None:
-            every = listed(recordings)
-        else:
-            columns = by_channel(recordings, inputs, "") | by_channel(y, given, "")
-            every = [Recording(columns, sample_time)]
+        every = recorded(recordings, inputs, y, given, sample_time)
         predicted = np.concatenate(self.predict(every))
         measured = np.concatenate([recording.matrix(given) for recording in every])
         residual = measured - predicted.reshape(measured.shape)
@@ -583,28 +575,21 @@ class Estimator(ABC):
         return tuple(place for place in unknown if place not in excluded)
 
     def free_runs(
-        self,
-        block: Block,
-        recordings: Sequence[Recording],
-        rows: Sequence[Mask] | None = None,
+        self, block: Block, recordings: Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> FreeRuns:
         """Return the free runs of a block over recordings."""
         return FreeRuns.of(block, recordings, rows)
 
-    @property
-    def penalty(self) -> float:
-        """Ridge of the fit, relative to each parameter's own effect on the output."""
-        return 0.0
-
     def left_out(self, runs: FreeRuns, parts: Sequence[Mask]) -> list[list[Array]] | None:
         """Return the outputs of the model as it would be without each part of its data.
 
-        By a step from the fit, or in closed form; see `mckibben.estimators.core.leaving_out.stepped`.
+        By a step from the fit, or in closed form; see `mckibben.estimators.core.leaving_out.stepped`. A
+        setting `ridge` is of each parameter's own effect on the output.
         """
-        block = runs.block
+        block, ridge = runs.block, self.get_params().get("ridge", 0.0)
         fixed = {*self.diagnostics_.at_bounds, *self.fixed(block)}
         free = [place for place in range(block.n_parameters) if place not in fixed]
-        return stepped(runs, free, self.penalty, parts)
+        return stepped(runs, free, ridge, parts)
 
     def held_out(
         self, recordings: Sequence[Recording], parts: Sequence[Sequence[Mask]]
@@ -651,8 +636,6 @@ class SearchEstimator(Estimator):
 
     Parameters
     ----------
-    input, output : str
-        Channels to learn from.
     initial : {"first_sample", "virgin"}
         Memory before the first sample of every recording: what its first output determines, else at rest
         at the first input; or as if nothing had ever happened.
@@ -691,30 +674,6 @@ def preceded(recordings: Sequence[Recording], runs: FreeRuns) -> tuple[list[Reco
         found.append(replace(recording, channels=channels, start_time=begun))
         counted.append(np.concatenate([np.zeros(len(past), dtype=bool), rows]))
     return found, counted
-
-
-def by_channel(given: Any, names: Sequence[str] | None, quantity: str) -> dict[str, Array]:
-    """Return an array, shape (n,) or (n, channels), by channel; without names those of a quantity.
-
-    Raises
-    ------
-    ValueError
-        On what `sklearn.utils.check_array` refuses, such as complex, sparse and infinite values.
-    DataError
-        If there are other than as many columns as channels.
-    """
-    from sklearn.utils import check_array
-
-    columns = check_array(given, dtype=float, ensure_2d=False)
-    columns = columns.reshape(len(columns), -1)
-    n = columns.shape[1]
-    usual = [f"{quantity}_{k + 1}" for k in range(n)] if n > 1 else [quantity]
-    if n != len(names or usual):
-        raise DataError(
-            f"arrays of shape {columns.shape} are not the channels {', '.join(names or usual)}",
-            remedy="name the columns: mckibben.Recording({'pressure_1': ...}, sample_time)",
-        )
-    return dict(zip(names or usual, columns.T, strict=True))
 
 
 def resting(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:

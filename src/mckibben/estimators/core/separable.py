@@ -48,8 +48,6 @@ class SeparableEstimator(Estimator):
 
     Parameters
     ----------
-    input, output : str
-        Channels to learn from.
     initial : {"first_sample", "virgin"}
         Memory before the first sample of every recording: what its first output determines, else as if
         the input had only risen; or as if nothing had ever happened.
@@ -133,11 +131,9 @@ class SeparableEstimator(Estimator):
         """Return the block for increasing data; mirrored for decreasing data."""
         if not (self.rises and data.falls):
             return self.identify(data, tracker)
-        rising = self.identify(
-            data.changed(lambda run: replace(run, outputs=-run.outputs)), tracker
-        )
-        channel = self.channels(data)["output"]
-        return Series((rising, Negative(channel, channel)))
+        mirrored = data.changed(lambda run: replace(run, outputs=-run.outputs))
+        channel = data.outputs[0]
+        return Series((self.identify(mirrored, tracker), Negative(channel, channel)))
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the identified block.
@@ -148,8 +144,9 @@ class SeparableEstimator(Estimator):
         linear, offset = self.solve(self.design_matrix(theta, data), data)
         return self.build(theta, linear, offset, data)
 
-    def most_evaluations(self, size: int) -> int:
-        """Return the maximum number of evaluations of a refinement."""
+    @property
+    def most_evaluations(self) -> int:
+        """Maximum number of evaluations of a refinement."""
         return self.search_evaluations
 
     def _search(self, data: TrainingData, tracker: Tracker) -> Array:
@@ -157,14 +154,18 @@ class SeparableEstimator(Estimator):
         lower, upper = ends = self.bounds(data)
         if lower.size == 0:
             return lower
+        from scipy.stats import qmc
+
         theta = tracker.near
         if theta is None or theta.shape != lower.shape:
             thin = data.thinned(SEARCH_SAMPLES)
             if self.searches_condensed:
                 thin = thin.changed(Run.condensed)
-            most = self.most_evaluations(lower.size)
+            most = self.most_evaluations
             tracker.budget = self.n_starts + self.n_refined * most
-            starts = self.guesses(data) + self._scattered(lower, upper)
+            exponent = int(np.ceil(np.log2(max(self.n_starts, 2))))
+            points = qmc.Sobol(lower.size, seed=self.seed).random_base2(exponent)[: self.n_starts]
+            starts = [*self.guesses(data), *qmc.scale(points, lower, upper)]
             theta = multi_start(
                 self._errors(thin),
                 starts,
@@ -183,13 +184,6 @@ class SeparableEstimator(Estimator):
             max_evaluations=self.polish_evaluations,
         )
         return tracker.near
-
-    def _scattered(self, lower: Array, upper: Array) -> list[Array]:
-        from scipy.stats import qmc
-
-        exponent = int(np.ceil(np.log2(max(self.n_starts, 2))))
-        points = qmc.Sobol(lower.size, seed=self.seed).random_base2(exponent)[: self.n_starts]
-        return list(qmc.scale(points, lower, upper))
 
     def design_matrix(self, theta: Array, data: TrainingData) -> Array:
         """Return the regressors at the scored samples of all runs, shape (samples, k)."""
@@ -216,10 +210,8 @@ class SeparableEstimator(Estimator):
         The first is kept off zero: it belongs to the operator without dead zone, and without it there
         is no inverse.
         """
-        floor = np.zeros(matrix.shape[1])
-        reach = float(np.ptp(matrix[:, 0]))
-        span = data.output_range[1] - data.output_range[0]
-        floor[0] = LEAST_REVERSIBLE * span / reach if reach > 0 else 0.0
+        floor, reach = np.zeros(matrix.shape[1]), float(np.ptp(matrix[:, 0]))
+        floor[0] = LEAST_REVERSIBLE * data.output_span / reach if reach > 0 else 0.0
         return floor
 
     def _errors(self, data: TrainingData) -> Errors:

@@ -8,11 +8,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from mckibben import registry
 from mckibben.arrays import Array, Mask
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
 from mckibben.channels import PRESSURE, Channels
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData, training_data
 from mckibben.estimators.core.estimator import Estimator, resting
+from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording, listed
 
 MOVES = 0.1
@@ -103,11 +107,8 @@ class CoupledEstimator(Estimator):
 
     @classmethod
     def channel_settings(cls, channels: Channels) -> dict[str, Any]:
-        return {
-            "input": channels.inputs,
-            "output": channels.outputs,
-            "scheduling": taken(channels),
-        }
+        inputs, outputs = channels.inputs, channels.outputs
+        return {"input": inputs, "output": outputs, "scheduling": taken(channels)}
 
     def completed(self, recordings: list[Recording], scheduling: Sequence[str]) -> list[Recording]:
         """Return recordings with what they may lack."""
@@ -182,6 +183,34 @@ def bridged(data: TrainingData) -> TrainingData:
         outputs = np.where(run.counts[:, np.newaxis], run.outputs, given @ by + meeting)
         found.append(replace(run, outputs=outputs, place=place))
     return replace(data, runs=tuple(found))
+
+
+def memory_of(
+    model: str,
+    settings: dict[str, Any],
+    runs: Sequence[Run],
+    place: int,
+    data: TrainingData,
+    output: Channel,
+) -> Block:
+    """Return the hysteresis of one muscle by a model of one, from runs in which it is alone.
+
+    It begins at rest, as the model of all does; ``output`` is what it is to be called.
+    """
+    given = data.inputs[place]
+    units = {given.name: given.unit, output.name: output.unit}
+    recordings = [
+        Recording(
+            {given.name: run.driven[:, place], output.name: run.outputs[:, place]},
+            run.sample_time,
+            units,
+        )
+        for run in runs
+    ]
+    channels = {"input": given.name, "output": output.name}
+    made = registry.load("estimators", model)(**settings | channels)
+    found: Block = made.find(made.data(recordings, [run.counts for run in runs]), Tracker())
+    return found
 
 
 def alone(data: TrainingData, place: int) -> list[Run]:

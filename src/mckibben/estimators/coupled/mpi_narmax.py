@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from annotated_types import Gt, Interval
@@ -28,12 +28,12 @@ from mckibben.blocks.fields import rows, vector
 from mckibben.blocks.kernels import kernel
 from mckibben.errors import DataError, MckibbenError, ModelError
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.coupled.base import CoupledEstimator
+from mckibben.estimators.coupled.base import CoupledEstimator, memory_of
 from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors
 from mckibben.numerics.statistics import rms
 from mckibben.numerics.swarm import Swarm, particle_swarm
 from mckibben.numerics.tracker import Tracker
-from mckibben.recording import Recording, check_sample_times
+from mckibben.recording import check_sample_times
 
 UNLOADED = 0.05
 """Largest force of a run without load, relative to the largest of all runs."""
@@ -90,10 +90,6 @@ class MPINarmaxEstimator(CoupledEstimator):
     method: Literal["pso", "ls"] = "pso"
     ridge: Annotated[float, Gt(0)] = 1e-4
 
-    @property
-    def penalty(self) -> float:
-        return self.ridge
-
     def fixed(self, block: Block) -> tuple[int, ...]:
         """Return the indices of parameters fixed by the hysteresis fit, and of even sets."""
         hysteresis, network = block.parts  # type: ignore[attr-defined]
@@ -113,7 +109,11 @@ class MPINarmaxEstimator(CoupledEstimator):
         check_sample_times([run.source for run in data.runs])
         tracker.reached(0.0)
         free, loaded = _parted(data)
-        hysteresis = self.hysteresis(free)
+        settings: dict[str, Any] = {"seed": self.seed}
+        if self.memory == "rdpi":
+            settings["rate_time_constant"] = 5.0 * data.timed()
+        channel = replace(data.outputs[0], name=f"{data.outputs[0].name}_free")
+        hysteresis = memory_of(self.memory, settings, free.runs, 0, free, channel)
         known = loaded if self.learns_from == "loaded" and loaded.runs else data
         problem = RecurrentProblem(self, after(hysteresis, known))
         even = Sets.even(*problem.ranges, self.n_sets)
@@ -122,22 +122,6 @@ class MPINarmaxEstimator(CoupledEstimator):
             chosen = problem.swarm(even, self.seed, tracker)
         tracker.reached(0.9)
         return Series((hysteresis, problem.best(*chosen)))
-
-    def hysteresis(self, data: TrainingData) -> Block:
-        """Return the hysteresis fitted to runs without load."""
-        u, y = data.inputs[0], data.outputs[0]
-        free = f"{y.name}_free"
-        units = {u.name: u.unit, free: y.unit}
-        recordings = [
-            Recording({u.name: run.u, free: run.y}, run.sample_time, units) for run in data.runs
-        ]
-        settings = {"input": u.name, "output": free, "seed": self.seed}
-        if self.memory == "rdpi":
-            settings["rate_time_constant"] = 5.0 * data.timed()
-        estimator = registry.load("estimators", self.memory)(**settings)
-        counted = [run.counts for run in data.runs]
-        block: Block = estimator.find(estimator.data(recordings, counted), Tracker())
-        return block
 
 
 def _parted(data: TrainingData) -> tuple[TrainingData, TrainingData]:
@@ -183,10 +167,6 @@ class RecurrentProblem:
     settings: MPINarmaxEstimator
     data: TrainingData
 
-    @property
-    def runs(self) -> Sequence[Run]:
-        return self.data.runs
-
     def regress(self, inputs: Array, past: Array) -> Array:
         """Return all regressors over a run, with given past outputs."""
         e = self.settings
@@ -203,7 +183,7 @@ class RecurrentProblem:
     @property
     def ranges(self) -> tuple[Array, Array]:
         """Lowest and highest of every regressor."""
-        x = np.concatenate([self.regress(run.inputs, run.y) for run in self.runs])
+        x = np.concatenate([self.regress(run.inputs, run.y) for run in self.data.runs])
         low, high = x.min(axis=0), x.max(axis=0)
         return low, np.where(high > low, high, low + 1.0)
 
@@ -212,7 +192,7 @@ class RecurrentProblem:
         e, constants = self.settings, self.settings.constants
         solver = Consequents(constants, e.ridge)
         gram, right, n_terms = np.zeros(()), np.zeros(()), 0
-        for run, past in zip(self.runs, pasts, strict=True):
+        for run, past in zip(self.data.runs, pasts, strict=True):
             x = self.regress(run.inputs, past)
             phi = np.empty((len(x), *sets.centres.shape))
             remembered(x, sets.centres, sets.widths, feedbacks, phi)
@@ -238,15 +218,12 @@ class RecurrentProblem:
             constants,
         )
 
-    def free_runs(self, network: RecurrentFuzzyNetwork) -> list[Array]:
-        """Return the network's free-running outputs."""
-        every = ((run.inputs, run.sample_time) for run in self.runs)
-        return [run_many([network], u, sample_time=step)[0, :, 0] for u, step in every]
-
-    def cost(self, outputs: Sequence[Array]) -> float:
-        """Return the free-running RMSE; infinite for diverging runs."""
+    def free_runs(self, network: RecurrentFuzzyNetwork) -> tuple[list[Array], float]:
+        """Return the network's free-running outputs, and their RMSE; infinite for diverging runs."""
+        every = ((run.inputs, run.sample_time) for run in self.data.runs)
+        outputs = [run_many([network], u, sample_time=step)[0, :, 0] for u, step in every]
         with np.errstate(over="ignore", invalid="ignore"):
-            return rms(np.concatenate(outputs) - self.data.stacked("y"))
+            return outputs, rms(np.concatenate(outputs) - self.data.stacked("y"))
 
     def best(self, sets: Sets, feedbacks: Array) -> RecurrentFuzzyNetwork:
         """Return the network of lowest free-running error, trained on its own past outputs.
@@ -256,12 +233,11 @@ class RecurrentProblem:
         ModelError
             If every one of them leaves all bounds.
         """
-        pasts = [run.y for run in self.runs]
+        pasts = [run.y for run in self.data.runs]
         found, least = None, np.inf
         for _ in range(ROUNDS):
             network = self.solved(sets, feedbacks, pasts)
-            outputs = self.free_runs(network)
-            cost = self.cost(outputs)
+            outputs, cost = self.free_runs(network)
             if cost < least:
                 found, least = network, cost
             if not np.isfinite(cost):
@@ -284,9 +260,9 @@ class RecurrentProblem:
         upper = np.concatenate([base + span, span, 0.3 * span])
         start = rng.uniform(lower, upper, (SWARM.particles, lower.size))
         start[0] = np.concatenate([even.vector, np.zeros(span.size)])
-        most = max(SEARCH_SAMPLES // len(self.runs), 100)
+        most = max(SEARCH_SAMPLES // len(self.data.runs), 100)
         thin = replace(self, data=self.data.changed(lambda run: run.cut(0, most)))
-        measured = [run.y for run in thin.runs]
+        measured = [run.y for run in thin.data.runs]
 
         def split(place: Array) -> tuple[Sets, Array]:
             n = even.vector.size
@@ -294,7 +270,7 @@ class RecurrentProblem:
 
         def cost(place: Array) -> float:
             try:
-                return thin.cost(thin.free_runs(thin.solved(*split(place), measured)))
+                return thin.free_runs(thin.solved(*split(place), measured))[1]
             except (MckibbenError, np.linalg.LinAlgError):
                 return np.inf
 

@@ -10,6 +10,7 @@ Source: Hoerl and Kennard, "Ridge regression", Technometrics, 1970.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import combinations_with_replacement
 from typing import Annotated
@@ -190,15 +191,10 @@ def chosen(blocks: Array, width: int) -> tuple[float, ...]:
 def features(block: CoupledMemory, inputs: Array, sample_time: float | None) -> Array:
     """Return the features over inputs, shape (n, width)."""
     n, width = inputs.shape[1], len(block.readout[0])
-    many = CoupledMemory(
-        block.lags,
-        block.thresholds,
-        rows(np.eye(width)[: block.n_states + 1]),
-        block.degree,
-        block.driven,
-        block.scheduled,
-        tuple(Channel(f"feature_{k}", "") for k in range(block.n_states + 1)),
-        block.crossed,
+    many = replace(
+        block,
+        readout=rows(np.eye(width)[: block.n_states + 1]),
+        given=tuple(Channel(f"feature_{k}", "") for k in range(block.n_states + 1)),
     )
     linear = many.simulate(np.ascontiguousarray(inputs), sample_time=sample_time)
     first = linear[:, 1 : 1 + n]

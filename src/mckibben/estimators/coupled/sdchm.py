@@ -26,9 +26,10 @@ from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.errors import DataError, ModelError, ModelWarning
+from mckibben.estimators.catalogue import settings_of
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import InverseKind
-from mckibben.estimators.coupled.base import CoupledEstimator, alone
+from mckibben.estimators.coupled.base import CoupledEstimator, alone, memory_of
 from mckibben.estimators.coupled.fuzzy import (
     Consequents,
     Method,
@@ -120,12 +121,8 @@ class SDCHMEstimator(CoupledEstimator):
 
     @property
     def pairs(self) -> bool:
-        """Whether these settings need one output per input, for the hysteresis of every muscle."""
+        """Whether every muscle has a hysteresis, for which each needs an output."""
         return self.memory is not None
-
-    @property
-    def penalty(self) -> float:
-        return self.ridge
 
     def fixed(self, block: Block) -> tuple[int, ...]:
         """Return the indices of the unit gains, and of parameters fixed by the hysteresis fits."""
@@ -147,7 +144,11 @@ class SDCHMEstimator(CoupledEstimator):
         runs, driven = list(data.runs), data.inputs
         if self.memory is not None:
             chosen = [softest(data, muscle) for muscle in range(len(data.inputs))]
-            memories = [self.hysteresis(run, k, data) for k, run in enumerate(chosen)]
+            settings = settings_of(self.memory, {"seed": self.seed} | (self.memory_settings or {}))
+            memories = [
+                memory_of(self.memory, settings, [run], k, data, data.outputs[k])
+                for k, run in enumerate(chosen)
+            ]
             tracker.reached(0.2)
             front = (PerChannel(tuple(memories)), coupled(memories, chosen, data))
             used = {id(run) for run in chosen}
@@ -158,23 +159,27 @@ class SDCHMEstimator(CoupledEstimator):
                 tracker.notes.append(f"{data.scheduled[0].name} is not used by this model")
             return Series(front)
         x, target = network_inputs(front, runs), [run.outputs for run in runs]
+        swarm = printed_swarm(self.particles, self.iterations)
         rounds = self.n_rounds if self.n_friction else 1
         parts: tuple[Block, ...] = ()
         for number in range(rounds):
-            own = tracker.part(*(0.25 + 0.75 * (number + end) / rounds for end in (0, 1)))
-            network = self.network(x, np.concatenate(target), driven, data, own)
+            network = fit_network(
+                x,
+                np.concatenate(target),
+                self.n_sets,
+                Consequents(self.constants, self.ridge),
+                Search(self.method, self.search_samples, swarm, self.seed),
+                (driven, data.scheduled, data.outputs),
+                beyond=BEYOND,
+                tracker=tracker.part(*(0.25 + 0.75 * (number + k) / rounds for k in (0, 1))),
+            )
             parts = (*front, network)
             if not self.n_friction:
                 break
-            ends = np.cumsum([len(run.outputs) for run in runs])[:-1]
-            straight = np.split(network.simulate(x), ends)
+            straight = np.split(network.simulate(x), np.cumsum([len(run) for run in runs])[:-1])
             rubbing = PerChannel(
                 tuple(
-                    self.friction(
-                        [part[:, k] for part in straight],
-                        [run.outputs[:, k] for run in runs],
-                        channel,
-                    )
+                    self.friction([part[:, k] for part in straight], runs, k, channel)
                     for k, channel in enumerate(data.outputs)
                 )
             )
@@ -185,73 +190,21 @@ class SDCHMEstimator(CoupledEstimator):
                 target = [unrubbed.simulate(run.outputs) for run in runs]
         return parts[0] if len(parts) == 1 else Series(parts)
 
-    def network(
-        self,
-        x: Array,
-        y: Array,
-        driven: tuple[Channel, ...],
-        data: TrainingData,
-        tracker: Tracker,
-    ) -> FuzzyNetwork:
-        """Return a network from driven and scheduling inputs to displacements."""
-        swarm = printed_swarm(self.particles, self.iterations)
-        return fit_network(
-            x,
-            y,
-            self.n_sets,
-            Consequents(self.constants, self.ridge),
-            Search(self.method, self.search_samples, swarm, self.seed),
-            (driven, data.scheduled, data.outputs),
-            beyond=BEYOND,
-            tracker=tracker,
-        )
-
-    def friction(self, given: list[Array], wanted: list[Array], channel: Channel) -> PI:
+    def friction(self, given: list[Array], runs: list[Run], muscle: int, channel: Channel) -> PI:
         """Return the friction memory of a muscle: play operators with positive partial sums."""
         low = min(float(part.min()) for part in given)
         high = max(float(part.max()) for part in given)
         span = high - low
-        smallest = FRICTION[0] * span
-        radii = np.append(0.0, np.geomspace(smallest, FRICTION[1] * span, self.n_friction))
+        radii = np.append(0.0, span * np.geomspace(*FRICTION, self.n_friction))
         plays = np.concatenate([play_operators(part, radii, "first_sample") for part in given])
         # weights are differences of partial sums, which must stay positive for an inverse
         steps = np.column_stack([-np.diff(plays, axis=1), plays[:, -1]])
         least = np.full(radii.size, LEAST_SLOPE)
-        sums, offset = solve_bounded(steps, np.concatenate(wanted), least)
+        wanted = np.concatenate([run.outputs[:, muscle] for run in runs])
+        sums, offset = solve_bounded(steps, wanted, least)
         weights = np.diff(sums, prepend=0.0)
-        margin = BEYOND * span
-        return PI(
-            vector(radii),
-            vector(weights),
-            offset,
-            (low - margin, high + margin),
-            "first_sample",
-            channel,
-            channel,
-        )
-
-    def hysteresis(self, run: Run, muscle: int, data: TrainingData) -> Block:
-        """Return the hysteresis of one muscle, from a run in which it moves alone."""
-        given, wanted = data.inputs[muscle], data.outputs[muscle]
-        recording = Recording(
-            {given.name: run.driven[:, muscle], wanted.name: run.outputs[:, muscle]},
-            run.sample_time,
-        )
-        settings = {"input": given.name, "output": wanted.name, "seed": self.seed}
-        assert self.memory is not None
-        estimator = registry.load("estimators", self.memory)()
-        try:
-            estimator.set_params(**settings | (self.memory_settings or {}))
-        except ValueError as error:
-            raise ModelError(
-                str(error).rstrip("."),
-                parameter="memory_settings",
-                remedy="give settings of the estimator in memory",
-            ) from None
-        estimator.check_settings()
-        # from rest, as the whole model of several muscles begins
-        block: Block = estimator.find(estimator.data(recording, [run.counts]), Tracker())
-        return block
+        ends = low - BEYOND * span, high + BEYOND * span
+        return PI(vector(radii), vector(weights), offset, ends, "first_sample", channel, channel)
 
 
 class CoupledPIEstimator(SDCHMEstimator):
@@ -371,7 +324,6 @@ def learned_inverse(
     recordings: Recording | Sequence[Recording],
     *,
     search: Search | None = None,
-    ridge: float = 1e-9,
     tracker: Tracker | None = None,
 ) -> Series:
     """Return the inverse with a trained network: SDIHC, as in its paper (Section 4).
@@ -387,8 +339,6 @@ def learned_inverse(
         Of its inputs and outputs.
     search : Search, optional
         Of the network's sets; default the paper's swarm, on 6000 samples.
-    ridge : float
-        Damping of what is a rule's own.
     tracker : Tracker, optional
         Is shown the progress.
 
@@ -421,7 +371,7 @@ def learned_inverse(
         y,
         h,
         len(network.centres[0]),
-        Consequents(network.constants, ridge),
+        Consequents(network.constants, PublishedSDCHMEstimator.ridge),
         search or Search("pso", SDCHMEstimator.search_samples, printed_swarm(), 0),
         (data.outputs, data.scheduled, network.driven),
         beyond=0.0,

@@ -80,8 +80,7 @@ class AirEstimator(SeparableEstimator):
 
     @classmethod
     def objection(cls, recordings: Sequence[Recording], channels: Channels) -> str | None:
-        objection = super().objection(recordings, channels)
-        if objection is not None:
+        if objection := super().objection(recordings, channels):
             return objection
         (command, pressure) = (name.partition("_")[0] for name in channels.pair)
         if command in NO_COMMANDS or pressure != "pressure":
@@ -174,8 +173,8 @@ class AirEstimator(SeparableEstimator):
         times = np.log([block.filling_time, block.venting_time])
         pressures = [getattr(block, name) for name in limits]
         start = np.array([block.gain, block.offset, block.hysteresis, *times, *pressures])
-        half = np.full(start.size, 0.25 * np.ptp(data.output_range))
-        half[:2] = 0.5 * block.gain, 0.5 * np.ptp(data.input_range)
+        half = np.full(start.size, 0.25 * data.output_span)
+        half[:2] = 0.5 * block.gain, 0.5 * data.input_span
         lower, upper = start - half, start + half
         lower[2:5], upper[2:5] = (0.0, shortest, shortest), (widest, longest, longest)
 
@@ -201,7 +200,7 @@ class AirEstimator(SeparableEstimator):
         sample_time = data.timed()
         shortest = np.log(0.1 * sample_time)
         longest = np.log(max(run.u.size for run in data.runs) * sample_time)
-        widest = MOST_HYSTERESIS * float(np.ptp(data.input_range))
+        widest = MOST_HYSTERESIS * data.input_span
         return np.array([shortest, shortest, 0.0]), np.array([longest, longest, widest])
 
     def guesses(self, data: TrainingData) -> list[Array]:

@@ -74,10 +74,7 @@ class PredictionErrorEstimator(Estimator):
 
     purpose = "rate"
     inverse_kind = "exact where stable"
-    param_grid: ClassVar[Grid] = {
-        "n_poles": (1, 2, 3),
-        "n_zeros": (1, 2, 3),
-    }
+    param_grid: ClassVar[Grid] = {"n_poles": (1, 2, 3), "n_zeros": (1, 2, 3)}
     needs_time = True
     begins_measured = True
     effort = 0.02
@@ -192,27 +189,25 @@ class PredictionErrorEstimator(Estimator):
                     remedy="give longer recordings, or lower orders",
                 )
             runs = known  # a free run needs no outputs, so it alone goes on where they do not count
-        if orders.c == orders.d == orders.f == 0:
-            theta = arx(runs, orders)
-            tracker.update(theta, evaluate(theta, orders, runs, start)[2])
+        plant = replace(orders, c=0, d=0)
+        if plant.f:
+            starts = starting_points(runs, known, plant, self.n_starts, self.seed)
+            theta = minimise(runs, plant, starts, tracker, start)
         else:
-            plant = replace(orders, c=0, d=0)
-            if plant.f:
-                starts = starting_points(runs, known, plant, self.n_starts, self.seed)
-                theta = minimise(runs, plant, starts, tracker, start)
-            else:
-                theta = arx(runs, plant)
-            if plant != orders:
-                own = tracker.part(0.5, 1.0)
-                theta = minimise(runs, orders, [with_noise(theta, orders, runs)], own, start)
-                tracker.best, tracker.best_cost = own.best, own.best_cost
+            theta = arx(runs, plant)
+        if plant != orders:
+            own = tracker.part(0.5, 1.0)
+            theta = minimise(runs, orders, [with_noise(theta, orders, runs)], own, start)
+            tracker.best, tracker.best_cost = own.best, own.best_cost
+        elif not plant.f:
+            tracker.update(theta, evaluate(theta, orders, runs, start)[2])
         deviation = wanted * evaluate(theta, orders, runs, start)[2]
         theta[: orders.zeros] *= np.repeat(wanted / given, orders.b)
         theta[-1] *= wanted
         p = Polynomials.of(theta, orders)
         noise = (vector(p.c), vector(p.poles[0] if orders.a else p.d), deviation)
         constant = p.constant / (1.0 + float(p.poles.sum())) if orders.a else p.constant
-        found, ends = [], list(zip(data.lowest.tolist(), data.highest.tolist(), strict=True))
+        found = []
         for place, (channel, b) in enumerate(zip(data.inputs, p.b, strict=True)):
             poles = p.poles[min(place, len(p.poles) - 1)]
             numerator = np.zeros(1 + max(orders.input_lags))
@@ -228,7 +223,8 @@ class PredictionErrorEstimator(Estimator):
                 data.outputs[0],
                 *(() if place else noise),
             )
-            block = replace(block, input_range=ends[place])
+            ends = float(data.lowest[place]), float(data.highest[place])
+            block = replace(block, input_range=ends)
             if not block.is_stable:
                 radius = float(np.abs(block.poles).max())
                 raise ModelError(

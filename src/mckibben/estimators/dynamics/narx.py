@@ -27,12 +27,7 @@ from annotated_types import Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.derivatives import relative_sizes
-from mckibben.blocks.dynamics.narx import (
-    Narx,
-    NarxNetwork,
-    NarxPolynomial,
-    products,
-)
+from mckibben.blocks.dynamics.narx import Narx, NarxNetwork, NarxPolynomial, products
 from mckibben.blocks.fields import vector
 from mckibben.blocks.kernels import kernel
 from mckibben.errors import DataError, ModelError, ModelWarning
@@ -112,11 +107,7 @@ class NarxEstimator(SearchEstimator):
     )
     cannot = "Memory limited to its lags; no inverse."
     caution = "a polynomial of past values is unbounded beyond them"
-    param_grid: ClassVar[Grid] = {
-        "output_lags": (1, 2),
-        "input_lags": (1, 2),
-        "n_terms": (8, 16),
-    }
+    param_grid: ClassVar[Grid] = {"output_lags": (1, 2), "input_lags": (1, 2), "n_terms": (8, 16)}
     needs_time = True
     effort = 0.6
 
@@ -172,14 +163,13 @@ class NarxEstimator(SearchEstimator):
 
     def _fields(self, data: TrainingData) -> dict[str, Any]:
         """Return the common fields of all candidate models; the scales map the data to -1 to 1."""
-        (ul, uh), (yl, yh) = data.input_range, data.output_range
         return {
             "output_lags": self.output_lags,
             "input_lags": self.input_lags,
             "delay": self.delay,
             "thresholds": vector(np.arange(1, self.n_play + 1) / (self.n_play + 1)),
-            "input_scale": (0.5 * (ul + uh), 0.5 * (uh - ul)),
-            "output_scale": (0.5 * (yl + yh), 0.5 * (yh - yl)),
+            "input_scale": (0.5 * sum(data.input_range), 0.5 * data.input_span),
+            "output_scale": (0.5 * sum(data.output_range), 0.5 * data.output_span),
             "sample_time": data.sample_time,
             "initial": self.starting_rule,
             **self.channels(data),
@@ -222,7 +212,7 @@ class NarxEstimator(SearchEstimator):
                 least_gain=LEAST_GAIN,
                 max_evaluations=LAYER_EVALUATIONS,
             )
-            models.append(layers.solved(layer)[0])
+            models.append(layers.solved(layer, layers.columns(layer))[0])
         return models
 
     def _refined(
@@ -344,43 +334,40 @@ class HiddenLayers:
     fields: Mapping[str, Any]
     units: int
 
-    def solved(self, layer: Array) -> tuple[NarxNetwork, Array]:
-        """Return the best network for hidden weights, shape (units * (k + 1),), and its errors.
+    def columns(self, layer: Array) -> Array:
+        """Return the regressors of the output weights: constant, regressors, units; then their damping.
 
-        Behind the errors is the damping of the weights solved for: neighbouring samples make the
-        regressors nearly dependent.
+        Neighbouring samples make the regressors nearly dependent.
         """
         rows = layer.reshape(self.units, -1)
-        columns = self._columns(rows)
+        a = np.tanh(self.x @ rows[:, :-1].T + rows[:, -1])
+        columns = np.column_stack([np.ones(len(a)), self.x, a])
+        return np.vstack([columns, DAMPING * np.eye(columns.shape[1])])
+
+    def solved(self, layer: Array, columns: Array) -> tuple[NarxNetwork, Array]:
+        """Return the best network for hidden weights, shape (units * (k + 1),), and its errors."""
         target = np.append(self.y, np.zeros(len(columns) - self.y.size))
         weights = np.linalg.lstsq(columns, target, rcond=None)[0]
         bias, linear, read = np.split(weights, [1, 1 + self.x.shape[1]])
-        hidden = vector(np.column_stack([rows, read]).ravel())
+        hidden = vector(np.column_stack([layer.reshape(self.units, -1), read]).ravel())
         network = NarxNetwork(
             bias=float(bias[0]), linear=vector(linear), hidden=hidden, **self.fields
         )
         return network, columns @ weights - target
 
     def errors(self, layer: Array) -> tuple[Array, Callable[[], Array]]:
-        """Return the errors, and a function to their derivatives."""
-        network, left = self.solved(layer)
-        return left, lambda: self.slopes(layer, network)
+        """Return the errors, and a function to their projected derivatives (Kaufman)."""
+        columns, (n, k) = self.columns(layer), self.x.shape
+        network, left = self.solved(layer, columns)
 
-    def slopes(self, layer: Array, network: NarxNetwork) -> Array:
-        """Return the projected derivatives of the errors (Kaufman)."""
-        n, k = self.x.shape
-        columns = self._columns(layer.reshape(self.units, -1))
-        by_all, _ = network.slopes(self.x)
-        moved = np.zeros((len(columns), layer.size))
-        moved[:n] = by_all[:, 1 + k :].reshape(n, self.units, -1)[:, :, :-1].reshape(n, -1)
-        taken = np.linalg.qr(columns)[0]
-        return np.asarray(moved - taken @ (taken.T @ moved))
+        def slopes() -> Array:
+            by_all, _ = network.slopes(self.x)
+            moved = np.zeros((len(columns), layer.size))
+            moved[:n] = by_all[:, 1 + k :].reshape(n, self.units, -1)[:, :, :-1].reshape(n, -1)
+            taken = np.linalg.qr(columns)[0]
+            return np.asarray(moved - taken @ (taken.T @ moved))
 
-    def _columns(self, rows: Array) -> Array:
-        """Return the regressors of the output weights: constant, regressors, units; then damping."""
-        a = np.tanh(self.x @ rows[:, :-1].T + rows[:, -1])
-        columns = np.column_stack([np.ones(len(a)), self.x, a])
-        return np.vstack([columns, DAMPING * np.eye(columns.shape[1])])
+        return left, slopes
 
 
 @dataclass(frozen=True, eq=False)
@@ -481,9 +468,8 @@ class StretchErrors:
         with np.errstate(over="ignore", invalid="ignore"):
             regressors = np.column_stack([behind[self._past], self._driven])
             by_parameters, by_past = model.slopes(regressors)
-            by_past[np.isfinite(self._behind)[self._past]] = (
-                0.0  # measured, whatever the parameters
-            )
+            # measured, whatever the parameters
+            by_past[np.isfinite(self._behind)[self._past]] = 0.0
             feed_back(by_parameters, by_past)
         slopes = by_parameters[self.counts]
         errors = y[self.counts] - scaled(self.target, model.output_scale)

@@ -122,8 +122,7 @@ class ProcessModelEstimator(SeparableEstimator):
 
     def gain_range(self, data: TrainingData) -> tuple[float, float]:
         """Return the bounds of the gain; a larger one is not seen in the recordings."""
-        (ul, uh), (yl, yh) = data.input_range, data.output_range
-        most = LARGEST_GAIN * (yh - yl) / (uh - ul)
+        most = LARGEST_GAIN * data.output_span / data.input_span
         return -most, most
 
     def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:

@@ -135,10 +135,8 @@ def averaged(data: TrainingData) -> TrainingData:
 
     What runs free is the same in all, so their squared errors are that of the mean, but for a constant.
     """
-    first, *others = data.runs
+    first = data.runs[0]
     if not all(np.array_equal(run.driven, first.driven) and run.counts.all() for run in data.runs):
-        return data
-    if not others:
         return data
     mean = np.mean([run.outputs for run in data.runs], axis=0)
     return replace(data, runs=(replace(first, outputs=mean),))
@@ -171,17 +169,14 @@ class StateNetworkEstimator(SearchEstimator):
     cannot = "Slow to fit; no inverse; arbitrary beyond the data."
     caution = "a network without physics is arbitrary beyond them"
     needs_time = True
+    made_for = ("force", "displacement")
+    effort = 100.0
 
-    input: str = "force"
-    output: str = "displacement"
     n_states: Annotated[int, Interval(ge=2, le=10)] = 3
     n_units: Annotated[int, Interval(ge=1, le=100)] = 10
     n_steps: Annotated[int, Interval(ge=1, le=10_000)] = 200
     periodic: bool = False
     substeps: Annotated[int, Interval(ge=1, le=MOST_SUBSTEPS)] | None = None
-
-    made_for = ("force", "displacement")
-    effort = 100.0
 
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
         step = data.timed()

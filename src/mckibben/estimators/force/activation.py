@@ -72,8 +72,6 @@ class ActivationMemoryEstimator(SeparableEstimator):
     input_settings = ("force",)
     rises = False
 
-    input = "contraction"
-    output = "pressure"
     force: str = "force"
     degree: Annotated[int, Interval(ge=1, le=9)] = 4
     force_degree: Annotated[int, Interval(ge=0, le=5)] = 3
@@ -86,24 +84,21 @@ class ActivationMemoryEstimator(SeparableEstimator):
     def unit(self, data: TrainingData) -> ActivationMemory:
         """Return the model with zero parameters."""
         forces = data.stacked("scheduled")
-        low, high = data.input_range
         weakest, strongest = float(forces.min()), float(forces.max())
         varies = strongest - weakest > 1e-6 * max(abs(strongest), 1.0)
+        half = 0.5 * (strongest - weakest) if varies else 1.0
         n, taus, smoothed = self.n_operators, self.time_constants, self.rate_time_constant
         return ActivationMemory(
             surface=(0.0,) * ((self.degree + 1) * (self.force_degree + 1)),
-            thresholds=vector(self.largest * (high - low) * (np.arange(1, n + 1) / n) ** 1.5),
+            thresholds=vector(self.largest * data.input_span * (np.arange(1, n + 1) / n) ** 1.5),
             friction=(0.0,) * (2 * n),
             viscosity=(0.0, 0.0),
             relaxation=(0.0,) * (2 * len(taus)),
             time_constants=taus,
             degree=self.degree,
             force_degree=self.force_degree,
-            input_scale=(0.5 * (low + high), 0.5 * (high - low)),
-            force_scale=(
-                0.5 * (weakest + strongest),
-                0.5 * (strongest - weakest) if varies else 1.0,
-            ),
+            input_scale=(0.5 * sum(data.input_range), 0.5 * data.input_span),
+            force_scale=(0.5 * (weakest + strongest), half),
             rate_time_constant=SMOOTHED * data.timed() if smoothed is None else smoothed,
             initial=self.starting_rule,
             **self.channels(data),
@@ -164,8 +159,6 @@ class ActivationPressureEstimator(SearchEstimator):
     made_for = ("contraction", "pressure")
     input_settings = ("force",)
 
-    input = "contraction"
-    output = "pressure"
     force: str = "force"
     rate_time_constant: Annotated[float, Ge(0)] | None = None
     frequency: Annotated[float, Ge(0)] | None = None
@@ -181,7 +174,7 @@ class ActivationPressureEstimator(SearchEstimator):
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the model, set to the first moving run's frequency."""
         step, smoothed, given = data.timed(), self.rate_time_constant, self.frequency
-        at = frequencies(data.runs) if given is None else np.full(len(data.runs), given)
+        at = frequencies(data) if given is None else np.full(len(data.runs), given)
         moving = at >= STATIC_SHARE * at.max()
         loops = replace(data, runs=tuple(data.runs[i] for i in np.flatnonzero(moving)))
         contractions, pressures = characteristic_points(data.runs, moving)
@@ -237,19 +230,14 @@ def _searched(errors: Errors, start: Array, bounds: tuple[Array, Array]) -> Arra
     return path[-1][0]
 
 
-def frequencies(runs: Sequence[Run]) -> Array:
+def frequencies(data: TrainingData) -> Array:
     """Return the dominant frequency of each run's input [Hz]; 0 if it is constant."""
-    spans = np.array([float(np.ptp(run.u)) for run in runs])
-    found = np.array([dominant_frequency(run) for run in runs])
+    spans, found = np.array([np.ptp(run.u) for run in data.runs]), []
+    for run in data.runs:
+        moved, n = run.u - run.u.mean(), 4 * len(run)
+        spectrum = np.abs(np.fft.rfft(moved * np.hanning(moved.size), n))
+        found.append(np.argmax(spectrum) / (n * data.timed()))
     return np.where(spans < CONSTANT_SHARE * spans.max(), 0.0, found)
-
-
-def dominant_frequency(run: Run) -> float:
-    """Return the dominant frequency of a run's input [Hz]."""
-    assert run.sample_time is not None
-    moved = run.u - run.u.mean()
-    spectrum = np.abs(np.fft.rfft(moved * np.hanning(moved.size), 4 * moved.size))
-    return float(np.argmax(spectrum) / (4 * moved.size * run.sample_time))
 
 
 # -- characteristic points -------------------------------------------------------------------
@@ -333,17 +321,15 @@ def by_force(runs: Sequence[Run]) -> dict[float, list[int]]:
 
 def outermost(runs: Sequence[Run]) -> Array:
     """Return contraction and pressure, (2, 2), at the outermost turning points."""
-    turns = np.concatenate([_turns(run) for run in runs])
+    found = []
+    for run in runs:
+        # where a run begins and ends, it does not turn
+        places = [place for place in reversals(run.u)[1:-1] if run.counts[place]]
+        if len(places) < 2:  # one that hardly turns counts as a whole
+            places = list(np.flatnonzero(run.counts))
+        found.append(np.column_stack([run.u[places], run.y[places]]))
+    turns = np.concatenate(found)
     return turns[[turns[:, 0].argmin(), turns[:, 0].argmax()]]
-
-
-def _turns(run: Run) -> Array:
-    """Return contraction and pressure at turning points, or over all of a run that hardly turns."""
-    # where a run begins and ends, it does not turn
-    places = [place for place in reversals(run.u)[1:-1] if run.counts[place]]
-    if len(places) < 2:
-        places = list(np.flatnonzero(run.counts))
-    return np.column_stack([run.u[places], run.y[places]])
 
 
 def boundaries(runs: Sequence[Run], extremes: Array, levels: tuple[float, float]) -> Array:

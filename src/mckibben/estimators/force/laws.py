@@ -51,46 +51,35 @@ class PolynomialForceEstimator(SeparableEstimator):
     input_settings = ("pressure",)
     rises = False
 
-    input = "length"
-    output = "force"
     pressure: str = "pressure"
     nonnegative = False
     law: Law = "bilinear"
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the powers of the scaled length with pressure, then without, but the constant."""
-        length, pressure = run.inputs.T
-        return force_columns(length, pressure, ORDERS[self.law], data.input_range)
+        return force_columns(self.law, run, data)
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
-        return force_law(linear, offset, ORDERS[self.law], data.input_range, self.channels(data))
+        return force_law(self.law, linear, offset, data, self.channels(data))
 
 
-def force_columns(
-    length: Array, pressure: Array, orders: tuple[int, int], span: tuple[float, float]
-) -> Array:
-    """Return the regressors of a polynomial law, without its constant, shape (n, k)."""
-    x = (length - 0.5 * sum(span)) / (0.5 * (span[1] - span[0]))
-    with_pressure = [pressure * x**i for i in range(orders[0] + 1)]
+def force_columns(law: Law, run: Run, data: TrainingData) -> Array:
+    """Return the regressors of a polynomial law over a run, without its constant, shape (n, k).
+
+    Powers of the length from -1 to 1 over its range: with the pressure, then without.
+    """
+    orders = ORDERS[law]
+    x = (run.u - 0.5 * sum(data.input_range)) / (0.5 * data.input_span)
+    with_pressure = [run.scheduled[:, 0] * x**i for i in range(orders[0] + 1)]
     return np.column_stack([*with_pressure, *[x**j for j in range(1, orders[1] + 1)]])
 
 
 def force_law(
-    linear: Array,
-    offset: float,
-    orders: tuple[int, int],
-    span: tuple[float, float],
-    channels: dict[str, Channel],
+    law: Law, linear: Array, offset: float, data: TrainingData, channels: dict[str, Channel]
 ) -> PolynomialForce:
     """Return the polynomial law of coefficients in the order of `force_columns`, and the constant."""
-    n = orders[0] + 1
-    return PolynomialForce(
-        vector(linear[:n]),
-        (offset, *vector(linear[n:])),
-        0.5 * sum(span),
-        0.5 * (span[1] - span[0]),
-        **channels,
-    )
+    n, centre, half = ORDERS[law][0] + 1, 0.5 * sum(data.input_range), 0.5 * data.input_span
+    constant = (offset, *vector(linear[n:]))
+    return PolynomialForce(vector(linear[:n]), constant, centre, half, **channels)
 
 
 class ChouHannafordEstimator(SeparableEstimator):
@@ -112,8 +101,6 @@ class ChouHannafordEstimator(SeparableEstimator):
     input_settings = ("pressure",)
     rises = False
 
-    input = "length"
-    output = "force"
     pressure: str = "pressure"
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
@@ -129,8 +116,7 @@ class ChouHannafordEstimator(SeparableEstimator):
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of the first: without it there would be no braid."""
         reach = float(np.ptp(matrix[:, 0])) or 1.0
-        low, high = data.output_range
-        return np.array([1e-3 * (high - low) / reach, 0.0])
+        return np.array([1e-3 * data.output_span / reach, 0.0])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         per_bar = float(linear.sum())
@@ -161,8 +147,6 @@ class TonduLopezEstimator(SeparableEstimator):
     rises = False
     searches_condensed = False
 
-    input = "length"
-    output = "force"
     pressure: str = "pressure"
     nonnegative = False
     rest_length: Annotated[float, Gt(0)] | None = None
@@ -179,7 +163,6 @@ class TonduLopezEstimator(SeparableEstimator):
     def law(
         self, theta: Array, mu: tuple[float, float], constant: float, data: TrainingData
     ) -> TonduLopez:
-        """Return the law with these parameters."""
         rest = self.rest_length or data.input_range[1]
         angle, *kappa = theta.tolist()
         channels = self.channels(data)

@@ -7,6 +7,7 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
@@ -21,7 +22,7 @@ from mckibben.blocks.force.multistate_friction import (
 )
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.force.laws import ORDERS, Law, force_columns, force_law
+from mckibben.estimators.force.laws import Law, force_columns, force_law
 from mckibben.numerics.multi_start import Choice
 from mckibben.recording import Recording, listed
 
@@ -37,10 +38,7 @@ TIMES = (0.1, 10.0)
 
 
 def extract_hysteresis(
-    recordings: Recording | Sequence[Recording],
-    law: Block,
-    *,
-    output: str = "force_hysteresis",
+    recordings: Recording | Sequence[Recording], law: Block, *, output: str = "force_hysteresis"
 ) -> list[Recording]:
     """Return recordings with the residual of a static law as output: f_h = f - f_st.
 
@@ -100,8 +98,6 @@ class MultistateEstimator(SeparableEstimator):
     search_evaluations = 20
     polish_evaluations = 20
 
-    input = "length"
-    output = "force"
     initial = "virgin"
     pressure: str = "pressure"
     static: Law | None = "bilinear"
@@ -129,24 +125,18 @@ class MultistateEstimator(SeparableEstimator):
         element; its force is k times that. So theta is the logarithms of these lengths and times,
         element by element, lengthening first.
         """
-        low, high = data.input_range
-        lengths = np.log((high - low) * np.array([0.005, 2.0]))
+        lengths = np.log(data.input_span * np.array([0.005, 2.0]))
         times = np.log(data.timed() * np.array([1e-2, 20.0]))
         pairs = np.tile([lengths, times], (sum(self._n_pairs), 1))
         return pairs[:, 0], pairs[:, 1]
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return initial elements that slip early and late, with short relaxation times."""
-        low, high = data.input_range
-        time = np.log(0.1 * data.timed())
+        time, elements = np.log(0.1 * data.timed()), np.arange(len(self.directions))
         guesses = []
-        for first in (0.5, 0.25, 0.1):
-            for ratio in (0.7, 0.4, 0.2):
-                theta: list[float] = []
-                for index, n_pairs in enumerate(self._n_pairs):
-                    length = np.log((high - low) * first * ratio**index)
-                    theta += [length, time] * n_pairs
-                guesses.append(np.array(theta))
+        for first, ratio in product((0.5, 0.25, 0.1), (0.7, 0.4, 0.2)):
+            lengths = np.repeat(np.log(data.input_span * first * ratio**elements), self._n_pairs)
+            guesses.append(np.column_stack([lengths, np.full(lengths.size, time)]).ravel())
         return guesses
 
     def choices(self, data: TrainingData) -> list[Choice]:
@@ -155,24 +145,26 @@ class MultistateEstimator(SeparableEstimator):
         The cost has many local minima, in which elements have changed roles, and rounding decides in
         which of them a search ends.
         """
-        low, high = data.input_range
-        lengths = np.log((high - low) * LENGTHS)
+        lengths = np.log(data.input_span * LENGTHS)
         times = np.log(data.timed() * np.array(TIMES))
-        choices, first = [], 0
-        for n_pairs in self._n_pairs:
+        choices = []
+        for index, n_pairs in enumerate(self._n_pairs):
             candidates = [
                 np.ravel([(length, time) for length in element])
                 for time, element in product(times, product(lengths, repeat=n_pairs))
             ]
-            choices.append(Choice(np.arange(first, first + 2 * n_pairs), np.array(candidates)))
-            first += 2 * n_pairs
+            choices.append(Choice(self._places(index), np.array(candidates)))
         return choices
+
+    def _places(self, index: int) -> NDArray[np.intp]:
+        """Return the places of an element in theta."""
+        first, n_pairs = sum(self._n_pairs[:index]), self._n_pairs[index]
+        return np.arange(2 * first, 2 * (first + n_pairs))
 
     def _unit_element(self, index: int, theta: Array) -> MultistateFriction:
         """Return one element with stiffnesses of 1."""
-        n_pairs, direction = self._n_pairs, self.directions[index]
-        first = 2 * sum(n_pairs[:index])
-        pairs = np.exp(theta[first : first + 2 * n_pairs[index]]).reshape(-1, 2).tolist()
+        direction = self.directions[index]
+        pairs = np.exp(theta[self._places(index)]).reshape(-1, 2).tolist()
         # k, sigma and F_c lengthening, then shortening: with k = 1, sigma is the time, F_c the length
         six = [value for length, time in (pairs[0], pairs[-1]) for value in (1.0, time, length)]
         values = tuple(six[position] for position in PLACES[direction])
@@ -203,23 +195,16 @@ class MultistateEstimator(SeparableEstimator):
             unit = self._unit_element(index, theta).values
             for position, value in zip(PLACES[direction], unit, strict=True):
                 values.append(value * (lengthening if position < 3 else shortening))
-        return MultistateFriction(
-            self.directions,
-            tuple(values),
-            0.0,
-            float(np.median(data.stacked("scheduled"))),
-            self.starting_rule,
-            **self.channels(data),
-        )
+        pressure, rule = float(np.median(data.stacked("scheduled"))), self.starting_rule
+        channels = self.channels(data)
+        return MultistateFriction(self.directions, tuple(values), 0.0, pressure, rule, **channels)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the forces of the elements, then the regressors of the static law."""
         forces = self._forces(theta, run)
         if self.static is None:
             return forces
-        length, pressure = run.inputs.T
-        law = force_columns(length, pressure, ORDERS[self.static], data.input_range)
-        return np.column_stack([forces, law])
+        return np.column_stack([forces, force_columns(self.static, run, data)])
 
     @property
     def solves_offset(self) -> bool:
@@ -239,8 +224,7 @@ class MultistateEstimator(SeparableEstimator):
         friction = self.friction(theta, linear[:n], data)
         if self.static is None:
             return friction
-        orders = ORDERS[self.static]
-        law = force_law(linear[n:], offset, orders, data.input_range, self.channels(data))
+        law = force_law(self.static, linear[n:], offset, data, self.channels(data))
         return Parallel((law, friction))
 
 

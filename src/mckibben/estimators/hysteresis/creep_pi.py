@@ -14,16 +14,15 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.dynamics.creep import Creep, creep_matrix
-from mckibben.blocks.fields import Channel, vector
+from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.memoryless import Logarithm
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, Operators
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator
-from mckibben.estimators.hysteresis.output_maps import PolynomialMap
+from mckibben.estimators.hysteresis.output_maps import LEAST_PIECE, PolynomialMap
 from mckibben.estimators.hysteresis.pi import play_operators, spread
 
 RAISED = 1e-5
@@ -84,13 +83,13 @@ class CreepPIEstimator(SeparableEstimator):
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [weights, log addition, log time constants, compliances]."""
         n, k = self.n_operators, self.n_creep
-        low, high = data.input_range
-        least = np.log(max(0.01 * (high - low), 0.1 - low))
+        low, span = data.input_range[0], data.input_span
+        least = np.log(max(0.01 * span, 0.1 - low))
         step = data.timed()
         longest = max(run.u.size for run in data.runs) * step
         slow = np.log(max(SLOWEST * longest, 30 * step))
         lower = [*[0.0] * n, least, *[np.log(FASTEST * step)] * k, *[0.0] * k]
-        added = max(np.log(MOST_ADDED * (high - low)), least + 1)
+        added = max(np.log(MOST_ADDED * span), least + 1)
         upper = [*[1.0] * n, added, *[slow] * k, *[MOST_CREEP] * k]
         lower[0] = LEAST_REVERSIBLE
         return np.array(lower), np.array(upper)
@@ -105,13 +104,6 @@ class CreepPIEstimator(SeparableEstimator):
         taus, compliances = self.tail(theta)
         order = np.argsort(taus, kind="stable")
         return taus[order], compliances[order]
-
-    def creep_parts(self, theta: Array, channel: Channel) -> tuple[Block, ...]:
-        """Return the creep block, if there is any."""
-        taus, compliances = self.creep(theta)
-        if not taus.size:
-            return ()
-        return (Creep(vector(compliances), vector(taus), "first_sample", channel, channel),)
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return decreasing weights, on the logarithm and nearly on the input, with some creep."""
@@ -171,28 +163,23 @@ class CreepPIEstimator(SeparableEstimator):
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every piece, so that the map increases."""
-        low, high = data.output_range
-        return np.full(matrix.shape[1], 1e-6 * (high - low))
+        return np.full(matrix.shape[1], LEAST_PIECE * data.output_span)
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Series:
         """Return the series: logarithm, memory, map and creep."""
         given, result = data.inputs[0], data.outputs[0]
         added, radii, (low, high), (bottom, top) = self.memory(theta, data)
-        weights = theta[: self.n_operators] / (top - bottom)
-        memory = PI(
-            vector(radii),
-            vector(weights),
-            float(-bottom / (top - bottom)),
-            (float(low), float(high)),
-            self.starting_rule,
-            given,
-            result,
-        )
-        settled = offset / (1.0 + self.creep(theta)[1].sum())
-        output_map = PolynomialMap(self.map_size)
-        increasing = output_map.build(linear, settled, 0.0, 1.0, result)
-        creep = self.creep_parts(theta, result)
-        return Series((Logarithm(added, given, given), memory, increasing, *creep))
+        weights, start = theta[: self.n_operators] / (top - bottom), float(-bottom / (top - bottom))
+        rule, reach = self.starting_rule, (float(low), float(high))
+        memory = PI(vector(radii), vector(weights), start, reach, rule, given, result)
+        taus, compliances = self.creep(theta)
+        settled = offset / (1.0 + compliances.sum())
+        increasing = PolynomialMap(self.map_size).build(linear, settled, 0.0, 1.0, result)
+        parts = (Logarithm(added, given, given), memory, increasing)
+        if not taus.size:
+            return Series(parts)
+        creep = Creep(vector(compliances), vector(taus), "first_sample", result, result)
+        return Series((*parts, creep))
 
 
 def with_creep(

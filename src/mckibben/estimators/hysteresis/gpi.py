@@ -52,10 +52,7 @@ def piecewise_linear_shape(low: float, high: float, n_knots: int) -> Shape:
     return middle - 4.0, middle + 2.0, guesses, envelopes
 
 
-SHAPES = {
-    "tanh": tanh_shape,
-    "piecewise-linear": piecewise_linear_shape,
-}
+SHAPES = {"tanh": tanh_shape, "piecewise-linear": piecewise_linear_shape}
 
 HEIGHTS = np.array([[-0.5], [0.0], [0.5]])
 """Initial heights of envelopes, relative to the largest expected."""
@@ -112,8 +109,8 @@ class GPIEstimator(SeparableEstimator):
     def shape(self, data: TrainingData) -> Shape:
         """Return the parametrisation: shape, gap, and the height if it is searched."""
         lower, upper, guesses, envelopes = SHAPES[self.envelope](*data.input_range, self.n_knots)
-        low, high = data.output_range
-        most = 1.0 + 2.0 * max(abs(low), abs(high)) / max(high - low, 1e-12)
+        largest = float(np.abs(data.target).max())
+        most = 1.0 + 2.0 * largest / max(data.output_span, 1e-12)
         heights = np.empty((1, 0)) if self.solves_offset else most * HEIGHTS
         end = 2.0 * most * np.ones(heights.shape[1])
         tried = product(heights, guesses, (0.0, 0.1))

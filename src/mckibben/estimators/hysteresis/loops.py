@@ -56,17 +56,12 @@ class Loops:
     degree: int
     both_ways: bool
 
-    def columns(self, x: Array, z: Array, slopes: Array) -> Array:
-        """Return the pieces of the polynomial, then lagging loops, then leading ones.
+    def columns(self, run: Run, data: TrainingData, z: Array, slopes: Array) -> Array:
+        """Return the pieces of the polynomial over a run, then lagging loops, then leading ones.
 
-        Parameters
-        ----------
-        x : array, shape (n,)
-            Input, from 0 to 1 over its range.
-        z : array, shape (n, m)
-        slopes : array, shape (m,)
-            Bounds of the slopes of z by x.
+        The latter are of z, shape (n, m), whose slopes by x have bounds, shape (m,).
         """
+        x = (run.u - data.input_range[0]) / data.input_span
         pieces = PolynomialMap(self.degree).pieces(x)
         if not self.both_ways:
             return np.column_stack([pieces, z])
@@ -75,8 +70,7 @@ class Loops:
     def least(self, size: int, data: TrainingData) -> Array:
         """Return a small lower bound of every piece of the polynomial, and 0 for the loops."""
         floor = np.zeros(size)
-        low, high = data.output_range
-        floor[: self.degree] = LEAST_SLOPE * (high - low)
+        floor[: self.degree] = LEAST_SLOPE * data.output_span
         return floor
 
     def weights(self, linear: Array, offset: float, slopes: Array) -> tuple[Array, Array]:
@@ -88,12 +82,6 @@ class Loops:
         lagging, leading = np.split(linear[self.degree :], 2)
         polynomial[1] += float(slopes @ lagging)
         return polynomial, leading - lagging
-
-
-def relative(run: Run, data: TrainingData) -> Array:
-    """Return the input over a run, from 0 to 1 over its range."""
-    low, high = data.input_range
-    return (run.u - low) / (high - low)
 
 
 class BoucWenEstimator(SeparableEstimator):
@@ -142,10 +130,8 @@ class BoucWenEstimator(SeparableEstimator):
 
     def unit(self, theta: Array, data: TrainingData) -> BoucWen | GeneralizedBoucWen:
         """Return the model of z alone; an asymmetric shape reverses at mid-range."""
-        low, high = data.input_range
-        span, rate = high - low, float(np.exp(theta[0])) / (high - low)
-        fields = self.common_fields(data)
-        n = self.exponent or 1
+        low, span, n = data.input_range[0], data.input_span, self.exponent or 1
+        rate, fields = float(np.exp(theta[0])) / span, self.common_fields(data)
         if self.asymmetric:
             half, shape = 0.5 * span, vector(theta[1:])
             return GeneralizedBoucWen((0.0,), 1.0, rate, shape, n, low + half, half, **fields)
@@ -168,7 +154,7 @@ class BoucWenEstimator(SeparableEstimator):
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         unit = self.unit(theta, data)
         z = unit.simulate(run.u, initial=self.starting_rule)[:, np.newaxis]
-        return self.linear.columns(relative(run, data), z, self.steepest(theta, unit))
+        return self.linear.columns(run, data, z, self.steepest(theta, unit))
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         unit = self.unit(theta, data)
@@ -219,9 +205,8 @@ class MaxwellSlipEstimator(SeparableEstimator):
     @property
     def fixed_fields(self) -> tuple[str, ...]:
         """Both ratios, if directions are equal."""
-        return (
-            () if self.asymmetric else ("maxwell-slip.stiffness_ratio", "maxwell-slip.limit_ratio")
-        )
+        ratios = ("maxwell-slip.stiffness_ratio", "maxwell-slip.limit_ratio")
+        return () if self.asymmetric else ratios
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of the logarithms of both ratios, if there are any."""
@@ -244,18 +229,11 @@ class MaxwellSlipEstimator(SeparableEstimator):
 
     def springs(self, theta: Array, data: TrainingData) -> MaxwellSlip:
         """Return the springs, without weights or polynomial."""
-        n, (low, high) = self.n_operators, data.input_range
-        kappa, ratio = np.exp(theta) if theta.size else (1.0, 1.0)
-        return MaxwellSlip(
-            vector(spread(n + 1, (low, high))[1:]),
-            (0.0,) * n,
-            (0.0,),
-            float(kappa),
-            float(ratio),
-            low,
-            high - low,
-            **self.common_fields(data),
-        )
+        n, (low, _) = self.n_operators, data.input_range
+        kappa, ratio = np.exp(theta).tolist() if theta.size else (1.0, 1.0)
+        limits, none = vector(spread(n + 1, data.input_range)[1:]), (0.0,) * n
+        fields = self.common_fields(data)
+        return MaxwellSlip(limits, none, (0.0,), kappa, ratio, low, data.input_span, **fields)
 
     def steepest(self, springs: MaxwellSlip) -> Array:
         """Return the bounds of the slopes of deflections by the relative input, (n_operators,)."""
@@ -267,7 +245,7 @@ class MaxwellSlipEstimator(SeparableEstimator):
         deflections = np.empty((u.size, n))
         limits = np.array(springs.breakaways)
         slip_matrix(u, limits, springs.stiffness_ratio, springs.limit_ratio, start, deflections)
-        return self.linear.columns(relative(run, data), deflections, self.steepest(springs))
+        return self.linear.columns(run, data, deflections, self.steepest(springs))
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         springs = self.springs(theta, data)
@@ -321,16 +299,10 @@ class DuhemEstimator(SeparableEstimator):
 
     def unit(self, theta: Array, data: TrainingData) -> Duhem:
         """Return the model with zero polynomials."""
-        low, high = data.input_range
-        half = 0.5 * (high - low)
-        return Duhem(
-            (0.0,) * (self.degree + 1),
-            (0.0,) * (self.slope_degree + 1),
-            float(np.exp(theta[0])),
-            low + half,
-            half,
-            **self.common_fields(data),
-        )
+        half, alpha = 0.5 * data.input_span, float(np.exp(theta[0]))
+        target, slope = (0.0,) * (self.degree + 1), (0.0,) * (self.slope_degree + 1)
+        fields = self.common_fields(data)
+        return Duhem(target, slope, alpha, data.input_range[0] + half, half, **fields)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the output per coefficient, without the constant, over the run."""

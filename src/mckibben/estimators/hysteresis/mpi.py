@@ -15,13 +15,10 @@ from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import InverseKind, Operators, Purpose
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator
-from mckibben.estimators.hysteresis.output_maps import MAPS, PolynomialMap
+from mckibben.estimators.hysteresis.output_maps import LEAST_PIECE, MAPS, PolynomialMap
 from mckibben.estimators.hysteresis.pi import play_operators, spread
 from mckibben.numerics.least_squares import solve_bounded
 from mckibben.numerics.tracker import Tracker
-
-LEAST_PIECE = 1e-6
-"""Smallest share of the output's range for a piece of an increasing map."""
 
 CROWDED = (1, 2, 4)
 """Exponents of the initial thresholds, as powers of their share of half the input range, if
@@ -145,16 +142,16 @@ class MPIEstimator(SeparableEstimator):
         """Number of identified thresholds."""
         return self.n_operators * self.identified
 
-    def most_evaluations(self, size: int) -> int:
-        """Return a larger number if thresholds are searched."""
-        return MOST_STEPS if self.identified else super().most_evaluations(size)
+    @property
+    def most_evaluations(self) -> int:
+        """Maximum number of evaluations of a refinement, larger if thresholds are searched."""
+        return MOST_STEPS if self.identified else self.search_evaluations
 
     def radii(self, theta: Array, data: TrainingData) -> Array:
         """Return the thresholds, shape (n_operators,)."""
         if not self.identified:
             return spread(self.n_operators, data.input_range)
-        low, high = data.input_range
-        return np.asarray(0.5 * (high - low) * theta[-self.n_operators :])
+        return np.asarray(0.5 * data.input_span * theta[-self.n_operators :])
 
     def weights(self, theta: Array) -> Array:
         """Return the relative weights, then the rate-dependent ones."""
@@ -175,24 +172,22 @@ class MPIEstimator(SeparableEstimator):
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return the weights of the best PI model, and two even distributions, without rate."""
-        low, high = data.input_range
-        by_rate = np.zeros(self.n_operators * self.rate_dependent)
+        span, by_rate = data.input_span, np.zeros(self.n_operators * self.rate_dependent)
         even, guesses = spread(self.n_operators, data.input_range), []
         for power in CROWDED if self.identified else (1,):
-            share = (2 * even / (high - low)) ** power
-            radii = even if power == 1 else 0.5 * (high - low) * share
-            matrix = self._plays(radii, data)
-            weights, _ = solve_bounded(matrix, data.target, np.zeros(matrix.shape[1]))
+            share = (2 * even / span) ** power
+            radii = even if power == 1 else 0.5 * span * share
+            plays = [play_operators(run.u, radii, self.starting_rule) for run in data.runs]
+            matrix = np.concatenate(
+                [p[run.counts] for p, run in zip(plays, data.runs, strict=True)]
+            )
+            weights, _ = solve_bounded(matrix, data.target, np.zeros(radii.size))
             top = weights.max() if weights.max() > 0 else 1.0
-            fading = np.exp(-3 * radii / (high - low))
+            fading = np.exp(-3 * radii / span)
             reversible = np.where(radii == 0, 1.0, 0.1)
             for guess in (weights / top, fading, reversible):
                 guesses.append(np.concatenate([guess, by_rate, share[: self.n_further]]))
         return guesses
-
-    def _plays(self, radii: Array, data: TrainingData) -> Array:
-        """Return play operators at the samples that count."""
-        return data.scored(lambda run: play_operators(run.u, radii, self.starting_rule))
 
     def operators(self, radii: Array, run: Run, data: TrainingData) -> Array:
         """Return play operators over the run, then their products with the relative rate."""
@@ -252,10 +247,10 @@ class MPIEstimator(SeparableEstimator):
         operators, weights = self._operators(theta, data), self.weights(theta)
         columns = operators
         if self.identified:
-            low, high = data.input_range
-            half, radii = 0.5 * (high - low), self.radii(theta, data) + RAISED * (high - low)
+            span = data.input_span
+            radii = self.radii(theta, data) + RAISED * span
             there = data.scored(lambda run: self.operators(radii, run, data))
-            by_radii = weights * (there - operators) / (RAISED * (high - low)) * half
+            by_radii = weights * (there - operators) / (RAISED * span) * (0.5 * span)
             by_radii = by_radii.reshape(len(operators), -1, self.n_operators).sum(axis=1)
             columns = np.column_stack([operators, by_radii])
         lowest, highest = self._ends(theta, columns, data)
@@ -266,8 +261,7 @@ class MPIEstimator(SeparableEstimator):
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every piece, so that the map increases."""
-        span = data.output_range[1] - data.output_range[0]
-        return np.full(matrix.shape[1], LEAST_PIECE * span)
+        return np.full(matrix.shape[1], LEAST_PIECE * data.output_span)
 
     @property
     def solves_nonnegative(self) -> bool:
@@ -288,8 +282,8 @@ class MPIEstimator(SeparableEstimator):
         n, radii = self.n_operators, self.radii(theta, data)
         weights = (scale * self.weights(theta)).reshape(-1, n)
         if self.identified:
-            order, (low, high) = np.argsort(radii, kind="stable"), data.input_range
-            least = LEAST_DISTANCE * (high - low) * np.arange(n)
+            order = np.argsort(radii, kind="stable")
+            least = LEAST_DISTANCE * data.input_span * np.arange(n)
             radii = np.maximum.accumulate(radii[order] - least) + least
             weights = weights[:, order]
         static, thresholds = vector(weights[0]), vector(radii)

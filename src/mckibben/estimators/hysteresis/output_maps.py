@@ -10,6 +10,9 @@ from mckibben.arrays import Array
 from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.memoryless import Polynomial
 
+LEAST_PIECE = 1e-6
+"""Smallest share of the output's range for a piece of an increasing map."""
+
 
 class PolynomialMap:
     """Integrals of Bernstein polynomials: non-negative weights make the map increase.

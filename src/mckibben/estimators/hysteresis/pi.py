@@ -197,29 +197,19 @@ class EUPIEstimator(SeparableEstimator):
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the pieces of the cubic, then the operators, over the run."""
-        low, high = data.input_range
-        x = np.ascontiguousarray(run.u - low)
+        x = np.ascontiguousarray(run.u - data.input_range[0])
         radii = spread(self.n_operators, data.input_range)
         operators = np.empty((x.size, radii.size))
         state = started(radii, x[0], x[0], self.starting_rule)
         eupi_matrix(x, theta[0], theta[1], radii, state, operators)
-        return np.column_stack([CUBIC.pieces(x / (high - low)), operators])
+        return np.column_stack([CUBIC.pieces(x / data.input_span), operators])
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every piece of the cubic, so that it increases."""
-        low, high = data.output_range
-        return np.where(np.arange(matrix.shape[1]) < CUBIC.size, 1e-3 * (high - low), 0.0)
+        return np.where(np.arange(matrix.shape[1]) < CUBIC.size, 1e-3 * data.output_span, 0.0)
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> EUPI:
-        low, high = data.input_range
-        slope, ratio = theta.tolist()
-        a, b, c = (CUBIC.powers(linear[:3])[1:] / (high - low) ** np.arange(1, 4)).tolist()
-        return EUPI(
-            vector(spread(self.n_operators, data.input_range)),
-            vector(linear[3:]),
-            slope,
-            ratio,
-            (a, b, c),
-            offset,
-            **self.common_fields(data),
-        )
+        radii, (slope, ratio) = vector(spread(self.n_operators, data.input_range)), theta.tolist()
+        a, b, c = (CUBIC.powers(linear[:3])[1:] / data.input_span ** np.arange(1, 4)).tolist()
+        fields = self.common_fields(data)
+        return EUPI(radii, vector(linear[3:]), slope, ratio, (a, b, c), offset, **fields)

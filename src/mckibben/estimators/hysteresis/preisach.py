@@ -48,12 +48,9 @@ class PreisachEstimator(SeparableEstimator):
     def grid(self, data: TrainingData) -> Preisach | KrasnoselskiiPokrovskii:
         """Return the model of these levels, without weights."""
         block = Preisach if self.relays == "sudden" else KrasnoselskiiPokrovskii
+        levels = vector(np.linspace(*data.input_range, self.n_levels + 1))
         n = self.n_levels * (self.n_levels + 1) // 2
-        return block(self.levels(data), (0.0,) * n, 0.0, self.starting_rule, **self.channels(data))
-
-    def levels(self, data: TrainingData) -> tuple[float, ...]:
-        """Return the levels: evenly spread over the input range."""
-        return vector(np.linspace(*data.input_range, self.n_levels + 1))
+        return block(levels, (0.0,) * n, 0.0, self.starting_rule, **self.channels(data))
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the output of every cell separately, over the run."""
@@ -65,9 +62,8 @@ class PreisachEstimator(SeparableEstimator):
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every diagonal cell, which the inverse needs."""
         floor = np.zeros(matrix.shape[1])
-        low, high = data.output_range
         diagonal = np.cumsum(np.arange(1, self.n_levels + 1)) - 1
-        floor[diagonal] = LEAST_REVERSIBLE * (high - low)
+        floor[diagonal] = LEAST_REVERSIBLE * data.output_span
         return floor
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:

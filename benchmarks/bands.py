@@ -26,9 +26,8 @@ from tests.plants import PLANTS
 
 import mckibben
 from mckibben import Recording
-from mckibben.comparison.fitting import FitResult, Task, fit
 from mckibben.comparison.planning import Plan, plan_of
-from mckibben.comparison.ranking import constant_of, held, row_of, test_errors
+from mckibben.comparison.ranking import FitResult, constant_of, fit, held, row_of, test_errors
 from mckibben.diagnosis.bands import SHARES, TestedBand, tested_band
 from mckibben.errors import MckibbenError
 from regret import RIGS, on_rig
@@ -108,7 +107,7 @@ def of_task(
     tests = [run for runs in groups.values() for run in runs]
     plan = plan_of(train, tests, models=models, **channels)  # type: ignore[arg-type]
     fits = {
-        label: fit(plan.data, Task(label, item), lambda *_: None)
+        label: fit(plan.data, (label, item), lambda *_: None)
         for label, item in plan.items.items()
         if label not in plan.refused
     }

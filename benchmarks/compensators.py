@@ -24,7 +24,7 @@ from tests.plants import PLANTS, Plant
 from mckibben import Recording, study
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.studying.static_map import static_map
+from mckibben.studying.inverting import static_map
 from mckibben.studying.study import Study
 
 LIKELY = (0.6, 1.6)

@@ -305,7 +305,28 @@ class FitOptions:
 
 @dataclass(frozen=True)
 class CompareOptions:
-    """Options of `compare` and `study`: data, models and processes."""
+    """Options of `compare` and `study`: data, models and processes.
+
+    Parameters
+    ----------
+    inputs, outputs : sequence of str, optional
+        ``pressure`` and ``displacement``, for several muscles ``pressure_1`` and so on. For several
+        outputs, models are chosen by the mean error.
+    load : str, optional
+        Channel of a varying load, an input of the models.
+    models : "all", "quick", str, sequence of str, or mapping
+        Short names, in a text with commas between; "all" leaves out models that do not apply to the
+        channels, "quick" is a choice that takes seconds. A mapping of labels to short names or
+        estimators compares one model with several settings.
+    settings : mapping of str to mapping
+        Model name, or label, to settings of its estimator.
+    jobs : int, optional
+        Processes, which share the models, or none for little work. Results are identical.
+    most_samples : int, optional
+        Recordings keep their turning points; default 100 000. Scores refer to these samples.
+    allow_shared : bool
+        Whether to allow test recordings that were fitted, and repeated training recordings.
+    """
 
     inputs: Inputs = None
     outputs: Outputs = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -73,16 +73,8 @@ def read_files(
     data: Data,
     channels: Sequence[str] | None,
     reading: ReadOptions | None = None,
-    *,
-    informative: bool = False,
 ) -> list[Recording]:
-    """Return the recordings in files and folders, which must have some channels; recordings unchanged.
-
-    Parameters
-    ----------
-    channels, informative
-        As for `mckibben.read`.
-    """
+    """Return recordings, and those in files and folders, which must have some channels."""
     from mckibben.files import read
 
     reading = reading or ReadOptions()
@@ -91,7 +83,7 @@ def read_files(
         if isinstance(one, Recording):
             found.append(one)
         else:
-            found += read(one, channels=channels, informative=informative, **reading.arguments())
+            found += read(one, channels=channels, informative=False, **reading.arguments())
     return prepared(found, reading)
 
 
@@ -124,11 +116,9 @@ def read_sides(
     if reading.rest_length is not None and not named:
         found = [[one.with_derived(["displacement"]) for one in some] for some in found]
     channels = resolve([one for some in found for one in some])
-    needed = [*channels.inputs, *channels.outputs]
-    if any(name not in one for runs in found for one in runs for name in needed):
-        return [
-            read_files(some, [*needed, *named], reading) for some in data
-        ], channels  # or raises
+    if any(name not in one for runs in found for one in runs for name in channels.sides):
+        needed = [*channels.sides, *named]
+        return [read_files(some, needed, reading) for some in data], channels  # or raises
     for one in caught:
         warnings.warn(one.message, one.category, stacklevel=2)
     return found, channels
@@ -148,12 +138,13 @@ def read_loop(
     DataError
         If a channel is missing, or is that of several muscles.
     """
-    from mckibben.channels import channels_of, loop_of
+    from mckibben.channels import channels_of, moved_by
 
-    (recordings,), _ = read_sides(
+    (recordings,), channels = read_sides(
         [data], lambda runs: channels_of(runs, input, output), (input, output, others), reading
     )
-    return recordings, *loop_of(recordings, input, output)
+    given, wanted = channels.pair
+    return recordings, moved_by(recordings, given) if input is None else given, wanted
 
 
 @dataclass(frozen=True)
@@ -175,7 +166,8 @@ class Contents:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the samples, for JSON."""
-        files = {file: [asdict(one) for one in found] for file, found in self.columns.items()}
+        from mckibben.system.atomic import plain
+
         recordings = [
             {
                 "name": one.name,
@@ -194,8 +186,8 @@ class Contents:
             }
             for one in self.recordings
         ]
-        gaps = self.gaps if isinstance(self.gaps, str) else [one.to_dict() for one in self.gaps]
-        return {"files": files, "recordings": recordings, "data_gaps": gaps}
+        read = {"files": plain(self.columns), "recordings": recordings}
+        return {**read, "data_gaps": plain(self.gaps)}
 
 
 def look(

@@ -193,9 +193,7 @@ def _cut(
         after.insert(0, before.pop())
     run, gone = before[-1], travels[-1]
     start = int(np.searchsorted(gone, gone[-1] - travel))
-    if (
-        start < FEWEST_SAMPLES and len(before) > 1
-    ):  # nearly all of it, as of recordings equally long
+    if start < FEWEST_SAMPLES and len(before) > 1:  # nearly all, as of recordings equally long
         return before[:-1], None, [run, *after]
     if min(start, len(run) - start) < FEWEST_SAMPLES:
         return before, None, after

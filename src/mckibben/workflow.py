@@ -48,13 +48,7 @@ from mckibben.options import (
     TrackOptions,
     given_options,
 )
-from mckibben.reading import (
-    Data,
-    files_of,
-    loaded,
-    read_files,
-    read_sides,
-)
+from mckibben.reading import Data, files_of, items, loaded, read_files, read_sides
 from mckibben.recording import COMMAND, Recording, sample_time_of
 from mckibben.studying.results import Exported, Fit, Inverse, Price, Tracking
 from mckibben.system.progress import Tell, telling
@@ -87,6 +81,7 @@ def fit(
 ) -> Fit:
     """Identify one model, by its short name, such as ``"gpi"``."""
     from mckibben.blocks.compose import Parallel
+    from mckibben.comparison.planning import Candidate, refusals
     from mckibben.estimators.catalogue import settings_of
     from mckibben.signals.shared_rows import check_shared
 
@@ -106,6 +101,10 @@ def fit(
     sides = [settings.pop(side, getattr(chosen, side)) for side in ("input", "output")]
     names = [*sides, settings.get("scheduling")]
     (runs,), channels = read_sides([data], lambda some: kind.resolved(some, *names), sides, reading)
+    if refused := refusals({model: Candidate(model)}, runs, channels):
+        problem = f"{model!r} does not apply to {', '.join(channels.sides)}: {refused[model]}"
+        remedy = "name channels with `input=NAME` and `output=NAME`, or fit another model"
+        raise DataError(problem, remedy=remedy)
     settings = kind.channel_settings(channels) | settings
     estimator = kind(**{**kind.targets.get(chosen.target, {}), **settings})
     base = saved(chosen.residual_of)
@@ -169,7 +168,7 @@ def compare(
     test: Data = (),
     options: CompareOptions | None = None,
     *,
-    validation: Sequence[Recording] = (),
+    validation: Data = (),
     reading: ReadOptions | None = None,
     out: str | Path | None = None,
     force: bool = False,
@@ -187,11 +186,11 @@ def compare(
     from mckibben.report.results_folder import LEADERBOARD, write_leaderboard
 
     chosen, reading = _chosen(CompareOptions, options, reading, given)
-    with _compared(train, test, validation, chosen, reading, out, force, lambda _: LEADERBOARD) as (
-        arguments,
-        results,
-    ):
-        board = rank(**arguments, executor=executor, progress=_standing(progress))
+    sides = train, validation, test
+    with _compared(sides, chosen, reading, out, force, lambda _: LEADERBOARD) as (data, results):
+        board = rank(
+            **data, options=chosen, clear=False, executor=executor, progress=_standing(progress)
+        )
         if results is not None:
             write_leaderboard(board, results)
             if not board.stopped:
@@ -204,7 +203,7 @@ def study(
     test: Data = (),
     options: StudyOptions | None = None,
     *,
-    validation: Sequence[Recording] = (),
+    validation: Data = (),
     reading: ReadOptions | None = None,
     out: str | Path | None = None,
     force: bool = False,
@@ -223,10 +222,9 @@ def study(
     from mckibben.studying.study import study as run
 
     chosen, reading = _chosen(StudyOptions, options, reading, given)
-    with _compared(train, test, validation, chosen, reading, out, force, study_files) as (
-        arguments,
-        results,
-    ):
+    ran = {"model": saved(chosen.model), "compensator": saved(chosen.compensator)}
+    sides = train, validation, test
+    with _compared(sides, chosen, reading, out, force, study_files) as (data, results):
         folder = None if results is None else StudyFolder(results, command, title=chosen.title)
 
         def pass_on(so_far: Study) -> None:
@@ -236,10 +234,8 @@ def study(
                 found(so_far)
 
         done = run(
-            **arguments,
-            rig=chosen.rig,
-            model=saved(chosen.model),
-            compensator=saved(chosen.compensator),
+            **data,
+            options=replace(chosen, **ran),
             executor=executor,
             progress=_standing(progress),
             found=pass_on,
@@ -268,38 +264,34 @@ def _standing(progress: Progress) -> Any:
 
 @contextmanager
 def _compared(
-    train: Data,
-    test: Data,
-    validation: Sequence[Recording],
+    data: Sequence[Data],
     chosen: CompareOptions,
     reading: ReadOptions | None,
     out: str | Path | None,
     force: bool,
     written: Callable[[Sequence[str]], Sequence[str]],
 ) -> Iterator[tuple[dict[str, Any], Results | None]]:
-    """Claim the output files of a comparison, read its recordings, and return its arguments."""
+    """Claim the output files of a comparison, and return its data: to fit, to choose and to test."""
     from mckibben.files.sources import expanded
     from mckibben.outputs import results_in
     from mckibben.system import workers
 
     if chosen.jobs != 1:
         workers.prepare()
-    arguments = {one.name: getattr(chosen, one.name) for one in fields(CompareOptions)}
     whole = chosen.models in ("all", "quick")
     names = registry.names("estimators") if whole else list(map(str, chosen.models))
+    train, validation, test = data
     files = expanded(files_of(train), files_of(test))
-    runs: tuple[list[Recording], ...] = (loaded(train), [], loaded(test))
+    runs: Sequence[Sequence[Recording | Path]] = loaded(train), items(validation), loaded(test)
     sides: list[Data] = [[*some, *more] for some, more in zip(files, runs, strict=True)]
     logs = [getattr(chosen, name, None) for name in ("model", "compensator")]
     read = _paths(train, *sides, logs)
     kind = "study" if isinstance(chosen, StudyOptions) else "compare"
     with results_in(out, written(names), inputs=read, force=force, kind=kind) as results:
         words = chosen.inputs, chosen.outputs, chosen.load
-        (fitted, checks, tests), _ = read_sides(
-            sides, lambda some: channels_of(some, *words), words, reading
-        )
-        arguments |= {"train": fitted, "validation": [*validation, *checks], "test": tests}
-        yield arguments | {"folder": out, "clear": False}, results
+        found, channels = read_sides(sides, lambda some: channels_of(some, *words), words, reading)
+        roles = dict(zip(("train", "validation", "test"), found, strict=True))
+        yield {**roles, "channels": channels, "folder": out}, results
 
 
 def track(
@@ -330,10 +322,10 @@ def track(
         tune_pid,
     )
     from mckibben.control import track as close
-    from mckibben.control.identified import beyond_known
-    from mckibben.control.preview import samples_ahead
-    from mckibben.control.roles import asked, flatters_feedback, kind_of, offered
+    from mckibben.control.connecting import asked, flatters_feedback, kind_of, offered
+    from mckibben.control.controller import samples_ahead
     from mckibben.files import write
+    from mckibben.studying.recorded_inputs import beyond_known
 
     chosen, reading = _chosen(TrackOptions, options, reading, given)
     read = _paths(compensator, reference, chosen.rig, chosen.plant)

@@ -74,7 +74,7 @@ BAD = [
     ("fit balance run.csv --prior nobody -o out.json", "'nobody'"),
     ("fit coupled-pi three.csv -o out.json --set luck=1", "'luck'"),
     ("fit sdchm rest.csv -o out.json --output displacement_1", "displacement_1"),
-    ("fit gpi three.csv -o out.json", "there are several"),
+    ("fit gpi three.csv -o out.json", "'gpi' does not apply to"),
     ("fit force-balance three.csv -o out.json", "'balance'"),
     ("compare run.csv --models pi,what", "'what'"),
     ("compare three.csv --models grey-box", "'balance'"),

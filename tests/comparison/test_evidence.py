@@ -13,8 +13,8 @@ from scipy.io import savemat
 
 import mckibben
 from mckibben import GPI, DataError, Recording, characterize, compare, study
-from mckibben.comparison import fitting
-from mckibben.comparison.choosing import acceptable, recommended
+from mckibben.comparison import ranking
+from mckibben.comparison.leaderboard import acceptable, recommended
 from mckibben.signals import irregular_triangle, triangle
 from tests.cli.conftest import cli as cli  # a fixture
 
@@ -108,16 +108,16 @@ def test_muscles_have_to_beat_the_constant_too(moves: bool) -> None:
 def test_a_cross_validation_that_ran_away_is_not_chosen_by(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    honest = fitting.fit
+    honest = ranking.fit
 
     def run_away(data: Any, task: Any, tell: Any) -> Any:
         found = honest(data, task, tell)
-        if task.name != "p1":
+        if task[0] != "p1":
             return found
         away = tuple(np.inf * one for one in found.predictions)
         return replace(found, predictions=away)
 
-    monkeypatch.setattr(fitting, "fit", run_away)
+    monkeypatch.setattr(ranking, "fit", run_away)
     board = compare(RUN, OTHER, **QUICK)
     assert board.best is not None
     assert board.best.model == "pi"

@@ -10,8 +10,7 @@ import pytest
 from mckibben import GPI, Recording, compare
 from mckibben.arrays import Array
 from mckibben.channels import Channels, channels_of
-from mckibben.comparison.choosing import CAUTION
-from mckibben.comparison.leaderboard import Row, doubts_of
+from mckibben.comparison.leaderboard import CAUTION, Row, doubts_of
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.leaving_out import MOST_FREE
 from mckibben.metrics import Scores

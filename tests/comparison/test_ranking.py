@@ -11,8 +11,7 @@ import pytest
 
 from mckibben import GPI, DataError, ModelError, Recording, compare, registry
 from mckibben.channels import Channels
-from mckibben.comparison.choosing import order, recommended
-from mckibben.comparison.leaderboard import Leaderboard
+from mckibben.comparison.leaderboard import Leaderboard, order, recommended
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.metrics import USEFUL
 from mckibben.signals import irregular_triangle, triangle

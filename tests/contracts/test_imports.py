@@ -16,6 +16,7 @@ SOURCE = Path(mckibben.__file__).parent
 LAYERS = (
     {"errors", "arrays", "registry", "numerals", "version", "system", "numerics"},
     {"recording", "signals", "channels", "metrics", "splits"},
+    {"options"},
     {"files"},
     {"rigs"},
     {"blocks"},
@@ -26,7 +27,6 @@ LAYERS = (
     {"diagnosis"},
     {"comparison"},
     {"planning"},
-    {"options"},
     {"reading"},
     {"studying"},
     {"papers"},

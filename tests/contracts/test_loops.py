@@ -35,7 +35,7 @@ from mckibben.control import (
     control_law,
     track,
 )
-from mckibben.control.roles import rest_length_of
+from mckibben.control.connecting import rest_length_of
 from mckibben.control.tuning import tune_pid, untuned_pid
 from mckibben.recording import MEASURED
 from mckibben.rigs import Rig

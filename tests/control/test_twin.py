@@ -25,7 +25,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import PIDFeedback
 from mckibben.blocks.fields import Channel
 from mckibben.control import Twin, before, track, tune_pid
-from mckibben.control.roles import flatters_feedback, kind_of
+from mckibben.control.connecting import flatters_feedback, kind_of
 from mckibben.registry import load as registered
 from mckibben.registry import names
 from tests.cli.conftest import Cli

@@ -10,8 +10,7 @@ import pytest
 from mckibben import PI, DataError, ModelError, Recording, review
 from mckibben.blocks.adaptive import adaptive
 from mckibben.control import track
-from mckibben.diagnosis.refit import Refit
-from mckibben.diagnosis.review import Delay, Review
+from mckibben.diagnosis.review import Delay, Refit, Review
 from mckibben.files.headers import channel_of, parse
 from tests.cli.conftest import cli as cli  # a fixture
 from tests.diagnosis.faulty import Faulty

@@ -15,9 +15,8 @@ from mckibben.blocks.memoryless import Affine
 from mckibben.registry import load
 from mckibben.signals import triangle
 from mckibben.splits import given_split
-from mckibben.studying.inverting import checked, made
+from mckibben.studying.inverting import checked, made, static_error, static_map
 from mckibben.studying.recorded_inputs import RecordedInputs
-from mckibben.studying.static_map import static_error, static_map
 from tests.blocks.balances import CROWDED
 
 TIME = np.arange(0, 24, 0.02)

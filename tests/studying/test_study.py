@@ -16,7 +16,7 @@ from mckibben.diagnosis.check import Validation
 from mckibben.files import read, write
 from mckibben.rigs import load_rig
 from mckibben.signals import triangle
-from mckibben.studying.loops import closed_loops, named, recorded_rig
+from mckibben.studying.study import closed_loops, named, recorded_rig
 
 TIME = np.arange(0, 24, 0.02)
 

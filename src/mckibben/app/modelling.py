@@ -13,7 +13,7 @@ from mckibben import registry, workflow
 from mckibben.app.jobs import Tell
 from mckibben.app.workspace import Workspace
 from mckibben.channels import Channels, channels_of
-from mckibben.comparison.choosing import recommended
+from mckibben.comparison.leaderboard import recommended
 from mckibben.comparison.planning import Candidate, objections, plan_of
 from mckibben.comparison.ranking import ranked
 from mckibben.errors import DataError, ModelError

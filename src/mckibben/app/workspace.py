@@ -325,7 +325,7 @@ class Workspace:
 
         Each has ``name``, and ``current``: whether the recordings are still those of the fit.
         """
-        from mckibben.comparison.choosing import order
+        from mckibben.comparison.leaderboard import order
 
         def place(row: dict[str, Any]) -> tuple[Any, ...]:
             errors = row.get("validation_rmse"), (row.get("train") or {}).get("rmse")

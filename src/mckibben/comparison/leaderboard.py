@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -13,17 +13,99 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.inverse import Inverse
-from mckibben.comparison.choosing import CAUTION, CONSTANT, Against, order, recommended
 from mckibben.diagnosis.bands import TestedBand
 from mckibben.diagnosis.branch_gaps import Memory
 from mckibben.errors import MckibbenError
 from mckibben.metrics import Scores
 from mckibben.numerics.statistics import half_interval
 from mckibben.splits import Span
+from mckibben.system.atomic import Numbers, plain
 from mckibben.system.showing import DrawsItself
 
 if TYPE_CHECKING:
     import pandas as pd
+from typing import Protocol, TypeVar
+
+from mckibben.metrics import useful
+
+CONSTANT = "constant"
+"""Name of the row that predicts the mean of the training output, whatever the input: never chosen."""
+
+CAUTION = 2.0
+"""Factor on the ranking error of a model that is reliable only near its training data, or whose error is
+that of the fit.
+"""
+
+Against = Literal["validation", "test"]
+"""The data on which no model is clearly better than the constant, so that none is recommended."""
+
+
+class Ranked(Protocol):
+    """A row of a ranking."""
+
+    @property
+    def reason(self) -> str | None:
+        """Reason of a failure, or None."""
+
+    @property
+    def skill_least(self) -> float | None:
+        """Lower bound of the skill over the constant in the cross-validation."""
+
+    @property
+    def test_error(self) -> float:
+        """RMSE on the test data, infinite if there is none."""
+
+
+R = TypeVar("R", bound=Ranked)
+
+
+def order(
+    model: str,
+    validated: float | None,
+    fitted: float | None,
+    skill_least: float | None = None,
+    *,
+    doubted: bool = False,
+) -> tuple[bool, bool, float, str]:
+    """Return the sort key of models: validated ones first, by their error; independent of the test.
+
+    The others are sorted by the error on the data fitted. Those that are known to be no better than the
+    constant come last. Parts of the same motion cannot show how a model extrapolates, so a doubted error
+    counts `CAUTION` times.
+    """
+    error = fitted if validated is None else validated
+    counted = float("inf") if error is None else error * (CAUTION if doubted else 1.0)
+    idle = skill_least is not None and not skill_least > 0
+    return validated is None, idle, counted, model
+
+
+def recommended(rows: Sequence[R], constant: Ranked | None) -> tuple[R | None, Against | None]:
+    """Return the recommended model, or None and the data on which it is no better than the constant.
+
+    It is the first in the order of the choice that beats the constant in the cross-validation beyond
+    chance. The test does not choose, but it may take the recommendation away: no other is chosen in
+    its place, since that would be a choice by the test. Without the constant's row, the first that did
+    not fail is recommended.
+    """
+    working = [row for row in rows if row.reason is None]
+    if not working:
+        return None, None
+    judged = [row.skill_least for row in working if row.skill_least is not None]
+    if judged and max(judged) <= 0:
+        return None, "validation"
+    first = next((row for row in working if (row.skill_least or 0.0) > 0), working[0])
+    return (None, "test") if constant and not _beats(first, constant) else (first, None)
+
+
+def acceptable(row: Ranked, constant: Ranked | None) -> bool:
+    """Return whether a row has no known defect compared with a recommended one."""
+    if row.reason is not None or constant is None:
+        return row.reason is None
+    return (row.skill_least is None or row.skill_least > 0) and _beats(row, constant)
+
+
+def _beats(row: Ranked, constant: Ranked) -> bool:
+    return useful(row.test_error, constant.test_error)
 
 
 BAD_PART = 3.0
@@ -40,7 +122,7 @@ Validated = Literal["step", "given", "fit"]
 
 
 @dataclass(frozen=True)
-class Row:
+class Row(Numbers):
     """One model of a leaderboard.
 
     Parameters
@@ -174,49 +256,34 @@ class Row:
             return {"model": self.model, "status": "failed", "reason": self.reason}
         test = None
         if self.test is not None:
-            test = asdict(self.test) | {
+            test = plain(self.test) | {
                 "rank": self.test_rank,
-                "rmse_interval": self.rmse_interval and list(self.rmse_interval),
-                "difference_to_chosen_interval": self.difference_interval
-                and list(self.difference_interval),
+                "rmse_interval": plain(self.rmse_interval),
+                "difference_to_chosen_interval": plain(self.difference_interval),
                 "level_with_chosen": self.level,
             }
+        copied = (
+            *("n_parameters", "fit_seconds", "step_ns", "train", "validation_rmse"),
+            *("validation_by_part", "validation_failed", "validated", "skill", "skill_least"),
+            *("memory", "band", "caution", "doubted"),
+        )
         return {
             "model": self.model,
             "status": "baseline" if self.model == CONSTANT else "ok",
-            "n_parameters": self.n_parameters,
-            "fit_seconds": self.fit_seconds,
-            "step_ns": self.step_ns,
-            "train": None if self.train is None else asdict(self.train),
+            **{name: plain(getattr(self, name)) for name in copied},
             "test": test,
-            "validation_rmse": self.validation_rmse,
-            "validation_by_part": list(self.validation_by_part),
-            "validation_failed": self.validation_failed,
-            "validated": self.validated,
             "outputs": {
-                name: asdict(scores) | {"validation_rmse": self.validation_by_output.get(name)}
+                name: plain(scores) | {"validation_rmse": self.validation_by_output.get(name)}
                 for name, scores in self.outputs.items()
             },
-            "skill": _finite(self.skill),
-            "skill_least": _finite(self.skill_least),
-            "memory": None if self.memory is None else asdict(self.memory),
-            "band": None if self.band is None else self.band.to_dict(),
             "rate_dependent": self.block is not None and bool(self.block.rate_dependent),
             "invertible": self.inverse is not None,
             "inverse": inverse_of(self.inverse),
-            "caution": self.caution,
-            "doubted": self.doubted,
         }
 
 
 def inverse_of(inverse: Block | None) -> Literal["exact", "solved", "none"]:
-    """Return the kind of inverse: closed form, solved in every step, or none.
-
-    Parameters
-    ----------
-    inverse : Block or None
-        Of a model; None where it has none.
-    """
+    """Return the kind of inverse: closed form, solved in every step, or none."""
     if inverse is None:
         return "none"
     return "solved" if _solves(inverse) else "exact"
@@ -230,12 +297,8 @@ def _solves(block: Block) -> bool:
     return any(_solves(part) for part in nested if isinstance(part, Block))
 
 
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and np.isfinite(value) else None
-
-
 @dataclass(frozen=True)
-class Doubt:
+class Doubt(Numbers):
     """What is doubtful, and the data that would decide.
 
     Parameters
@@ -261,13 +324,9 @@ class Doubt:
     interval: tuple[float, float] | None = None
     spans: tuple[Span, ...] = ()
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return asdict(self)
-
 
 @dataclass(frozen=True, repr=False)
-class Leaderboard(DrawsItself):
+class Leaderboard(DrawsItself, Numbers):
     """Models chosen on training data, and their errors on independent test data.
 
     Parameters
@@ -406,27 +465,25 @@ class Leaderboard(DrawsItself):
     def to_dict(self) -> dict[str, Any]:
         """Return the leaderboard as in ``leaderboard.json``."""
         best, lowest = self.best, self.lowest
+        copied = (
+            *(
+                "loads",
+                "unit",
+                "split",
+                "seed",
+                "n_train",
+                "n_test",
+                "chosen_by",
+                "not_recommended",
+            ),
+            *("doubts", "left_out", "pending", "notes", "shared", "offered", "ignored", "outside"),
+        )
         return {
             "input": self.inputs[0] if len(self.inputs) == 1 else list(self.inputs),
             "output": self.outputs[0] if len(self.outputs) == 1 else list(self.outputs),
-            "loads": list(self.loads),
-            "unit": self.unit,
-            "split": self.split,
-            "seed": self.seed,
-            "n_train": self.n_train,
-            "n_test": self.n_test,
-            "chosen_by": self.chosen_by,
+            **{name: plain(getattr(self, name)) for name in copied},
             "chosen": None if best is None else best.model,
-            "not_recommended": self.not_recommended,
-            "doubts": [doubt.to_dict() for doubt in self.doubts],
             "lowest_on_test": None if lowest is None else lowest.model,
-            "left_out": dict(self.left_out),
-            "pending": list(self.pending),
-            "notes": list(self.notes),
-            "shared": list(self.shared),
-            "offered": list(self.offered),
-            "ignored": list(self.ignored),
-            "outside": dict(self.outside),
             "rows": [row.to_dict() for row in self.ranking],
         }
 
@@ -449,14 +506,7 @@ def doubts_of(
 ) -> tuple[Doubt, ...]:
     """Return what is doubtful about a choice, most important first.
 
-    Parameters
-    ----------
-    best : Row
-        Of the chosen model.
-    others : sequence of Row
-        Of the others, in the order of the choice.
-    parts : sequence of tuple of Span
-        Of the cross-validation.
+    The others are in the order of the choice, the parts those of the cross-validation.
     """
     sound = [row for row in others if row.sound]
     found = []

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from mckibben import registry
-from mckibben.channels import Channels, Names, channels_of
-from mckibben.comparison.choosing import CONSTANT
-from mckibben.comparison.leaderboard import Leaderboard
+from mckibben.channels import Channels, channels_of
+from mckibben.comparison.leaderboard import CONSTANT, Leaderboard
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.catalogue import declared, settings_of_all
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.numerals import counted
+from mckibben.options import CompareOptions, given_options
 from mckibben.recording import Recording, listed, reading_notes
 from mckibben.signals import made_manageable
 from mckibben.signals.shared_rows import check_shared
@@ -99,64 +99,52 @@ class Plan:
 def plan_of(
     train: Recording | Sequence[Recording],
     test: Recording | Sequence[Recording] = (),
+    options: CompareOptions | None = None,
     *,
-    models: Models = "all",
-    settings: Mapping[str, Any] | None = None,
-    seed: int = 0,
-    **choices: Any,
+    validation: Recording | Sequence[Recording] = (),
+    channels: Channels | None = None,
+    **given: Any,
 ) -> Plan:
     """Return the set-up of a comparison; see `compare`."""
-    data, empty = data_of(train, test, **choices)
-    items, left_out = _chosen(models, [*data.recordings, *data.checks], data.channels, seed)
+    chosen = given_options(CompareOptions, options, given)
+    data, empty = _data_of([listed(train), listed(validation), listed(test)], chosen, channels)
+    every = [*data.recordings, *data.checks]
+    items, left_out = _chosen(chosen.models, every, data.channels, chosen.seed)
     made = {name: item.made for name, item in items.items()}
     made |= {name: declared(name) for name in left_out}
-    given = settings_of_all(made, settings) if settings else {}
-    # that a model is not given the load is no reason against it
-    unloaded = replace(data.channels, scheduling=(), offered=data.channels.further)
-    refused = objections(items, data.split.train, data.channels)
-    refused = objections({name: items[name] for name in refused}, data.split.train, unloaded)
+    own = settings_of_all(made, chosen.settings) if chosen.settings else {}
+    refused = refusals(items, data.split.train, data.channels)
     items = {
-        name: replace(items[name], settings={**items[name].settings, **given.get(name, {})})
+        name: replace(items[name], settings={**items[name].settings, **own.get(name, {})})
         for name in sorted(items, key=lambda name: items[name].made.effort)
     }
-    return Plan(
-        data,
-        items,
-        replace(empty, seed=seed, left_out=left_out, pending=tuple(items)),
-        refused,
-    )
+    return Plan(data, items, replace(empty, left_out=left_out, pending=tuple(items)), refused)
 
 
-def data_of(
-    train: Recording | Sequence[Recording],
-    test: Recording | Sequence[Recording] = (),
-    *,
-    inputs: Names = None,
-    outputs: Names = None,
-    load: str | None = None,
-    validation: Sequence[Recording] = (),
-    most_samples: int | None = None,
-    allow_shared: bool = False,
+def _data_of(
+    sides: Sequence[list[Recording]], chosen: CompareOptions, channels: Channels | None
 ) -> tuple[Data, Leaderboard]:
-    """Return the data of a comparison, and what a leaderboard states of them; see `compare`."""
-    sides = [listed(train), listed(validation), listed(test)]
+    """Return the data of a comparison, and what a leaderboard states of them.
+
+    ``sides`` are the recordings to fit, to choose, and to test on.
+    """
     every = [one for side in sides for one in side]
     notes = reading_notes(every)
     if not sides[0]:
         raise DataError("there are no recordings to fit", remedy="give at least one")
-    channels = channels_of(every, inputs, outputs, load)
+    channels = channels or channels_of(every, chosen.inputs, chosen.outputs, chosen.load)
     unit = _unit_of(sides, channels)
     sides = [[one.with_derived(channels.sides) for one in side] for side in sides]
     shared = check_shared(
         dict(zip(("fit", "validate", "test"), sides, strict=True)),
         [*channels.inputs, *channels.scheduling],
         channels.outputs,
-        allow=allow_shared,
+        allow=chosen.allow_shared,
     )
     if channels.single:
-        sides, thinned = made_manageable(sides, channels.inputs[0], most_samples)
+        sides, thinned = made_manageable(sides, channels.inputs[0], chosen.most_samples)
         notes = (*thinned, *notes)
-    elif most_samples is not None:
+    elif chosen.most_samples is not None:
         raise DataError(
             "recordings of several muscles, or under loads, are not thinned",
             remedy="leave `most_samples` out, or resample them to a longer sample time",
@@ -177,6 +165,7 @@ def data_of(
         split=described,
         n_train=sum(map(len, split.train)),
         n_test=sum(int(rows.sum()) for rows in split.test_rows),
+        seed=chosen.seed,
         chosen_by=chosen_by,
         notes=notes,
         shared=shared,
@@ -272,6 +261,18 @@ def objections(
         if reason is not None:
             found[name] = reason
     return found
+
+
+def refusals(
+    items: Mapping[str, Candidate], recordings: Sequence[Recording], channels: Channels
+) -> dict[str, str]:
+    """Return which models asked for by name cannot be fitted, and why.
+
+    That a model is not given the load is no reason against it.
+    """
+    refused = objections(items, recordings, channels)
+    unloaded = replace(channels, scheduling=(), offered=channels.further)
+    return objections({name: items[name] for name in refused}, recordings, unloaded)
 
 
 def _timeless(estimator: type[Estimator], recordings: Sequence[Recording]) -> str | None:

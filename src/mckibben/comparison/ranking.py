@@ -1,4 +1,7 @@
-"""Comparison of models on recordings: chosen on training data, tested once on independent data."""
+"""Comparison of models on recordings: chosen on training data, tested once on independent data.
+
+Fit, held-out predictions and free runs of one model are a task for a worker process.
+"""
 
 from __future__ import annotations
 
@@ -15,30 +18,136 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.runs import FreeRun, run_of
-from mckibben.channels import Names
+from mckibben.channels import Channels
 from mckibben.checkpoints import Checkpoints, source
-from mckibben.comparison.choosing import CONSTANT
-from mckibben.comparison.fitting import (
-    FitResult,
-    Task,
-    effort_of,
-    outputs_of,
-    processes_for,
-    results,
-)
-from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.comparison.planning import Data, Models, Plan, plan_of
+from mckibben.comparison.leaderboard import CONSTANT, Leaderboard, Row, Validated
+from mckibben.comparison.planning import Candidate, Data, Plan, plan_of
 from mckibben.diagnosis.bands import tested_band
-from mckibben.errors import MckibbenError
+from mckibben.diagnosis.branch_gaps import Memory, memory_test
+from mckibben.errors import MckibbenError, unforeseen
+from mckibben.estimators.core.estimator import Estimator
 from mckibben.metrics import Scores, mean_scores, score
 from mckibben.numerals import duration
 from mckibben.numerics.blocks import RESAMPLES, BlockBootstrap, block_length, differences, interval
 from mckibben.numerics.statistics import correlation_length
+from mckibben.options import CompareOptions, given_options
 from mckibben.recording import Recording
 from mckibben.system.progress import telling
-from mckibben.system.workers import checked
+from mckibben.system.threads import cores
+from mckibben.system.workers import checked, outcomes
 
-Watch = Callable[[str, float, float], None]
+TIMED_SAMPLES = 20_000
+"""Number of samples of the simulation that measures the time of a step."""
+
+
+Task = tuple[str, Candidate]
+"""The name of a model in the leaderboard, and what is fitted."""
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """Result of a task.
+
+    Parameters
+    ----------
+    predictions : tuple of array, shape (n, k)
+        Outputs over every recording of the parts, a part's by the model as it would be without it.
+    validated : {"step", "given", "fit"}
+        How these were found; see `Row`.
+    reason : str or None
+        Why the model failed.
+    block : Block or None
+        Fitted to all training data; ``seconds``, ``memory`` and ``diagnostics`` are of that fit.
+    outputs : tuple of array, shape (n, k)
+        Its free-running outputs on every training recording, then every test recording.
+    step_ns : float
+        Of one simulated sample [ns].
+    """
+
+    predictions: tuple[Array, ...] = ()
+    validated: Validated = "step"
+    reason: str | None = None
+    block: Block | None = None
+    outputs: tuple[Array, ...] = ()
+    seconds: float = 0.0
+    step_ns: float = 0.0
+    memory: Memory | None = None
+    diagnostics: Mapping[str, Any] = field(default_factory=dict)
+    caution: str | None = None
+
+
+def effort_of(item: Candidate, data: Data) -> float:
+    """Return the approximate time of a fit [s]."""
+    samples = sum(len(recording) for recording in data.split.train)
+    return float(item.made.effort * max(samples, 2000) / 10_000)
+
+
+def fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:
+    """Run a task; any error becomes the reason in the result."""
+    try:
+        return _fit(data, task, tell)
+    except MckibbenError as error:
+        return FitResult(reason=str(error))
+    except Exception as error:  # one model must not end the comparison, whatever it does
+        return FitResult(reason=str(unforeseen(error)))
+
+
+def _fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:
+    split, channels = data.split, data.channels
+    started = time.perf_counter()
+    estimator = task[1].estimator(channels).fit(split.train, progress=tell)
+    seconds = time.perf_counter() - started
+    block = estimator.fitted
+    outputs = outputs_of(block, data)
+    predictions, validated = _held_out(estimator, data, outputs)
+    diagnostics = dict(vars(estimator.diagnostics_))
+    diagnostics.pop("uncertainty")  # it holds the recordings
+    return FitResult(
+        predictions,
+        validated,
+        block=block,
+        outputs=outputs,
+        seconds=seconds,
+        step_ns=_step_cost(block, split.train[0]),
+        memory=memory_test(block, split.test, outputs[len(split.train) :], channels.pairs),
+        diagnostics=diagnostics,
+        caution=estimator.caution,
+    )
+
+
+def _held_out(
+    estimator: Estimator, data: Data, outputs: Sequence[Array]
+) -> tuple[tuple[Array, ...], Validated]:
+    """Return the outputs over the recordings of the parts, each part by the model without it."""
+    block, train, names = estimator.fitted, data.split.train, data.channels.outputs
+    if data.checks:
+        return tuple(block.simulate(one).matrix(names) for one in data.checks), "given"
+    if not data.parts:
+        return tuple(outputs[: len(train)]), "fit"
+    found = estimator.held_out(train, data.parts)
+    if found is None:
+        return tuple(outputs[: len(train)]), "fit"
+    given = [channel.name for channel in block.outputs]
+    return tuple(table[:, [given.index(name) for name in names]] for table in found), "step"
+
+
+def outputs_of(block: Block, data: Data) -> tuple[Array, ...]:
+    """Return a model's free-running outputs on every training recording, then every test recording."""
+    return tuple(block.simulate(one).matrix(data.channels.outputs) for one in data.recordings)
+
+
+def _step_cost(block: Block, recording: Recording) -> float:
+    inputs = np.resize(
+        recording.matrix(channel.name for channel in block.inputs),
+        (TIMED_SAMPLES, len(block.inputs)),
+    )
+    times = []
+    for _ in range(3):
+        started = time.perf_counter()
+        block.simulate(inputs, sample_time=recording.sample_time)
+        times.append(time.perf_counter() - started)
+    return min(times) / TIMED_SAMPLES * 1e9
+
 
 PIECES = 4
 """Number of consecutive pieces of a part whose squared errors are summed, for resampling."""
@@ -46,6 +155,9 @@ PIECES = 4
 LEAST_SHARE = 0.1
 """Smallest error of a part that counts, relative to that of all parts together: a rest does not decide.
 """
+
+WORTH_A_PROCESS = 2.0
+"""Seconds of work below which starting processes costs more time than it saves."""
 
 SURE = 0.1
 """Share of the work after which the remaining time is extrapolated from the progress so far."""
@@ -86,23 +198,16 @@ class Standing:
 def compare(
     train: Recording | Sequence[Recording],
     test: Recording | Sequence[Recording] = (),
+    options: CompareOptions | None = None,
     *,
-    inputs: Names = None,
-    outputs: Names = None,
-    load: str | None = None,
-    validation: Sequence[Recording] = (),
-    models: Models = "all",
-    settings: Mapping[str, Any] | None = None,
-    seed: int = 0,
-    jobs: int | None = None,
+    validation: Recording | Sequence[Recording] = (),
+    channels: Channels | None = None,
     executor: Executor | None = None,
-    most_samples: int | None = None,
-    allow_shared: bool = False,
     folder: str | Path | None = None,
     clear: bool = True,
     progress: bool | Callable[[Standing], None] | None = None,
     found: Callable[[Leaderboard], None] | None = None,
-    watch: Watch | None = None,
+    **given: Any,
 ) -> Leaderboard:
     """Fit models to the same data, choose one by cross-validation, and test all.
 
@@ -121,32 +226,15 @@ def compare(
         To test on. Default: the last quarter of the input's travel over the training recordings in
         which the output moves, which is then left out of training; of several muscles, or under loads,
         every third level of what schedules, or every third recording.
-    inputs, outputs : str or sequence of str, optional
-        Channels, by default by their names: ``pressure`` and ``displacement``, for several muscles
-        ``pressure_1`` and so on. For several outputs, models are chosen by the mean error.
-    load : str, optional
-        Channel of a varying load, an input of the models.
-    validation : sequence of Recording
+    options : CompareOptions, optional
+        Its fields may also be given by name.
+    validation : Recording or sequence of Recording
         To choose on; nothing is fitted to them.
-    models : "all", "quick", str, sequence of str, or mapping
-        Short names, in a text with commas between; "all" leaves out models that do not apply to the
-        channels, "quick" is a choice that takes seconds. A mapping of labels to short names or
-        estimators compares one model with several settings.
-    settings : mapping of str to mapping, optional
-        Model name, or label, to settings of its estimator.
-    seed : int
-        Seed of all random numbers.
-    jobs : int, optional
-        Processes, which share the models; default as many as there are cores, or none for little work.
-        Results are identical.
+    channels : Channels, optional
+        Of all these recordings; default those that the options name, or `channels_of` finds.
     executor : concurrent.futures.Executor, optional
-        What fits the models instead of these processes: one over several machines, say, of Dask
+        What fits the models instead of own processes: one over several machines, say, of Dask
         (``client.get_executor()``) or MPI.
-    most_samples : int
-        Longer recordings are thinned to so many samples for fit and test, including turning points.
-        Default: 100 000. Scores refer to these samples.
-    allow_shared : bool
-        Whether to allow test recordings that were fitted, and repeated training recordings.
     folder : path, optional
         Folder for finished models, from which an interrupted comparison is resumed.
     clear : bool
@@ -156,42 +244,22 @@ def compare(
         Whether to show a bar; or a callback for every change of the `Standing`.
     found : callable, optional
         Called with the leaderboard of the finished models after each one.
-    watch : callable, optional
-        Called, while a model is fitted, with its name, the share done of its fit, and the least cost
-        so far.
-
-    Returns
-    -------
-    Leaderboard
 
     Raises
     ------
     DataError
-        On recordings that no model could use, or that share samples, see ``allow_shared``.
+        On recordings that no model could use, or that share samples, unless options allow it.
     ModelError
-        On unknown models.
+        On unknown models or options.
     """
-    plan = plan_of(
-        train,
-        test,
-        inputs=inputs,
-        outputs=outputs,
-        load=load,
-        validation=validation,
-        models=models,
-        settings=settings,
-        seed=seed,
-        most_samples=most_samples,
-        allow_shared=allow_shared,
-    )
+    chosen = given_options(CompareOptions, options, given)
+    plan = plan_of(train, test, chosen, validation=validation, channels=channels)
     board = plan.empty
     try:
         with (
             telling(progress, "comparing", lines=True) as tell,
             closing(
-                ranked(
-                    plan, jobs=jobs, executor=executor, folder=folder, progress=tell, watch=watch
-                )
+                ranked(plan, jobs=chosen.jobs, executor=executor, folder=folder, progress=tell)
             ) as rankings,
         ):
             for ranking in rankings:
@@ -222,11 +290,13 @@ def ranked(
     executor: Executor | None = None,
     folder: str | Path | None = None,
     progress: Callable[[Standing], None] | None = None,
-    watch: Watch | None = None,
+    watch: Callable[[str, float, float], None] | None = None,
 ) -> Generator[Ranking]:
     """Yield the ranking after every model; the last ranking is complete.
 
     In one process fast models are first, in several the slow ones, so that none is left for the end.
+    ``watch`` is called, while a model is fitted, with its name, the share done of its fit, and the
+    least cost so far.
     """
     checked(jobs)
     data, table, kept = plan.data, _Table(plan), Checkpoints(folder, plan.data)
@@ -239,9 +309,8 @@ def ranked(
             table.add(row, outputs_of(row.block, data))
     remaining = {name: item for name, item in plan.items.items() if name not in table.rows}
     efforts = {name: effort_of(item, data) for name, item in remaining.items()}
-    workers = jobs or processes_for(sum(efforts.values()))
-    tasks = [Task(name, item) for name, item in remaining.items()]
-    tasks.sort(key=lambda task: -efforts[task.name] if workers > 1 else 0.0)
+    workers = jobs or (cores() if sum(efforts.values()) > WORTH_A_PROCESS else 1)
+    tasks = sorted(remaining.items(), key=lambda task: -efforts[task[0]] if workers > 1 else 0.0)
     begun: list[str] = []
     started = time.monotonic()
 
@@ -258,7 +327,7 @@ def ranked(
             progress(Standing(*counts, working, best, plan.empty.unit, rest * pace))
 
     def report(index: int, *what: float) -> None:
-        name = tasks[index].name
+        name, _ = tasks[index]
         if not what and name not in begun:
             begun.append(name)
             tell()
@@ -268,8 +337,8 @@ def ranked(
     tell()
     if table.rows:
         yield table.ranking()
-    for outcome in results(data, tasks, workers, report, executor):
-        name, found = tasks[outcome.index].name, outcome.value
+    for outcome in outcomes(fit, data, tasks, workers, report, executor):
+        name, found = tasks[outcome.index][0], outcome.value
         if not isinstance(found, FitResult):
             found = FitResult(reason=str(outcome.error or "its process gave no result"))
         row = _row(plan, name, found, table)
@@ -404,14 +473,7 @@ def held(data: Data, predictions: Sequence[Array], block: Block) -> list[FreeRun
 
 
 def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed: int) -> Row:
-    """Return the row of a model: all scores, and its skill over the constant.
-
-    Parameters
-    ----------
-    found : FitResult
-    constant : array, shape (pieces, k), or None
-        Squared errors of the mean of the training output; see `squares_of`.
-    """
+    """Return the row of a model: all scores, and its skill over the constant of `squares_of`."""
     if found.reason is not None:
         return Row(name, reason=found.reason)
     names, block, n_train = data.channels.outputs, found.block, len(data.split.train)
@@ -492,14 +554,8 @@ def constant_of(data: Data) -> Constant:
 def skill_of(squares: Array, constant: Array, seed: int) -> tuple[float, float]:
     """Return the share of a constant's squared error that a model explains, and its lower bound.
 
-    The bound is exceeded by 99 % of resamples of blocks, the same for both.
-
-    Parameters
-    ----------
-    squares, constant : array, shape (pieces,)
-        Sums of squared errors of the model and of the constant on the same blocks.
-    seed : int
-        Of the resampling.
+    The bound is exceeded by 99 % of resamples of blocks, the same for both. Both are sums of squared
+    errors, shape (pieces,).
     """
     both = np.array([squares, constant])
     if not np.isfinite(both).all() or both[1].sum() == 0:

@@ -27,7 +27,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -39,6 +38,7 @@ from mckibben.blocks.repetition import Repetition
 from mckibben.control.connecting import find
 from mckibben.errors import DataError, require
 from mckibben.recording import REFERENCE, Recording, sample_time_of
+from mckibben.system.atomic import Numbers
 
 SEGMENTS = 8
 """Half-overlapping parts of the motion over which its spectrum is averaged."""
@@ -54,7 +54,7 @@ MOST_REPETITIONS = 1000
 
 
 @dataclass(frozen=True)
-class Learned:
+class Learned(Numbers):
     """What repetitions of a motion have taught.
 
     Parameters
@@ -84,16 +84,6 @@ class Learned:
     convergence: Mapping[str, float]
     runs: tuple[Recording, ...] = field(repr=False)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the errors and how they converge, for JSON."""
-        return {
-            "best_repetition": self.best_repetition,
-            "rmse": {name: list(errors) for name, errors in self.rmse.items()},
-            "cutoff": dict(self.cutoff),
-            "expected": dict(self.expected),
-            "convergence": dict(self.convergence),
-        }
-
 
 def learn(
     compensator: Block,
@@ -117,10 +107,6 @@ def learn(
         After the first run; at least 1.
     ahead, settle, repeats
         As for `learned`.
-
-    Returns
-    -------
-    Learned
 
     Raises
     ------
@@ -163,10 +149,6 @@ def learned(
     repeats : bool
         Whether each repetition follows the one before without a pause, in a state left by it. If not,
         the controller is started anew with every repetition.
-
-    Returns
-    -------
-    Learned
 
     Raises
     ------
@@ -266,9 +248,8 @@ class _Lesson:
         low, high = np.minimum(lowest - desired, 0.0), np.maximum(highest - desired, 0.0)
         delay = _delay(desired, measured[0])
         cutoff, expected = _cutoff(desired, _earlier(desired - measured[0], delay, repeats))
-        width = math.sqrt(2 * math.log(2)) / (
-            2 * math.pi * cutoff
-        )  # of a Gaussian that is 1/2 there
+        # of a Gaussian that is 1/2 there
+        width = math.sqrt(2 * math.log(2)) / (2 * math.pi * cutoff)
         errors = np.sqrt(np.mean((desired - measured)[:, settle:] ** 2, axis=1))
         corrections, gain = [np.zeros(len(desired))], np.ones(len(desired))
         before: Array | None = None

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from mckibben import registry
 from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import FeedforwardFeedback, PIDFeedback
+from mckibben.control.connecting import Plant
 from mckibben.control.controller import Controller, DisturbanceObserver
-from mckibben.control.roles import Plant
 from mckibben.control.tuning import untuned_pid
 from mckibben.errors import MckibbenError, ModelError
 

@@ -13,10 +13,8 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.fields import Channel
-from mckibben.control.connecting import match
-from mckibben.control.controller import BlockController, Controller
-from mckibben.control.preview import samples_ahead
-from mckibben.control.roles import Plant, asked, offered, resting, roles
+from mckibben.control.connecting import Plant, asked, match, offered, resting
+from mckibben.control.controller import BlockController, Controller, samples_ahead
 from mckibben.errors import ModelError, require
 from mckibben.recording import COMMAND, REFERENCE, Recording, sample_time_of
 from mckibben.signals.checking import generator
@@ -132,10 +130,6 @@ def track(
     progress : bool or callable, optional
         Whether to show a bar; or a callback for the share of the time passed.
 
-    Returns
-    -------
-    Tracked
-
     Raises
     ------
     DataError
@@ -155,8 +149,11 @@ def track(
     rng = generator(seed)
     offer = offered(plant, reference)
     controller.connect(offer)
-    driven, held = roles(plant, reference)
-    followed, beside = ([c.name for c in some] for some in (offer.followed, offer.scheduled))
+    held = offer.held
+    followed, beside, driven = (
+        [channel.name for channel in some]
+        for some in (offer.followed, offer.scheduled, offer.driven)
+    )
     starts = resting(plant, {name: float(reference[name][0]) for name in held})
     settings: dict[str, float] = {"sample_time": step, **starts}
     changed = plant.changed(settings)
@@ -206,9 +203,8 @@ def track(
             if slew is not None and last is not None:
                 allowed = np.clip(allowed, last - slew * step, last + slew * step)
             clipped[t] = bool((np.abs(allowed - wanted) > 1e-9).any())
-            if (
-                t + 1 < n and controller.stream is not None
-            ):  # what is asked for at a step is due then
+            # what is asked for at a step is due at the next
+            if t + 1 < n and controller.stream is not None:
                 unreached[t + 1] = controller.stream.status & Stream.CLIPPED
             last = allowed
             controller.applied(allowed)

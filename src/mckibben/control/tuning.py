@@ -17,8 +17,15 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.feedback import PIDFeedback
 from mckibben.blocks.fields import COMMANDS, Channel
-from mckibben.control.connecting import match
-from mckibben.control.roles import MOVED, Plant, actuated, channels_of, rest_length_of, resting
+from mckibben.control.connecting import (
+    MOVED,
+    Plant,
+    actuated,
+    channels_of,
+    match,
+    rest_length_of,
+    resting,
+)
 from mckibben.control.twin import Twin
 from mckibben.errors import ModelError
 from mckibben.system.progress import Tell, one_by_one, telling

@@ -15,9 +15,9 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.control.connecting import Plant, asked, offered
 from mckibben.control.controller import Ahead, Controller
 from mckibben.control.loop import Tracked, track
-from mckibben.control.roles import Plant, asked, followed_by, roles
 from mckibben.errors import MckibbenError, ModelError
 from mckibben.recording import Recording, sample_time_of
 
@@ -98,12 +98,13 @@ def slow_rise(
     DataError, ModelError
         As of `track`.
     """
-    followed, driven, held = _roles(plant, reference)
+    offer = offered(plant, reference)
+    followed, driven = ([c.name for c in some] for some in (offer.followed, offer.driven))
     low, high = _limits(plant, driven)
     if only is not None:
         high = np.where([name == only for name in driven], high, low)
     steps = round(RISE / sample_time_of(reference, "be a reference"))
-    first = {name: np.full(steps + 2, reference[name][0]) for name in (*followed, *held)}
+    first = {name: np.full(steps + 2, reference[name][0]) for name in (*followed, *offer.held)}
     shares = np.minimum(np.arange(steps + 2) / steps, 1.0)
     rise = low + shares[:, np.newaxis] * (high - low)
     rows = iter(rise)
@@ -112,15 +113,10 @@ def slow_rise(
     found = track(
         ramp, plant, given, approach=0.0, pressure_loop=pressure_loop, seed=seed
     ).recording
-    channels = {name: first[name][:-1] for name in held}
+    channels = {name: first[name][:-1] for name in offer.held}
     channels |= dict(zip(driven, rise[:-1].T, strict=True))
     channels |= {name: found[name][1:] for name in followed}
     return Recording(channels, reference.sample_time)
-
-
-def _roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str], list[str]]:
-    """Return the followed, driven and held channels."""
-    return followed_by(plant, reference), *roles(plant, reference)
 
 
 def _limits(plant: Plant, driven: list[str]) -> tuple[Array, Array]:
@@ -153,7 +149,8 @@ def uncompensated(
     ModelError
         If something does not move.
     """
-    followed, driven, _ = _roles(plant, reference)
+    offer = offered(plant, reference)
+    followed, driven = ([c.name for c in some] for some in (offer.followed, offer.driven))
     if len(followed) != len(driven):
         found = []
         for name in driven:
@@ -217,16 +214,9 @@ class Before:
 
 
 def before(compensator: Block, plant: Plant, reference: Recording, **settings: Any) -> Before:
-    """Run the uncompensated loop on a plant.
+    """Run the loop without compensation on a plant, with the reference of a compensator.
 
-    Parameters
-    ----------
-    compensator : Block
-        The compensator to compare with.
-    plant : Plant
-    reference : Recording
-    **settings
-        As of `track`; a preview is ignored, as no dead time is compensated.
+    Settings are those of `track`; a preview is ignored, as no dead time is compensated.
     """
     settings.pop("preview", None)
     reference = asked(plant, reference, compensator)

@@ -9,7 +9,7 @@ unit's samples on average (Lee, Barber and Willett, Distribution-free inference 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
@@ -29,6 +29,7 @@ from mckibben.numerics.statistics import correlation_length
 from mckibben.recording import Recording, check_sample_times, listed
 from mckibben.signals.reversals import reversals
 from mckibben.signals.shared_rows import check_shared
+from mckibben.system.atomic import Numbers
 from mckibben.system.progress import Tell, one_by_one, telling
 
 if TYPE_CHECKING:
@@ -300,7 +301,7 @@ def n_branches(tables: Sequence[Array]) -> int:
 
 
 @dataclass(frozen=True)
-class TestedBand:
+class TestedBand(Numbers):
     """Coverage of a band, calibrated on training data, on the test.
 
     Parameters
@@ -332,10 +333,6 @@ class TestedBand:
     width: Mapping[str, float]
     lowest: float
     highest: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return asdict(self)
 
 
 def tested_band(

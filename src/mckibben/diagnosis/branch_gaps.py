@@ -58,18 +58,15 @@ def memory_test(
         Every output's own input, or where that rests the first of the block's that moves; the output.
     """
     names = [channel.name for channel in block.inputs]
-    gaps = paired_gaps(recordings, outputs, pairs, names)
-    pairs = [(_moving(names, recordings, given), output) for given, output in pairs]
+    pairs = moving_pairs(recordings, pairs, names)
+    gaps = paired_gaps(recordings, outputs, pairs)
     held = [hold_test(block, recordings[0], *pair) for pair in pairs]
     kept = [share for share in held if share is not None]
     return Memory(gap_ratio(gaps), len(gaps), float(np.mean(kept)) if kept else None)
 
 
 def paired_gaps(
-    recordings: Sequence[Recording],
-    outputs: Sequence[Array],
-    pairs: Sequence[tuple[str, str]],
-    names: Sequence[str],
+    recordings: Sequence[Recording], outputs: Sequence[Array], pairs: Sequence[tuple[str, str]]
 ) -> Array:
     """Return measured and modelled branch gaps, shape (n, 2), of all recordings and outputs.
 
@@ -78,11 +75,8 @@ def paired_gaps(
     outputs : sequence of array, shape (n, k)
         Modelled outputs on each recording; samples that are NaN do not count.
     pairs : sequence of (str, str), length k
-        As for `memory_test`.
-    names : sequence of str
-        Inputs; the first that moves replaces one that is constant.
+        Of `moving_pairs`.
     """
-    pairs = [(_moving(names, recordings, given), output) for given, output in pairs]
     return np.concatenate(
         [
             branch_gaps(run[given], np.column_stack([run[output], found[:, place]]))
@@ -99,11 +93,15 @@ def gap_ratio(gaps: Array) -> float | None:
     return float(modelled @ measured) / power if power > 0 else None
 
 
-def _moving(names: Sequence[str], recordings: Sequence[Recording], given: str) -> str:
-    for name in (given, *(name for name in names if name != given)):
-        if any(name in r and np.ptp(r[name]) > 0 for r in recordings):
-            return name
-    return given
+def moving_pairs(
+    recordings: Sequence[Recording], pairs: Sequence[tuple[str, str]], names: Sequence[str]
+) -> list[tuple[str, str]]:
+    """Return inputs and outputs, where an input that rests is replaced by the first that moves."""
+
+    def moves(name: str) -> bool:
+        return any(name in run and np.ptp(run[name]) > 0 for run in recordings)
+
+    return [(next(filter(moves, (given, *names)), given), output) for given, output in pairs]
 
 
 def branch_gaps(u: Array, y: Array) -> Array:
@@ -149,23 +147,17 @@ def hold_test(
     names = [channel.name for channel in block.inputs]
     rest = 0.5 * (recording.matrix(names).min(axis=0) + recording.matrix(names).max(axis=0))
     place = [channel.name for channel in block.outputs].index(output_name)
-    try:
-        ends = [
-            block.simulate(
-                _with_rest(np.concatenate([way, hold]), rest, names.index(input_name)),
-                initial="first_sample",
-                sample_time=recording.sample_time,
-            )[:, place]
-            for way in (up, over)
-        ]
-    except MckibbenError:
-        return None
+    ends = []
+    for way in (up, over):
+        inputs = np.tile(rest, (way.size + hold.size, 1))
+        inputs[:, names.index(input_name)] = np.concatenate([way, hold])
+        try:
+            found = block.simulate(
+                inputs, initial="first_sample", sample_time=recording.sample_time
+            )
+        except MckibbenError:
+            return None
+        ends.append(found[:, place])
     before = float(ends[1][over.size] - ends[0][up.size])
     after = float(ends[1][-1] - ends[0][-1])
     return after / before if before != 0 else None
-
-
-def _with_rest(along: Array, rest: Array, place: int) -> Array:
-    inputs = np.tile(rest, (along.size, 1))
-    inputs[:, place] = along
-    return inputs

@@ -3,31 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from mckibben.channels import loop_of
-from mckibben.diagnosis.conditions import COVERS, constant_segments, levelled, others_of
+from mckibben.arrays import Array
+from mckibben.channels import by_name, channels_of, loop_of
 from mckibben.diagnosis.excitation import extremes
 from mckibben.diagnosis.loops import (
     FIGURES,
     Cycle,
+    Range,
     branches_of,
+    creep,
+    dead_zones,
     drift,
     explained,
     gains_of,
     gap_of,
     largest_of,
     loops_of,
+    prepare,
+    rate_dependence,
 )
-from mckibben.diagnosis.memory import creep, dead_zones, rate_dependence
-from mckibben.diagnosis.tracks import Range, prepare
 from mckibben.errors import DataError
-from mckibben.numerics.statistics import half_interval
-from mckibben.recording import Recording, listed
+from mckibben.numerics.statistics import half_interval, hats
+from mckibben.recording import FEWEST_SAMPLES, Recording, listed
+from mckibben.signals.holds import STILL, holds, moves
 from mckibben.signals.reversals import whole_cycles
+from mckibben.system.atomic import Numbers
 from mckibben.system.showing import DrawsItself
 
 LEVEL, NO_GAP = 0.01, 0.01
@@ -60,7 +65,7 @@ class Level:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Characterization(DrawsItself):
+class Characterization(DrawsItself, Numbers):
     """Characterization of a muscle from recordings; None for quantities that they do not determine.
 
     Units are those of the channels; percentages are of the output range. Figures are medians over
@@ -165,10 +170,6 @@ class Characterization(DrawsItself):
         small = limits is not None and max(map(abs, limits)) <= NO_GAP * self.output_span
         return False if small else None
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything for JSON, with None for undetermined quantities."""
-        return asdict(self)
-
 
 def characterize(
     recordings: Recording | Sequence[Recording],
@@ -194,10 +195,6 @@ def characterize(
     scheduling : sequence of str
         Other inputs that move the output, in addition to channels of the input's quantity, loads, and
         channels that are constant within recordings and differ between them.
-
-    Returns
-    -------
-    Characterization
 
     Raises
     ------
@@ -360,3 +357,79 @@ def _unit(runs: Sequence[Recording], channel: str) -> str:
             remedy="convert them, or read the files with `units[CHANNEL]=UNIT`",
         )
     return units.pop()
+
+
+ALIKE, COVERS = 0.02, 0.5
+"""Share of another input's range within which its levels are equal, and share of the input range
+that a segment must cover.
+"""
+
+MOST, KNOTS = 2000, 12
+"""Largest number of samples per recording for offsets, and number of knots of the input's curve."""
+
+
+def others_of(
+    recordings: Sequence[Recording], given: str, wanted: str, asked: Sequence[str]
+) -> list[str]:
+    """Return other inputs that vary within or between recordings.
+
+    Those asked for, what drives beside the input, what schedules models, and channels that every
+    recording holds.
+    """
+    seen = [name for name in recordings[0].channels if all(name in one for one in recordings)]
+    driving = by_name(recordings)[0]
+    further = channels_of(recordings, given, wanted).further
+    candidates = [
+        *asked,
+        *(n for n in driving if given in driving and n in seen),
+        *(n for n in further if n in seen),
+        *(n for n in seen if all(np.ptp(one[n]) == 0 for one in recordings)),
+    ]
+    named = [n for n in dict.fromkeys(candidates) if n not in (given, wanted)]
+    return [n for n in named if moves([one[n] for one in recordings])]
+
+
+Group = tuple[tuple[float, ...], list[tuple[int, Recording]]]
+"""Levels at which the other inputs are constant, with the recordings and segments in which they
+are.
+"""
+
+
+def constant_segments(
+    recordings: Sequence[Recording], given: str, others: Sequence[str]
+) -> list[Group]:
+    """Return segments in which all other inputs are constant and the input moves, by level."""
+    span = max(float(np.ptp(one[given])) for one in recordings)
+    ranges = np.ptp(np.concatenate([one.matrix(others) for one in recordings]), axis=0)
+    found: list[tuple[Array, int, Recording]] = []
+    for place, one in enumerate(recordings):
+        columns = one.matrix(others)
+        whole = bool(np.all(np.ptp(columns, axis=0) <= STILL * ranges))
+        for hold in (
+            [slice(0, len(one))] if whole else holds(columns, ranges.tolist(), FEWEST_SAMPLES)
+        ):
+            part = one.slice(hold.start, hold.stop)
+            if np.ptp(part[given]) > COVERS * span:
+                found.append((columns[hold].mean(axis=0), place, part))
+    groups: list[Group] = []
+    for level, place, part in sorted(found, key=lambda each: tuple(each[0])):
+        for at, parts in groups:
+            if np.all(np.abs(level - at) <= ALIKE * ranges):
+                parts.append((place, part))
+                break
+        else:
+            groups.append((tuple(level.tolist()), [(place, part)]))
+    return groups
+
+
+def levelled(recordings: Sequence[Recording], given: str, wanted: str) -> list[Recording]:
+    """Return recordings whose outputs are shifted onto one curve of the input."""
+    seen = [one.matrix((given, wanted))[:: -(-len(one) // MOST)] for one in recordings]
+    own = np.repeat(np.eye(len(seen)), [len(part) for part in seen], axis=0)
+    x, y = np.concatenate(seen).T
+    offsets = np.linalg.lstsq(np.column_stack([own, hats(x, KNOTS)]), y, rcond=None)[0][: len(seen)]
+    offsets -= offsets @ own.mean(axis=0)
+    return [
+        one.with_channels({wanted: one.units[wanted]}, **{wanted: one[wanted] - offset})
+        for one, offset in zip(recordings, offsets.tolist(), strict=True)
+    ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,6 +21,7 @@ from mckibben.metrics import useful
 from mckibben.numerics.statistics import NORMAL_95, correlation_length, rms
 from mckibben.recording import Recording, check_sample_times, listed
 from mckibben.signals.shared_rows import check_shared
+from mckibben.system.atomic import Numbers, plain
 from mckibben.system.progress import Tell, one_by_one, telling
 from mckibben.system.showing import DrawsItself
 from mckibben.system.threads import one_blas_thread
@@ -110,7 +111,7 @@ class Pattern:
 
 
 @dataclass(frozen=True, eq=False)
-class OutputCheck:
+class OutputCheck(Numbers):
     """Residual of one output.
 
     Parameters
@@ -160,13 +161,13 @@ class OutputCheck:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
-        found = asdict(self)
+        found = super().to_dict()
         found["range"] = found.pop("span")
         return found | {"right": self.right}
 
 
 @dataclass(frozen=True, eq=False)
-class Validation(DrawsItself):
+class Validation(DrawsItself, Numbers):
     """Result of a model check on recordings.
 
     Parameters
@@ -200,14 +201,9 @@ class Validation(DrawsItself):
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything for JSON, without runs."""
-        return {
-            "model": self.model,
-            "recordings": list(self.recordings),
-            "right": self.right,
-            "untested": list(self.untested),
-            "outputs": [one.to_dict() for one in self.outputs],
-            **({"description": self.description.to_dict()} if self.description else {}),
-        }
+        described = {"description": plain(self.description)} if self.description else {}
+        found = {"right": self.right, "outputs": plain(self.outputs), **described}
+        return super().to_dict() | found
 
 
 def check(
@@ -232,10 +228,6 @@ def check(
     progress : bool or callable, optional
         Whether to show a bar; or what is called with the share done, and words.
 
-    Returns
-    -------
-    Validation
-
     Raises
     ------
     DataError
@@ -257,7 +249,13 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
     if not recordings:
         raise DataError("there is no recording to check the model on", remedy="give at least one")
     for recording in recordings:
-        _refuse(recording, block)
+        check_units(recording, (*block.inputs, *block.outputs))
+        if len(recording) < FEWEST_IN_EACH:
+            raise DataError(
+                f"{len(recording)} samples are too few: the residual is correlated over longer times",
+                file=recording.source,
+                remedy=f"leave this recording out, or record at least {FEWEST_IN_EACH} samples",
+            )
     check_sample_times(recordings)
     total, source = sum(map(len, recordings)), recordings[0].source
     if total < FEWEST_IN_ALL:
@@ -275,16 +273,6 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
             file=source,
             channel=still[0],
             remedy="record while it moves, or name another column with `columns[CHANNEL]=COLUMN`",
-        )
-
-
-def _refuse(recording: Recording, block: Block) -> None:
-    check_units(recording, (*block.inputs, *block.outputs))
-    if len(recording) < FEWEST_IN_EACH:
-        raise DataError(
-            f"{len(recording)} samples are too few: the residual is correlated over longer times",
-            file=recording.source,
-            remedy=f"leave this recording out, or record at least {FEWEST_IN_EACH} samples",
         )
 
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from mckibben.errors import DataError
 from mckibben.numerics.statistics import dependence
 from mckibben.recording import FEWEST_SAMPLES, Recording, listed
 from mckibben.signals.shared_rows import without_copies
+from mckibben.system.atomic import Numbers
 
 if TYPE_CHECKING:
     from mckibben.channels import Names
@@ -42,7 +43,7 @@ Found = Iterator[tuple[float, tuple[str, ...]]]
 
 
 @dataclass(frozen=True)
-class Gap:
+class Gap(Numbers):
     """A property that recordings cannot identify.
 
     Parameters
@@ -66,10 +67,6 @@ class Gap:
     ranges: Mapping[str, tuple[float, float]]
     run: str
     severity: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)

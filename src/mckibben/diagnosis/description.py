@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +22,9 @@ from mckibben.estimators.core.uncertainty import (
     unknown,
     vanishing,
 )
+from mckibben.numerics.statistics import student
 from mckibben.recording import Recording
-from mckibben.system.atomic import plain
-
-LEVEL = 0.95
-"""Confidence level of intervals."""
+from mckibben.system.atomic import Numbers
 
 MOST_PARAMETERS = 300
 """Number of parameters above which single parameters are not interpreted."""
@@ -61,7 +58,7 @@ class Parameter(Quantity):
 
 
 @dataclass(frozen=True, eq=False)
-class ModelDescription:
+class ModelDescription(Numbers):
     """Description of a model, with uncertainties.
 
     Parameters
@@ -80,11 +77,6 @@ class ModelDescription:
     parameters: tuple[Parameter, ...]
     recordings: tuple[str, ...]
     fitted: bool
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as a JSON-ready dict, with None for unknown values."""
-        found: dict[str, Any] = plain(self)
-        return found
 
 
 def describe(
@@ -109,15 +101,13 @@ def describe(
     DataError
         If there are no recordings, or a channel is absent.
     """
-    from scipy.special import stdtrit
-
     if not recordings:
         raise DataError("there are no recordings to describe a model on", remedy="give one or more")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
         covariance, n_effective = uncertainty(block, recordings)
         freedom = n_effective - np.isfinite(np.diag(covariance)).sum()
-        half = float(stdtrit(np.maximum(freedom, 1.0), 0.5 + LEVEL / 2))
+        half = student(max(freedom, 1.0))
     names = tuple(recording.name for recording in recordings)
     return ModelDescription(written(block), parameters(block, covariance, half), names, fitted)
 

@@ -1,18 +1,172 @@
-"""Hysteresis loops: output over input along rising and falling branches, and their shape."""
+"""Hysteresis loops: recordings prepared for them, their curves and shape, dead zones, creep, rate."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mckibben.arrays import Array
-from mckibben.diagnosis.tracks import Range, Scale, Track
+from mckibben.arrays import NARROWEST, Array
+from mckibben.errors import DataError
 from mckibben.metrics import loop_area
-from mckibben.signals.holds import STILL
-from mckibben.signals.reversals import whole_cycles
+from mckibben.numerics.statistics import student
+from mckibben.recording import FEWEST_SAMPLES, Recording
+from mckibben.signals.holds import STILL, holds, shortest_hold
+from mckibben.signals.reversals import (
+    branches_between,
+    noise_level,
+    reversals,
+    swing_threshold,
+    whole_cycles,
+)
+
+Range = tuple[float, float]
+
+QUIET, ROUNDING = 1e-3, 1e-12
+"""Shares of the range: noise below the first is not averaged; below the second it is rounding."""
+
+MAJOR = 0.1
+"""Smallest swing of the input, as a share of its range, that separates cycles."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Extremes of a channel over all recordings, and its sensor noise.
+
+    Noise is the standard deviation of a sample, NaN for unknown; a step is the least distance between
+    two readings.
+    """
+
+    low: float
+    high: float
+    noise: float
+    step: float
+
+    @property
+    def span(self) -> float:
+        """Range."""
+        return self.high - self.low
+
+    @classmethod
+    def of(cls, signals: Sequence[Array], source: str | None, channel: str) -> Spread:
+        """Return that of the pieces of a channel, which must vary."""
+        readings = np.unique(np.concatenate(signals))
+        low, high = float(readings[0]), float(readings[-1])
+        span = high - low
+        if span < NARROWEST:
+            raise DataError(
+                f"it {f'moves by {span:.3g} in all' if span else f'is constant at {low:g}'}, so "
+                "hysteresis cannot be measured",
+                file=source,
+                channel=channel,
+                remedy="record while it moves, check its column and unit, or name another channel",
+            )
+        levels = [noise_level(signal, span) for signal in signals if signal.size > 1]
+        known = [level for level in levels if not np.isnan(level)]
+        noise = float(np.median(known)) if known else float("nan")
+        steps = np.diff(readings)
+        step = float(steps[steps > ROUNDING * span].min())
+        return cls(low, high, 0.0 if noise < ROUNDING * span else noise, step)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Input and output over all recordings; the sign is -1 if the output falls with the input."""
+
+    u: Spread
+    y: Spread
+    sign: float = 1.0
+
+
+@dataclass(frozen=True)
+class Track:
+    """One recording: input and output, (n,) each, as moving averages where there is noise.
+
+    ``y_noise`` is the noise that is left, 0 where unknown. ``turns`` are the first sample, the turning
+    points of the input and the last sample, ``major_turns`` the same without swings below a tenth of
+    the input range. A ``periodic`` recording starts at its lowest input.
+    """
+
+    u: Array
+    y: Array
+    sample_time: float | None
+    y_noise: float
+    turns: NDArray[np.int64]
+    major_turns: NDArray[np.int64]
+    periodic: bool
+
+    @property
+    def branches(self) -> list[tuple[slice, int]]:
+        """Samples between major turning points, with 1 if the input rises, else -1."""
+        found = branches_between(self.u, self.major_turns)
+        return [(slice(start, stop), way) for start, stop, way in found]
+
+
+def prepare(
+    recordings: Sequence[Recording], input_name: str, output_name: str
+) -> tuple[Scale, list[Track]]:
+    """Return the common scale of recordings, and each of them prepared for measurement.
+
+    Raises
+    ------
+    DataError
+        On no recordings, a missing channel, fewer than ten samples, or a channel that hardly moves.
+    """
+    if not recordings:
+        raise DataError("there is no recording to characterize", remedy="give at least one")
+    us, ys = ([one[name] for one in recordings] for name in (input_name, output_name))
+    source, n = recordings[0].source, sum(map(len, recordings))
+    if n < FEWEST_SAMPLES:
+        raise DataError(
+            f"{n} samples are too few to characterize",
+            file=source,
+            channel=input_name,
+            remedy=f"record at least {FEWEST_SAMPLES}, better whole cycles with 50 or more each",
+        )
+    scale = Scale(Spread.of(us, source, input_name), Spread.of(ys, source, output_name))
+    tracks = [
+        _track(u, y, one.sample_time, scale) for u, y, one in zip(us, ys, recordings, strict=True)
+    ]
+    # what the output does along the branches: neither drift nor another level between runs turns it
+    follows = sum(
+        way * float(track.y[part][-1] - track.y[part][0])
+        for track in tracks
+        for part, way in track.branches
+    )
+    return replace(scale, sign=-1.0 if follows < 0 else 1.0), tracks
+
+
+def _track(u: Array, y: Array, sample_time: float | None, scale: Scale) -> Track:
+    periodic = _closes(u, scale.u.noise) and _closes(y, scale.y.noise)
+    if periodic:  # one loop wherever its record begins
+        if u[0] == u[-1] and y[0] == y[-1]:
+            u, y = u[:-1], y[:-1]
+        start = int(np.argmin(u))
+        u, y = (np.append(np.roll(x, -start), x[start]) for x in (u, y))
+    noisy = any(spread.noise > QUIET * spread.span for spread in (scale.u, scale.y))
+    # so many samples take the input over 1 % of its range
+    window = max(1, shortest_hold(u, scale.u.span) // 50 - 1) | 1 if noisy else 1
+    if window > 1:
+        from scipy.ndimage import uniform_filter1d
+
+        u, y = (np.asarray(uniform_filter1d(x, window, mode="nearest")) for x in (u, y))
+    u_noise, y_noise = (
+        float(np.nan_to_num(spread.noise)) / np.sqrt(window) for spread in (scale.u, scale.y)
+    )
+    threshold = swing_threshold(u_noise, scale.u.span, u.size)
+    turns = reversals(u, threshold)
+    major_turns = reversals(u, max(threshold, MAJOR * scale.u.span))
+    return Track(u, y, sample_time, y_noise, turns, major_turns, periodic)
+
+
+def _closes(x: Array, noise: float) -> bool:
+    """Return whether a signal is periodic: its end continues at its beginning."""
+    usual = float(np.quantile(np.abs(np.diff(x)), 0.99)) if x.size > FEWEST_SAMPLES else 0.0
+    return bool(abs(x[0] - x[-1]) <= max(1.5 * usual, 4 * np.nan_to_num(noise)))
+
 
 SHARES = np.linspace(0.02, 0.98, 49)
 """Input levels of a curve, as shares of the input range; the middle one is mid input."""
@@ -214,7 +368,7 @@ def gap_of(found: Branches, sign: float) -> tuple[float | None, Range | None, fl
     counts in which they differ less, as branches of loops that turn at different peaks differ after the
     peak. Of fewer than four branches, which drift would part as well, there is no interval.
     """
-    from scipy.special import fdtrc, stdtrit
+    from scipy.special import fdtrc
 
     curves, same = found.curves, np.diff(found.owners) == 0
     ways, inner = found.ways[:, np.newaxis], same[1:] & same[:-1]
@@ -237,7 +391,7 @@ def gap_of(found: Branches, sign: float) -> tuple[float | None, Range | None, fl
     error, freedom = min(
         (float(np.sqrt(2 * np.mean(x**2) / n)), float(x.size)) for x in (rising, falling) if x.size
     )
-    half = error * float(stdtrit(freedom, 0.975))
+    half = error * student(freedom)
     p = float(fdtrc(1.0, freedom, (gap / error) ** 2)) if error > 0 else float(gap == 0)
     return gap, (gap - half, gap + half), p
 
@@ -283,3 +437,112 @@ def drift(loops: Sequence[Loop]) -> list[float]:
             later = [np.interp(one.levels[common], other.levels, x) for x in (other.up, other.down)]
             changes.append(float(np.mean(np.subtract(later, [one.up[common], one.down[common]]))))
     return changes
+
+
+MOVED = 0.02
+"""Output change, relative to its range, above which the output has moved."""
+
+DENSE = 8
+"""Smallest number of samples of an interpolated branch."""
+
+SETTLED = 0.1
+"""Share of a hold that is discarded at its start, so that lag does not count as creep."""
+
+ALIKE, SPEED_RATIO = 0.05, 1.5
+"""Cycles are compared if their extremes differ by at most this share of the amplitude, and their
+speeds by at least this ratio.
+"""
+
+
+def dead_zones(tracks: Sequence[Track], scale: Scale) -> tuple[list[float], list[float]]:
+    """Return the dead zones after upper and after lower reversals [input unit].
+
+    The change of the input from a reversal until the output moves back, extrapolated linearly from the
+    changes at which it has moved by one and by two thresholds. The threshold is 2 % of the output
+    range, six times the noise, or two steps of the sensor, whichever is largest. For a play operator of
+    radius r, 2 r.
+    """
+    upper: list[float] = []
+    lower: list[float] = []
+    for track in tracks:
+        threshold = max(MOVED * scale.y.span, 6 * track.y_noise, 2 * scale.y.step)
+        for k in range(1, track.turns.size - 1):
+            u, y = (x[track.turns[k] : track.turns[k + 1] + 1] for x in (track.u, track.y))
+            if u.size <= DENSE:
+                continue
+            way = float(np.sign(u[-1] - u[0]))
+            travel, moved = way * (u - u[0]), scale.sign * way * (y - y[0])
+            once, twice = (_first_reach(travel, moved, limit * threshold) for limit in (1, 2))
+            if once is not None and twice is not None:
+                (upper if way < 0 else lower).append(max(0.0, 2 * once - twice))
+    return upper, lower
+
+
+def _first_reach(wanted: Array, x: Array, limit: float) -> float | None:
+    """Return ``wanted`` where ``x`` first reaches a limit, interpolated; None if it never does."""
+    i = int(np.argmax(x >= limit))
+    if not x[i] >= limit:
+        return None
+    if i == 0:
+        return float(wanted[0])
+    share = (limit - x[i - 1]) / (x[i] - x[i - 1])
+    return float(wanted[i - 1] + share * (wanted[i] - wanted[i - 1]))
+
+
+def creep(
+    runs: Sequence[Recording], given: str, wanted: str, scale: Scale
+) -> list[tuple[float, float]]:
+    """Return the times [s] and creep [output unit] of the holds at least half as long as the longest.
+
+    The first tenth of a hold is left out; the means over the second tenth and the last are compared,
+    positive where the output went on as it was going. Holds into which the input did not move are left
+    out.
+    """
+    span, found = scale.u.span, []
+    for run in runs:
+        u, y = run[given], run[wanted]
+        if run.sample_time is None:
+            continue
+        for hold in holds(u[:, np.newaxis], [span], shortest_hold(u, span)):
+            lasts = hold.stop - hold.start
+            before = u[max(0, hold.start - lasts) : hold.start]
+            if before.size == 0 or np.ptp(before) < 2 * STILL * span:
+                continue
+            came = u[hold.start] - before[np.argmax(np.abs(before - u[hold.start]))]
+            part = max(1, round(SETTLED * lasts))
+            early, late = (y[at : at + part].mean() for at in (hold.start + part, hold.stop - part))
+            crept = scale.sign * float(np.sign(came) * (late - early))
+            found.append((run.sample_time * (lasts - 2 * part), crept))
+    longest = max((time for time, _ in found), default=0.0)
+    return [(time, crept) for time, crept in found if time >= 0.5 * longest]
+
+
+def rate_dependence(loops: Sequence[Loop]) -> tuple[float, Range, Range] | None:
+    """Return the increase of loop width at twice the speed [%], its 95 % interval, and the speeds.
+
+    By a straight line over the logarithm of the mean speed, of three or more closed cycles between like
+    extremes that differ most in speed, without the first of a recording, which starts from an unknown
+    memory.
+    """
+    timed = [
+        (loop.cycle, np.log2(loop.cycle.rate))
+        for loop in loops
+        if loop.cycle.rate is not None and loop.closed and not loop.first
+    ]
+    # Any cycle may be the one to compare with; of very many, fifty will do.
+    groups = [
+        [(rate, cycle.width) for cycle, rate in timed if one.like(cycle, ALIKE)]
+        for one, _ in timed[:: max(1, len(timed) // 50)]
+    ]
+    if not groups:
+        return None
+    speed, widths = np.transpose(max(groups, key=lambda group: np.ptp([rate for rate, _ in group])))
+    if speed.size < 3 or np.ptp(speed) < np.log2(SPEED_RATIO):
+        return None
+    _, place, count = np.unique(np.round(4 * speed), return_inverse=True, return_counts=True)
+    # every speed weighs the same, however many cycles have it
+    found, spread = np.polyfit(speed, widths, 1, w=1 / np.sqrt(count[place]), cov=True)
+    growth = float(found[0])
+    half = float(np.sqrt(spread[0, 0])) * student(speed.size - 2)
+    ends = float(2 ** speed.min()), float(2 ** speed.max())
+    return growth, (growth - half, growth + half), ends

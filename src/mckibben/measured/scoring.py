@@ -12,7 +12,7 @@ import pandas as pd
 
 from mckibben.arrays import Array, Mask
 from mckibben.channels import Channels, channels_of
-from mckibben.diagnosis.branch_gaps import gap_ratio, paired_gaps
+from mckibben.diagnosis.branch_gaps import gap_ratio, moving_pairs, paired_gaps
 from mckibben.errors import DataError
 from mckibben.files import write
 from mckibben.measured.running import span_of
@@ -148,7 +148,8 @@ def _entry(file: Path, one: Set, parts: Sequence[Part], own: pd.DataFrame) -> En
             errors.append((run.matrix(channels.outputs) - outputs)[rows])
     missed = np.concatenate(errors)
     error = float(np.mean([rmse(column, np.zeros_like(column)) for column in missed.T]))
-    gaps = paired_gaps(runs, predicted, channels.pairs, channels.given(runs))
+    pairs = moving_pairs(runs, channels.pairs, channels.given(runs))
+    gaps = paired_gaps(runs, predicted, pairs)
     wide = len(gaps) > 0 and np.sqrt(np.mean(gaps[:, 0] ** 2)) > LEAST_WIDTH * parts[0].span
     ratio = gap_ratio(gaps) if wide else None
     unit = runs[0].units[channels.outputs[0]]

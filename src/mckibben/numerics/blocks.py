@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.numerics.statistics import NORMAL_95
+from mckibben.numerics.statistics import NORMAL_95, student
 
 RESAMPLES = 1000
 """Number of resamples of a bootstrap."""
@@ -89,10 +89,7 @@ class BlockBootstrap:
             offset += n
             n_blocks += n / block
         freedom = max(n_blocks - 1, 1.0)
-        from scipy.special import stdtrit  # which takes a fifth of a second to import
-
-        student = float(stdtrit(freedom, 0.975)) / NORMAL_95
-        self._wider = student * float(np.sqrt(n_blocks / freedom))
+        self._wider = student(freedom) / NORMAL_95 * float(np.sqrt(n_blocks / freedom))
 
     def rmse(self, errors: Array) -> Array:
         """Return the RMSE of every resample, shape (RESAMPLES,); of several outputs their mean.

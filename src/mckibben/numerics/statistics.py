@@ -151,9 +151,13 @@ def dependence(columns: Array) -> Array:
     return np.asarray(1.0 - 1.0 / np.maximum(inflation, 1.0))
 
 
-def half_interval(values: Array, level: float) -> float:
-    """Return half the width of the interval of the mean of independent values, by Student's t."""
+def student(freedom: float, level: float = 0.95) -> float:
+    """Return half the width of the central interval of Student's t, in standard deviations."""
     from scipy.special import stdtrit  # which takes a fifth of a second to import
 
-    n = values.size
-    return float(stdtrit(n - 1, 0.5 + level / 2) * values.std(ddof=1) / np.sqrt(n))
+    return float(stdtrit(freedom, 0.5 + level / 2))
+
+
+def half_interval(values: Array, level: float) -> float:
+    """Return half the width of the interval of the mean of independent values, by Student's t."""
+    return student(values.size - 1, level) * float(values.std(ddof=1) / np.sqrt(values.size))

@@ -6,7 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from mckibben.diagnosis.check import Validation
-from mckibben.diagnosis.refit import Refit
+from mckibben.diagnosis.review import Refit
 from mckibben.outputs import Results
 from mckibben.report.check_page import check_json
 from mckibben.report.commands import model_file

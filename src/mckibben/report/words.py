@@ -17,8 +17,7 @@ from mckibben.recording import standard_unit
 if TYPE_CHECKING:
     from mckibben.arrays import Array
     from mckibben.blocks.fields import Channel
-    from mckibben.comparison.choosing import Against
-    from mckibben.comparison.leaderboard import Leaderboard
+    from mckibben.comparison.leaderboard import Against, Leaderboard
     from mckibben.control import Learned
     from mckibben.diagnosis.bands import Calibration
     from mckibben.diagnosis.causes import Cause

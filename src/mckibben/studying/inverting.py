@@ -8,8 +8,10 @@ only that the inverse is right.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations_with_replacement
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -18,14 +20,16 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.fields import drives
 from mckibben.blocks.force.feedforward import compensator
-from mckibben.comparison.choosing import acceptable
-from mckibben.comparison.leaderboard import Leaderboard, Row
+from mckibben.blocks.runs import run_of
+from mckibben.comparison.leaderboard import Leaderboard, Row, acceptable
 from mckibben.errors import MckibbenError, ModelError, ModelWarning
 from mckibben.metrics import useful
+from mckibben.numerics.blocks import squared_errors, sums_of_others
+from mckibben.numerics.least_squares import solve_products
 from mckibben.recording import COMMAND, Recording
 from mckibben.splits import Split
 from mckibben.studying.recorded_inputs import RecordedInputs
-from mckibben.studying.static_map import static_error
+from mckibben.system.atomic import Numbers
 
 FOLLOWED = 1e-9
 """Largest error of a model behind its inverse, relative to the range of the motion."""
@@ -75,7 +79,7 @@ class InverseCheck:
 
 
 @dataclass(frozen=True)
-class Compensation:
+class Compensation(Numbers):
     """A compensator, and what is to be expected of it.
 
     Parameters
@@ -100,25 +104,18 @@ class Compensation:
     """
 
     model: str
-    inverse: Block
+    inverse: Block = field(repr=False)
     unit: str
     following_error: float
     following_interval: tuple[float, float] | None
-    static_error: float
-    check: InverseCheck
+    static_error: float = field(repr=False)
+    check: InverseCheck = field(repr=False)
     commands: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Return whose it is, and its errors."""
-        return {
-            "model": self.model,
-            "unit": self.unit,
-            "following_error": self.following_error,
-            "following_interval": self.following_interval and list(self.following_interval),
-            "static_map_error": self.static_error,
-            "inverse_error": self.check.error,
-            "commands": list(self.commands),
-        }
+        errors = {"static_map_error": self.static_error, "inverse_error": self.check.error}
+        return super().to_dict() | errors
 
 
 def compensation(
@@ -126,20 +123,9 @@ def compensation(
 ) -> tuple[Compensation | None, Mapping[str, str]]:
     """Return the compensator of the first model of a leaderboard that has a good one.
 
-    Parameters
-    ----------
-    board : Leaderboard
-        Without a recommended model there is no compensator: one is as good as its model.
-    split : Split
-        The recordings of the leaderboard.
-    seed : int
-        Of the random motion of the check.
-
-    Returns
-    -------
-    found : Compensation or None
-    passed_over : mapping of str to str
-        The models before it in the order of the choice, and why they have no compensator.
+    Also the models before it in the order of the choice, and why they have no compensator. Without a
+    recommended model there is none: a compensator is as good as its model. The split is that of the
+    leaderboard.
     """
     if board.best is None:
         return None, {}
@@ -195,16 +181,9 @@ def _of_row(
 def checked(
     block: Block, space: RecordedInputs, *, model: str | None = None, seed: int = 0
 ) -> InverseCheck:
-    """Return the compensator of a model, tested on a random motion, slow and fast.
+    """Return the compensator of a model, tested on a random motion within a space, slow and fast.
 
-    Parameters
-    ----------
-    block : Block
-    space : RecordedInputs
-        The inputs of that motion, their rate, and the sample time.
-    model : str, optional
-        Short name; default the block's kind.
-    seed : int
+    Its name is by default the block's kind.
 
     Raises
     ------
@@ -225,11 +204,7 @@ def checked(
 def made(block: Block, sample_time: float | None = None) -> Block:
     """Return the compensator of a model, tested within its identified inputs where it knows them.
 
-    Parameters
-    ----------
-    block : Block
-    sample_time : float, optional
-        At which it is tested [s]; default the model's own, or 20 ms.
+    It is tested at a sample time [s], by default the model's own, or 20 ms.
 
     Raises
     ------
@@ -300,3 +275,88 @@ def _refuse_unrecorded(inverse: Block, split: Split) -> None:
             f"{', '.join(names)} in {100 * share:.0f} % of the samples",
             remedy="record these too, or invert another model",
         )
+
+
+LARGEST_DEGREE, MOST_TERMS = 5, 60
+"""Of the polynomial."""
+
+RIDGE = 1e-9
+"""Of the least squares, relative to each term's own effect."""
+
+FEWEST_PARTS = 3
+"""Of the data, each left out in turn to choose the degree: recordings, or pieces of them if fewer."""
+
+Map = Callable[[Array], Array]
+"""From values, (m, n), to others, (m, k)."""
+
+
+def static_error(split: Split, inputs: Sequence[str], outputs: Sequence[str]) -> float:
+    """Return the error on the test of a static map of the inputs, mean RMSE over outputs."""
+    every = [one.with_derived((*inputs, *outputs)) for one in (*split.train, *split.test)]
+    known = [name for name in inputs if all(name in one for one in every)]
+    train = [run_of(one, known, outputs) for one in split.train]
+    pairs = zip(split.test, split.test_rows, strict=True)
+    test = [run_of(one, known, outputs, counts=rows) for one, rows in pairs]
+    given = [run.driven[run.counts] for run in train]
+    found = static_map(given, [run.outputs[run.counts] for run in train])
+    errors = np.concatenate([(found(run.driven) - run.outputs)[run.counts] for run in test])
+    return float(np.sqrt((errors**2).mean(axis=0)).mean())
+
+
+def static_map(given: Sequence[Array], wanted: Sequence[Array]) -> Map:
+    """Return a polynomial fitted to recordings by least squares.
+
+    Its degree is that of the smallest error on recordings left out in turn; of one or two recordings,
+    on thirds of each: few lengths or loads determine no high degree.
+
+    Parameters
+    ----------
+    given, wanted : sequence of array, shapes (m, n) and (m, k)
+        Of every recording. Values beyond these count as the nearest one.
+    """
+    if len(given) < FEWEST_PARTS:
+        given, wanted = (
+            [part for one in tables for part in np.array_split(one, FEWEST_PARTS)]
+            for tables in (given, wanted)
+        )
+    n = given[0].shape[1]
+    every = np.concatenate(given)
+    low, high = every.min(axis=0), every.max(axis=0)
+    possible = [d for d in range(1, LARGEST_DEGREE + 1) if d == 1 or comb(n + d, d) <= MOST_TERMS]
+    chosen, least = _constant(wanted), np.inf
+    for degree in possible:
+        terms = _polynomial(low, high, degree)
+        tables = [np.hstack([terms(part), y]) for part, y in zip(given, wanted, strict=True)]
+        width = tables[0].shape[1] - wanted[0].shape[1]
+        products = np.array([table.T @ table for table in tables])
+        others = sums_of_others(products, np.arange(len(tables)))
+        missed = float(squared_errors(products, solve_products(others, width, RIDGE)).sum())
+        if missed < least:
+            least = missed
+            whole = solve_products(products.sum(axis=0, keepdims=True), width, RIDGE)[0]
+            chosen = _weighted(terms, whole)
+    return chosen
+
+
+def _weighted(terms: Map, weights: Array) -> Map:
+    return lambda values: terms(values) @ weights
+
+
+def _constant(wanted: Sequence[Array]) -> Map:
+    mean = np.concatenate(wanted).mean(axis=0)
+    return lambda values: np.tile(mean, (len(values), 1))
+
+
+def _polynomial(low: Array, high: Array, degree: int) -> Map:
+    """Return the function to the terms of a polynomial; values beyond the ends count as these."""
+    factors = [
+        list(places)
+        for order in range(degree + 1)
+        for places in combinations_with_replacement(range(low.size), order)
+    ]
+
+    def terms(values: Array) -> Array:
+        scaled = (np.clip(values, low, high) - low) / np.where(high > low, high - low, 1.0) * 2 - 1
+        return np.column_stack([scaled[:, places].prod(axis=1) for places in factors])
+
+    return terms

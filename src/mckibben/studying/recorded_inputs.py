@@ -1,4 +1,4 @@
-"""The inputs of recordings: their ranges, their combinations and their rates."""
+"""The inputs of recordings: their ranges, their combinations and their rates, and runs outside them."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.coupled.balance import drive_of
+from mckibben.blocks.coupled.balance import balance_in, drive_of
 from mckibben.blocks.laws import wander
 from mckibben.blocks.ranges import known_ranges
-from mckibben.control.identified import BEYOND
+from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
 FAST = 0.99
@@ -145,16 +145,8 @@ class RecordedInputs:
     ) -> dict[str, tuple[float, float]]:
         """Return the lowest and highest of a model's outputs that these inputs reach again and again.
 
-        They go from end to end along each direction, in cycles; what the first cycles leave behind, and
-        what creeps, has come by the last one.
-
-        Parameters
-        ----------
-        block : Block
-        held : mapping of str to float
-            All other inputs of the model, which stay.
-        seconds : float
-            Duration of a cycle [s].
+        They go from end to end along each direction, in cycles of a duration [s], while all other inputs
+        are held; what the first cycles leave behind, and what creeps, has come by the last one.
         """
         step = block.sample_time or seconds / (2 * SAMPLES)
         n = max(round(seconds / step), 4)
@@ -177,3 +169,29 @@ class RecordedInputs:
         low, high = self.extent
         margin = BEYOND * (high - low).max()
         return float(((along < low - margin) | (along > high + margin)).any(axis=1).mean())
+
+
+BEYOND = 0.05
+"""Share of a range beyond which a value counts as outside; noise is smaller."""
+
+
+def beyond_known(model: Block, recording: Recording) -> list[str]:
+    """Return warnings about parts of a recording outside the identified range.
+
+    Inverses without a balance count the samples that they clip instead.
+    """
+    if model.inverts and balance_in(model) is None:
+        return []
+    known, notes = known_ranges(model.inputs, model.known_inputs), []
+    for channel in model.inputs:
+        if channel.name not in known or channel.name not in recording:
+            continue
+        values, (low, high) = recording[channel.name], known[channel.name]
+        reach = BEYOND * (high - low)
+        if values.min() < low - reach or values.max() > high + reach:
+            ends = " to ".join(numeral(float(end), 3) for end in (values.min(), values.max()))
+            notes.append(
+                f"in {recording.name}, {channel.name} goes from {ends} {channel.unit}, and the model "
+                f"was identified from {numeral(low, 3)} to {numeral(high, 3)}: it extrapolates"
+            )
+    return notes

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mckibben.blocks.equations import quantities
+from mckibben.system.atomic import Numbers, plain
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
     from mckibben.control import Before, Learned, Tracked
-    from mckibben.control.roles import Kind, Plant
+    from mckibben.control.connecting import Kind, Plant
     from mckibben.estimators.core.estimator import Estimator
     from mckibben.recording import Recording
 
@@ -25,7 +26,7 @@ class Price(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(Numbers):
     """A fitted model.
 
     Parameters
@@ -58,7 +59,7 @@ class Fit:
         copied = ("rmse", "rmse_from_rest", "n_samples", "n_evaluations", "seconds")
         return {
             "model": self.name,
-            "file": _text(self.file),
+            "file": plain(self.file),
             "n_parameters": found.n_free,
             **{name: getattr(found, name) for name in copied},
             "rmse_by_output": dict(zip(names, found.rmse_by_output, strict=True)),
@@ -75,7 +76,7 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class Tracking:
+class Tracking(Numbers):
     """Tracking of a reference by a controller, and without compensation.
 
     Parameters
@@ -123,12 +124,12 @@ class Tracking:
             "plant": {"name": self.plant.name, "kind": self.plant_kind},
             "flatters_feedback": self.flatters_feedback,
             **_errors(found),
-            "learned": None if self.learned is None else self.learned.to_dict(),
+            "learned": plain(self.learned),
             "out_of_reach": {name: far._asdict() for name, far in found.beyond.items()},
             "uncompensated": None if without is None else _errors(without),
             "step_time": dict(zip(("median", "p99.9"), found.step_time, strict=True)),
-            "file": _text(self.file),
-            "controller_file": _text(self.controller_file),
+            "file": plain(self.file),
+            "controller_file": plain(self.controller_file),
             "notes": list(self.notes),
         }
 
@@ -138,7 +139,7 @@ def _errors(found: Tracked) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Inverse:
+class Inverse(Numbers):
     """A compensator, or a force estimator.
 
     Parameters
@@ -165,18 +166,18 @@ class Inverse:
     def to_dict(self) -> dict[str, Any]:
         """Return the kind of inverse and its reachable range, for JSON."""
         return {
-            "file": _text(self.file),
+            "file": plain(self.file),
             "kind": self.kind,
             "inputs": [channel.name for channel in self.block.inputs],
             "outputs": [channel.name for channel in self.block.outputs],
-            "reachable": {name: list(ends) for name, ends in self.reachable.items()},
+            "reachable": plain(self.reachable),
             "samples_ahead": self.block.samples_ahead,
             "rmse": dict(self.rmse),
         }
 
 
 @dataclass(frozen=True)
-class Exported:
+class Exported(Numbers):
     """Exported code.
 
     Parameters
@@ -196,14 +197,3 @@ class Exported:
     files: tuple[str, ...]
     self_test: str | None = None
     emulation: str | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return all of it, for JSON."""
-        return {one.name: getattr(self, one.name) for one in fields(self)} | {
-            "path": str(self.path),
-            "files": list(self.files),
-        }
-
-
-def _text(path: Path | None) -> str | None:
-    return None if path is None else str(path)

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands import Banded
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
-from mckibben.control.identified import beyond_known
 from mckibben.diagnosis.bands import outside
 from mckibben.errors import DataError, ModelError
 from mckibben.metrics import score
 from mckibben.recording import Recording
+from mckibben.studying.recorded_inputs import beyond_known
+from mckibben.system.atomic import Numbers
 
 
 @dataclass(frozen=True)
-class Simulation:
+class Simulation(Numbers):
     """A model's run over a recording.
 
     Parameters
@@ -35,20 +36,17 @@ class Simulation:
         and the range of the calibration.
     """
 
-    recording: Recording
+    recording: Recording = field(repr=False)
     metrics: Mapping[str, Mapping[str, float]]
     interval: float | None
     notes: tuple[str, ...]
-    outside: tuple[tuple[Channel, float, Array, tuple[float, float]], ...] = ()
+    outside: tuple[tuple[Channel, float, Array, tuple[float, float]], ...] = field(
+        default=(), repr=False
+    )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the errors, for JSON."""
-        return {
-            "n_samples": len(self.recording),
-            "interval": self.interval,
-            "metrics": {name: dict(figures) for name, figures in self.metrics.items()},
-            "notes": list(self.notes),
-        }
+        return {"n_samples": len(self.recording), **super().to_dict()}
 
 
 def simulated(

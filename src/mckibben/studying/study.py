@@ -1,4 +1,4 @@
-"""Studies: characterization, model choice, and inverse."""
+"""Studies: characterization, model choice, check on the test, inverse, and closed loops on a rig."""
 
 from __future__ import annotations
 
@@ -9,31 +9,35 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.channels import moved_by
-from mckibben.checkpoints import Checkpoints
+from mckibben.blocks.runs import FreeRun
+from mckibben.channels import Channels, moved_by
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.planning import plan_of
 from mckibben.comparison.ranking import Standing, ranked
-from mckibben.control import Tracked
+from mckibben.control import UNCOMPENSATED, Tracked, before, control_law, track, tune_pid
 from mckibben.diagnosis import Characterization, characterize
-from mckibben.diagnosis.check import Validation
+from mckibben.diagnosis.check import Validation, check_runs, check_usable
 from mckibben.diagnosis.data_gaps import Gap, data_gaps
 from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.diagnosis.review import Review, review
-from mckibben.errors import DataError
-from mckibben.recording import COMMAND, Recording, listed
+from mckibben.errors import DataError, MckibbenError
+from mckibben.options import StudyOptions, given_options
+from mckibben.recording import COMMAND, Recording, listed, sample_time_of
 from mckibben.rigs import load_rig
-from mckibben.studying.checking import check_on_test
+from mckibben.rigs.rig import Rig, changes, recorded_on
+from mckibben.splits import Split
 from mckibben.studying.inverting import Compensation, compensation
-from mckibben.studying.loops import closed_loops, named, recorded_rig
+from mckibben.system.atomic import Numbers, plain
 from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
 
 
 @dataclass(frozen=True, repr=False)
-class Study(DrawsItself):
+class Study(DrawsItself, Numbers):
     """Results of ``mckibben study``.
 
     Parameters
@@ -104,35 +108,26 @@ class Study(DrawsItself):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the results without models and their outputs."""
-        known = self.characterization
-        return {
-            "characterization": None if known is None else known.to_dict(),
-            "data_gaps": [gap.to_dict() for gap in self.data_gaps],
-            "check": self.check.to_dict() if isinstance(self.check, Validation) else self.check,
-            "description": None if self.description is None else self.description.to_dict(),
-            "review": None if self.review is None else self.review.to_dict(),
-            "leaderboard": self.leaderboard.to_dict(),
-            "inverse": None if self.inverse is None else self.inverse.to_dict(),
-            "passed_over": dict(self.passed_over),
-            "tracking": {name: dict(tracked.rmse) for name, tracked in self.loops.items()},
-        }
+        copied = (
+            *("characterization", "data_gaps", "check", "description", "review", "leaderboard"),
+            *("inverse", "passed_over"),
+        )
+        tracking = {name: dict(tracked.rmse) for name, tracked in self.loops.items()}
+        return {name: plain(getattr(self, name)) for name in copied} | {"tracking": tracking}
 
 
 def study(
     train: Recording | Sequence[Recording],
     test: Recording | Sequence[Recording] = (),
+    options: StudyOptions | None = None,
     *,
-    rig: str | None = None,
-    seed: int = 0,
-    jobs: int | None = None,
+    validation: Recording | Sequence[Recording] = (),
+    channels: Channels | None = None,
     executor: Executor | None = None,
     folder: str | Path | None = None,
-    clear: bool = True,
     progress: bool | Callable[[Standing], None] | None = None,
     found: Callable[[Study], None] | None = None,
-    model: Block | None = None,
-    compensator: Block | None = None,
-    **choices: Any,
+    **given: Any,
 ) -> Study:
     """Characterize recordings, choose a model by cross-validation, test it, and invert it if possible.
 
@@ -142,45 +137,40 @@ def study(
 
     For several muscles, or under a load, a test motion is tracked on a virtual rig with every
     inverse, and with PID feedback. An interrupt ends the work at once; the study then has the
-    finished results.
+    finished results. The log of a loop, of which options have the model or the compensator, is reviewed.
 
     Parameters
     ----------
-    train, test, seed, jobs, executor, folder, clear, progress
-        As for `compare`.
-    rig : str, optional
-        Virtual rig to close loops on; by default the rig of the recordings, with its changed
-        parameters.
+    train, test, validation, channels, executor, folder, progress
+        As for `mckibben.comparison.ranking.compare`.
+    options : StudyOptions, optional
+        Model and compensator are blocks. Its fields may also be given by name.
     found : callable, optional
         Called with the study so far: once the muscle is characterized, before any model is fitted,
         then whenever a model is finished.
-    model, compensator : Block, optional
-        Model and compensator of the loop logged in ``train``, which is then reviewed; see `review`.
-    **choices
-        Further arguments of `compare`.
-
-    Returns
-    -------
-    Study
 
     Raises
     ------
     DataError
         On recordings that cannot be used.
     """
-    recordings, tests = listed(train), listed(test)
+    chosen = given_options(StudyOptions, options, given)
+    recordings, tests, seed = listed(train), listed(test), chosen.seed
     reviewed = None
-    if model is not None or compensator is not None:  # the test is not for a refit to see
-        reviewed = review(recordings, model=model, compensator=compensator, seed=seed)
-        if choices.get("inputs") is None:
-            recordings = [_driven(one) for one in recordings]
-    plan = plan_of(recordings, tests, seed=seed, **choices)
+    if chosen.model is not None or chosen.compensator is not None:
+        # the test is not for a refit to see
+        ran: Any = {"model": chosen.model, "compensator": chosen.compensator}
+        reviewed = review(recordings, seed=seed, **ran)
+        if chosen.inputs is None:
+            recordings, channels = [_driven(one) for one in recordings], None
+    plan = plan_of(recordings, tests, chosen, validation=validation, channels=channels)
     channels = plan.data.channels
-    if rig is not None and channels.single:
+    if chosen.rig is not None and channels.single:
         raise DataError(
             "loops are closed on a rig with recordings of several muscles, or under a load",
             remedy="leave `rig` out, or use `track()`",
         )
+    rig = None if chosen.rig is None else load_rig(chosen.rig)
     looped, loop = channels.inputs, None
     if len(channels.inputs) == len(channels.outputs) == 1:
         looped = (moved_by([*recordings, *tests], looped[0]),)
@@ -196,7 +186,7 @@ def study(
         leaderboard=plan.empty,
         predictions={},
         inverse=None,
-        load=choices.get("load"),
+        load=chosen.load,
         notes=plan.empty.notes,
         data_gaps=data_gaps(recordings, looped, channels.outputs, tests=tests),
         review=reviewed,
@@ -207,7 +197,7 @@ def study(
         with (
             telling(progress, "studying", lines=True) as tell,
             closing(
-                ranked(plan, jobs=jobs, executor=executor, folder=folder, progress=tell)
+                ranked(plan, jobs=chosen.jobs, executor=executor, folder=folder, progress=tell)
             ) as rankings,
         ):
             for ranking in rankings:
@@ -231,21 +221,14 @@ def study(
     so_far = replace(so_far, inverse=undone, passed_over=passed_over)
     if not channels.single and undone is not None:
         try:
-            plant = recorded_rig([*recordings, *tests]) if rig is None else load_rig(rig)
-        except DataError as error:
-            if rig is not None:
-                raise
-            plant, so_far = None, replace(so_far, not_looped=str(error))
-        if plant is not None:
-            try:
+            plant = rig or recorded_rig([*recordings, *tests])
+            if plant is not None:
                 loops = closed_loops(board, undone.model, plant, so_far.test, seed)
                 so_far = replace(so_far, loops=loops, plant=named(plant))
-            except DataError as error:
-                so_far = replace(so_far, not_looped=str(error))
+        except DataError as error:
+            so_far = replace(so_far, not_looped=str(error))
     if found is not None:
         found(so_far)
-    if clear:
-        Checkpoints(folder).clear()
     return so_far
 
 
@@ -255,3 +238,112 @@ def _driven(log: Recording) -> Recording:
     blind = [name for name in names if name not in log]
     units = {name: log.units[COMMAND + name] for name in blind}
     return log.with_channels(units, **{name: log[COMMAND + name] for name in blind})
+
+
+def check_on_test(
+    model: Block, split: Split, modelled: Sequence[Array], outputs: Sequence[str]
+) -> Validation | str:
+    """Return the check of a model on the test, or why it cannot be checked.
+
+    ``modelled`` are free-running outputs on every test recording, shape (n, k), with their names.
+    """
+    given = [channel.name for channel in model.outputs]
+    places = [list(outputs).index(name) for name in given]
+    trained = np.concatenate([recording.matrix(given) for recording in split.train])
+    runs = []
+    for recording, rows, found in zip(split.test, split.test_rows, modelled, strict=True):
+        scored = np.flatnonzero(rows)
+        if not scored.size:
+            continue
+        start, stop = int(scored[0]), int(scored[-1]) + 1
+        run = model.as_run(recording.slice(start, stop))
+        runs.append(FreeRun.of(run, found[start:stop, places]))
+    try:
+        check_usable(model, [run.source for run in runs])
+        return check_runs(model, runs, means=trained.mean(axis=0))
+    except DataError as error:
+        return str(error)
+
+
+LONGEST = 200.0
+"""Longest motion that is tracked [s]."""
+
+SMOOTHED = 0.5
+"""Half width of the window that smooths a measured motion before it is tracked [s]."""
+
+
+def recorded_rig(recordings: Sequence[Recording]) -> Rig | None:
+    """Return the virtual rig of recordings, in its recorded configuration; None if they name none.
+
+    Raises
+    ------
+    DataError
+        If it cannot be rebuilt, or there are several.
+    """
+    rigs = [recorded_on(recording) for recording in recordings]
+    # where commands rest is no matter of the rig: a loop begins at its reference
+    kinds = [None if rig is None else rig.changed({"start": {}}) for rig in rigs]
+    if any(kind != kinds[0] for kind in kinds):
+        raise DataError(
+            "the recordings are not all of one virtual rig", remedy="name the rig to close it on"
+        )
+    return rigs[0]
+
+
+def named(rig: Rig) -> str:
+    """Return the name of a rig, and its changes from the published one."""
+    changed = ", ".join(changes(rig) or ())
+    return f"{rig.name} (changed: {changed})" if changed else rig.name
+
+
+def closed_loops(
+    board: Leaderboard, chosen: str, rig: Rig, tests: Sequence[Recording], seed: int
+) -> dict[str, Tracked]:
+    """Return tracking results of a measured motion: uncompensated, with every inverse, PID, and both.
+
+    PID is combined with the inverse of the chosen model. Of the tests, the one that moves most in its
+    stillest output is followed. Nothing is chosen by it. An inverse that fails is left out; its model is
+    in the leaderboard. There are none where inverses give pressures, and the rig takes volts.
+
+    Raises
+    ------
+    DataError
+        If that has no time.
+    """
+    inverses = {row.model: row.inverse for row in board.rows if row.inverse is not None}
+    if not {channel.name for channel in inverses[chosen].outputs} <= set(rig.inputs):
+        return {}
+    wanted = {channel.name for inverse in inverses.values() for channel in inverse.inputs}
+    held = [name for name in rig.inputs if name in wanted]
+    reference = _followed(tests, board.outputs, held)
+    step = sample_time_of(reference, "be tracked")
+    scheduled = {name: float(reference[name][0]) for name in held}
+    asked = inverses[chosen].inputs
+    pid = tune_pid(rig, sample_time=step, scheduled=scheduled, references=asked, seed=seed)
+    laws = [(f"{model} inverse", "feedforward", model) for model in inverses]
+    laws += [("PID", "pid", chosen), (f"{chosen} inverse + PID", "feedforward-pid", chosen)]
+    found: dict[str, Tracked] = {}
+    without = before(inverses[chosen], rig, reference, approach=5.0, seed=seed).tracked
+    if without is not None:
+        found[UNCOMPENSATED] = without
+    for name, law, model in laws:
+        with suppress(MckibbenError):
+            controller = control_law(law, inverses[model], lambda: pid)
+            found[name] = track(controller, rig, reference, approach=5.0, seed=seed)
+    return found
+
+
+def _followed(tests: Sequence[Recording], outputs: Sequence[str], held: Sequence[str]) -> Recording:
+    """Return a smoothed measured motion, with scheduling inputs at their means."""
+    model = max(tests, key=lambda run: min(float(np.ptp(run[name])) for name in outputs))
+    step = sample_time_of(model, "be tracked")
+    n = min(len(model), round(LONGEST / step))
+    width = max(round(SMOOTHED / step), 1)
+    window = np.ones(width) / width
+    smooth = {
+        name: np.convolve(np.pad(model[name][:n], width, mode="edge"), window, "same")[
+            width : width + n
+        ]
+        for name in outputs
+    }
+    return Recording(smooth | {name: np.full(n, float(model[name].mean())) for name in held}, step)

@@ -8,7 +8,7 @@ import os
 import secrets
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from hashlib import sha256
@@ -113,13 +113,26 @@ def write_json(path: str | Path, value: Any) -> None:
     write_text(path, to_json(value) + "\n")
 
 
+class Numbers:
+    """A dataclass whose fields are given as JSON values, but those that ``repr`` leaves out."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it for JSON, with None for numbers that are not finite."""
+        of: Any = self
+        return {one.name: plain(getattr(self, one.name)) for one in fields(of) if one.repr}
+
+
 def plain(value: Any) -> Any:
-    """Return dataclasses and arrays as JSON values; non-finite numbers become None."""
+    """Return dataclasses, arrays and paths as JSON values; non-finite numbers become None."""
+    if isinstance(value, Numbers):
+        return plain(value.to_dict())
+    if isinstance(value, Path):
+        return str(value)
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if hasattr(value, "tolist"):  # NumPy's
         return plain(value.tolist())
-    if isinstance(value, dict):
+    if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]

@@ -12,7 +12,7 @@ any sample time. As of `Creep`, the output of a sample is that at its end; where
 read at one instant, the sample for which the command was held is part of the dead time.
 
 The inverse is in closed form and does not compensate the dead time: the response is delayed by it,
-unless the reference is given ahead (`mckibben.control.preview`).
+unless the reference is given ahead (`mckibben.control.previewed`).
 """
 
 from __future__ import annotations

@@ -23,6 +23,7 @@ import mckibben
 from mckibben import registry
 from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
 from mckibben.blocks.saving import load
+from mckibben.channels import channels_of
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 from mckibben.report.figures import write_figure
@@ -133,11 +134,11 @@ def fit(name: str) -> str:
     reasons = []
     for key in [PREFERRED[name]] if name in PREFERRED else TASKS:
         task = TASKS[key]()
-        asked = (task.inputs, task.outputs, task.scheduling)
-        reason = estimator.objection(task.recordings, *asked)
+        channels = channels_of(task.recordings, task.inputs, task.outputs, task.scheduling)
+        reason = estimator.objection(task.recordings, channels)
         if reason is None:
             try:
-                chosen = estimator.channel_settings(*asked) | SETTINGS.get(name, {})
+                chosen = estimator.channel_settings(channels) | SETTINGS.get(name, {})
                 estimator(**chosen).fit(task.recordings).model_.save(MODELS / f"{name}.json")
                 draw(name, task)
             except MckibbenError as error:

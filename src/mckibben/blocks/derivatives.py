@@ -17,7 +17,7 @@ from itertools import pairwise, starmap
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import VIRGIN, Block
@@ -255,7 +255,7 @@ def _by_differences(
 
 def derivatives(
     block: Block,
-    inputs: Array,
+    inputs: ArrayLike,
     sample_time: float | None = None,
     initial: Begun = None,
     places: Sequence[int] | None = None,
@@ -268,7 +268,7 @@ def derivatives(
     Parameters
     ----------
     block : Block
-    inputs : array, shape (n, n_inputs)
+    inputs : array_like, shape (n, n_inputs), or (n,) for one input
     sample_time : float, optional
         Time between samples [s]; needed by blocks that depend on rate.
     initial : {"first_sample", "virgin"}, sequence of float, or callable, optional
@@ -277,17 +277,18 @@ def derivatives(
     places : sequence of int, optional
         Of the k parameters, in `pack`; all by default.
     """
+    table = np.asarray(inputs, dtype=np.float64).reshape(-1, len(block.inputs))
     places = range(block.n_parameters) if places is None else places
     workers, exact = max(min(cores(), len(places)), 1), differentiable(block)
 
     def run(share: Sequence[int]) -> Array:
         if exact:
-            return Tangents(block, sample_time, initial, share).over(inputs)[1]
-        return _by_differences(block, inputs, sample_time, initial, share)
+            return Tangents(block, sample_time, initial, share).over(table)[1]
+        return _by_differences(block, table, sample_time, initial, share)
 
     with ThreadPoolExecutor(workers) as pool:
         shares = [places[first::workers] for first in range(workers)]
-        found = np.empty((len(inputs), len(block.outputs), len(places)))
+        found = np.empty((len(table), len(block.outputs), len(places)))
         for first, own in enumerate(pool.map(run, shares)):
             found[:, :, first::workers] = own
     return found

@@ -231,7 +231,7 @@ def inverse(found: Inverse) -> list[Item]:
     made = found.block
     units = {channel.name: channel.unit for channel in (*made.inputs, *made.outputs)}
     given, wanted = (
-        ", ".join(f"{channel.name} [{channel.unit}]" for channel in side)
+        ", ".join(f"{one.name} [{one.unit}]" if one.unit else one.name for one in side)
         for side in (made.inputs, made.outputs)
     )
     said = [f"{wanted} from {given}."]
@@ -347,7 +347,8 @@ def study(found: Study) -> list[Item]:
 def tiles(study: Study) -> tuple[Tile, ...]:
     """Return the numbers of the first screen: loop, model, inverse, data gaps."""
     board, found, best = study.leaderboard, study.characterization, study.leaderboard.best
-    loop = Tile("Loop width", "–", "several muscles: see Recordings", "recordings")
+    why = "several inputs" if len(board.inputs) > 1 else "not measured"
+    loop = Tile("Loop width", "–", f"{why}: see Recordings", "recordings")
     if found is not None and found.loop_width is not None:
         width = f"{numeral(found.mid_width, 2)} {found.output_unit} at mid {found.input}"
         loop = Tile("Loop width", f"{numeral(found.loop_width, 2)} %", width, "recordings")

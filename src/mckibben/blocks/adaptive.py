@@ -39,7 +39,6 @@ from mckibben.blocks.fields import (
 from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.learning import READY, SENSES, USUAL, Learnable, start_root
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
@@ -127,11 +126,9 @@ class Prompt(Block):
     n_missable: ClassVar[int] = 1  # the measurement
     n_states: ClassVar[int] = LONGEST_DELAY + 1
     parameters: ClassVar[tuple[str, ...]] = ("late",)
-    notation: ClassVar[Notation] = Notation(
-        r"y_t = y_{m,t} + r_{t-1} - r_{t-T_d/T}", late="T_d [s]"
-    )
+    formulas = (r"y_t = y_{m,t} + r_{t-1} - r_{t-T_d/T}",)
 
-    late: Annotated[FiniteFloat, Gt(0)]
+    late: Annotated[FiniteFloat, Gt(0), "T_d [s]"]
     reference: ChannelField
     measured: ChannelField
 

@@ -21,7 +21,6 @@ from mckibben.blocks.base import Block, Board, Ports, Start
 from mckibben.blocks.compose import Composition
 from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Rows, Vector
 from mckibben.blocks.kernels import Step, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
@@ -88,15 +87,12 @@ class Band(Block):
     start_kernel: ClassVar[Start] = band_start
     parameters: ClassVar[tuple[str, ...]] = ("widening",)
     made_again: ClassVar[str] = "calibrate the model again, with `calibrate()`"
-    notation: ClassVar[Notation] = Notation(
-        r"y^{\pm} = y \pm q\,(1 + k\,|\dot y|)",
-        widening="k_{k} [s/{out0}]",
-    )
+    formulas = (r"y^{\pm} = y \pm q\,(1 + k\,|\dot y|)",)
 
     driving: Channels
     given: Channels
     ends: Rows
-    widening: Vector
+    widening: Annotated[Vector, "k_{k} [s/{out0}]"]
     scores: Rows
     units: Annotated[int, Field(ge=1)]
     unit: Literal["run", "block"] = "run"

@@ -24,7 +24,6 @@ from mckibben.blocks.base import SEVERAL, Block, Board, Ports, Start
 from mckibben.blocks.compose import Composition
 from mckibben.blocks.fields import STRICT, Channel, Channels, Vector
 from mckibben.blocks.kernels import Step, accumulate, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
@@ -106,27 +105,19 @@ class PIDFeedback(Block):
     no_inverse: ClassVar[str] = "has no inverse"
     instead: ClassVar[str] = "invert the model of the muscle"
     parameters: ClassVar[tuple[str, ...]] = ("kp", "ki", "kd")
-    notation: ClassVar[Notation] = Notation(
+    formulas = (
         r"p_i = p_{b,i} + k_{p,i} e_i + k_{i,i} \int e_i\, dt - k_{d,i} \dot{y}_i,\quad "
         "e_i = r_i - y_i",
-        kp="k_{p,i} [bar/mm]",
-        ki="k_{i,i} [bar/mm s]",
-        kd="k_{d,i} [bar s/mm]",
-        filter_time="T [s]",
-        limits=r"p_{\pm,i} [bar]",
-        driven="r_i",
-        scheduled="x_i",
-        given="p_i",
     )
 
-    kp: Vector
-    ki: Vector
-    kd: Vector
-    limits: tuple[FiniteFloat, FiniteFloat]
-    filter_time: Annotated[FiniteFloat, Ge(0)]
-    driven: Channels
-    scheduled: Channels
-    given: Channels
+    kp: Annotated[Vector, "k_{p,i} [bar/mm]"]
+    ki: Annotated[Vector, "k_{i,i} [bar/mm s]"]
+    kd: Annotated[Vector, "k_{d,i} [bar s/mm]"]
+    limits: Annotated[tuple[FiniteFloat, FiniteFloat], r"p_{\pm,i} [bar]"]
+    filter_time: Annotated[FiniteFloat, Ge(0), "T [s]"]
+    driven: Annotated[Channels, "r_i"]
+    scheduled: Annotated[Channels, "x_i"]
+    given: Annotated[Channels, "p_i"]
     late: bool = False
 
     def __post_init__(self) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from mckibben.arrays import Array
-from mckibben.blocks.notation import Notation
+from mckibben.blocks.notation import symbol_of
 from mckibben.errors import ModelError
 
 Made = TypeVar("Made")
@@ -92,17 +92,17 @@ class Parametrised(metaclass=Checked):
     parameters: ClassVar[tuple[str, ...]] = ()
     """Names of the fields, in the order of the vector."""
 
-    notation: ClassVar[Notation] = Notation()
-    """Its equations, and the symbols and units of its numbers."""
+    formulas: ClassVar[tuple[str, ...]] = ()
+    """Its equations, in LaTeX; symbols are declared with the fields, see `mckibben.blocks.notation`."""
 
     def equations(self) -> tuple[str, ...]:
         """Return the equations of this structure, in LaTeX; by default those of its class."""
-        return self.notation.equations
+        return self.formulas
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
-        """Return the unit of a number of a field, as `Notation` writes it; None if none is declared."""
+        """Return the unit of a number of a field, as `Symbol` writes it; None if none is declared."""
         del index
-        return self.notation.of(field).unit
+        return symbol_of(type(self), field).unit
 
     def name_of(self, field: str, index: tuple[int, ...]) -> str:
         """Return the label of a parameter: the field's name, and its indices."""

@@ -30,7 +30,6 @@ from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.kernels import Step, fill, in_scratch, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.planning import clip_path, plan_path, plan_scratch
 from mckibben.blocks.sample_times import needs_sample_time
@@ -362,15 +361,14 @@ class Predictive(Block):
     retired: ClassVar[Mapping[str, Any]] = {"total_limit": None, "flow_limit": None, "volumes": ()}
     rate_dependent: ClassVar[bool] = True
     path_dependent: ClassVar[bool] = True
-    notation: ClassVar[Notation] = Notation(
+    formulas = (
         r"\min_{p} \sum_{t=0}^{N-1} \left(r_t - P[p]_t\right)^2 \quad\text{such that}\quad "
         r"p_{\min} \le p_t \le p_{\max},\quad |p_t - p_{t-1}| \le \rho T",
-        rate_limit=r"\rho [bar/s]",
     )
 
     compensator: Annotated[InstanceOf[Block], BeforeValidator(nested)]
     horizon: Annotated[int, Interval(ge=1, le=200)] = 20
-    rate_limit: Limit | None = None
+    rate_limit: Annotated[Limit | None, r"\rho [bar/s]"] = None
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
 
     inputs = same_as("compensator.inputs")

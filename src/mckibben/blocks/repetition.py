@@ -20,7 +20,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Ports, Start
 from mckibben.blocks.fields import DISPLACEMENT, STRICT, Channels, Rows, vector
 from mckibben.blocks.kernels import Step, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.sample_times import own_sample_time
 from mckibben.errors import ModelError
 
@@ -67,18 +66,12 @@ class Repetition(Block):
     start_kernel: ClassVar[Start] = repetition_start
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("corrections",)
-    notation: ClassVar[Notation] = Notation(
-        r"y_i(t) = u_i(t) + c_{i,t}",
-        corrections="c_{i,t} [{out0}]",
-        sample_time="T_s [s]",
-        driven="u_i",
-        given="y_i",
-    )
+    formulas = (r"y_i(t) = u_i(t) + c_{i,t}",)
 
-    corrections: Rows
-    sample_time: Annotated[FiniteFloat, Gt(0)]
-    driven: Channels = (DISPLACEMENT,)
-    given: Channels = (DISPLACEMENT,)
+    corrections: Annotated[Rows, "c_{i,t} [{out0}]"]
+    sample_time: Annotated[FiniteFloat, Gt(0), "T_s [s]"]
+    driven: Annotated[Channels, "u_i"] = (DISPLACEMENT,)
+    given: Annotated[Channels, "y_i"] = (DISPLACEMENT,)
     repeats: bool = False
 
     def __post_init__(self) -> None:

@@ -50,7 +50,6 @@ from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
 from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.learning import Learnable
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.ranges import unknown
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError, ModelWarning
@@ -199,66 +198,42 @@ class Balance(Invertible):
         *("damping", "lines", "walls", "friction_offset", "bladders", "pushes", "mass"),
         *("asymmetry", "friction_slopes", "obstacles"),
     )
-    notation: ClassVar[Notation] = Notation(
+    formulas = (
         r"A_k(y) = \sum_i a_{ki} (y / L)^i,\quad E_k(y) = b_k y + \sum_{i \ge 2} e_{ki} "
         "(y / L)^i",
-        springs="S_{ki}",
-        elasticity="e_{ki} from 2 [N]",
-        areas="a_{ki} from 0 [N/bar]",
-        friction="h_{km} [N/mm]",
-        relaxation=r"\kappa_{kl} [N/mm]",
-        loads="C_{kl}",
-        damping="d_k [N s/mm]",
-        lines="l_k [N s/mm]",
-        walls="w_k [mm/bar]",
-        limits="r_m [mm/bar]",
-        friction_offset="p_0 [bar]",
-        lags=r"\tau_l [s]",
-        scale="L [mm]",
-        bladders="b_k [N/mm]",
-        pushes="P_k [N]",
-        mass="m_k [N s^2/mm]",
-        asymmetry=r"\rho",
-        friction_slopes="g_i",
-        obstacles="o_{ki}",
-        directions="W_{ki}",
-        preload="p_s [bar]",
-        drive="D_{ki} [bar]",
-        driven="y_i",
-        given="p_i",
     )
 
-    springs: Rows
-    elasticity: Rows
-    areas: Rows
-    friction: Rows
-    relaxation: Rows
-    loads: Rows
-    damping: Vector
-    walls: Vector
-    limits: Vector
-    friction_offset: FiniteFloat
-    lags: Vector
+    springs: Annotated[Rows, "S_{ki}"]
+    elasticity: Annotated[Rows, "e_{ki} from 2 [N]"]
+    areas: Annotated[Rows, "a_{ki} from 0 [N/bar]"]
+    friction: Annotated[Rows, "h_{km} [N/mm]"]
+    relaxation: Annotated[Rows, r"\kappa_{kl} [N/mm]"]
+    loads: Annotated[Rows, "C_{kl}"]
+    damping: Annotated[Vector, "d_k [N s/mm]"]
+    walls: Annotated[Vector, "w_k [mm/bar]"]
+    limits: Annotated[Vector, "r_m [mm/bar]"]
+    friction_offset: Annotated[FiniteFloat, "p_0 [bar]"]
+    lags: Annotated[Vector, r"\tau_l [s]"]
     hull: Rows
-    scale: Annotated[FiniteFloat, Gt(0)]
+    scale: Annotated[FiniteFloat, Gt(0), "L [mm]"]
     degree: Annotated[int, Interval(ge=1, le=4)]
-    driven: Channels
+    driven: Annotated[Channels, "y_i"]
     scheduled: Channels
-    given: Channels
-    lines: Vector = ()
-    bladders: Vector = ()
-    pushes: Vector = ()
+    given: Annotated[Channels, "p_i"]
+    lines: Annotated[Vector, "l_k [N s/mm]"] = ()
+    bladders: Annotated[Vector, "b_k [N/mm]"] = ()
+    pushes: Annotated[Vector, "P_k [N]"] = ()
     tare: bool = False
     settled: bool = False
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
-    mass: Vector = ()
+    mass: Annotated[Vector, "m_k [N s^2/mm]"] = ()
     known: Rows = ()
-    asymmetry: Annotated[FiniteFloat, Gt(0)] | None = None
-    friction_slopes: Vector = ()
-    obstacles: Rows = ()
-    directions: Rows = ()
-    preload: FiniteFloat = 0.0
-    drive: Rows = ()
+    asymmetry: Annotated[Annotated[FiniteFloat, Gt(0)] | None, r"\rho"] = None
+    friction_slopes: Annotated[Vector, "g_i"] = ()
+    obstacles: Annotated[Rows, "o_{ki}"] = ()
+    directions: Annotated[Rows, "W_{ki}"] = ()
+    preload: Annotated[FiniteFloat, "p_s [bar]"] = 0.0
+    drive: Annotated[Rows, "D_{ki} [bar]"] = ()
     held: bool = False
 
     def __post_init__(self) -> None:
@@ -396,7 +371,7 @@ class Balance(Invertible):
             r"\dot{q}_{kl} = \dot{y}_k - q_{kl} / \tau_l": self.lags,
         }
         remembered = r",\quad ".join(line for line, numbers in memory.items() if numbers)
-        return tuple(line for line in (*balance, *self.notation.equations, remembered) if line)
+        return tuple(line for line in (*balance, *self.formulas, remembered) if line)
 
     @property
     def n_loads(self) -> int:

@@ -24,7 +24,6 @@ from mckibben.blocks.base import SEVERAL, Block
 from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
 from mckibben.blocks.hysteresis.play_operators import start_operators
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
@@ -119,24 +118,19 @@ class CoupledMemory(Block):
     parameters = ("readout",)
     no_inverse = "has no inverse: its lags cannot be inverted within a sample"
     instead = "invert balance or sdchm, or close a loop"
-    notation = Notation(
+    formulas = (
         r"\tau_l \dot{x}_{li} = u_i - x_{li},\quad z_{lik} = F_{r_{ik}}[x_{li}]",
         r"y_j = R_j \cdot \left(1,\; x,\; z,\; x_{1i} x_{1k},\; x_{1i} x_{1k} x_{1q},\; "
         r"x_{1i} x_{lk},\; x_{1i} z_{lkm}\right)",
-        lags=r"\tau_l [s]",
-        thresholds="r_{ik} [{in0}]",
-        readout="R_{jk}",
-        driven="u_i",
-        given="y_j",
     )
 
-    lags: Vector
-    thresholds: PositiveRows
-    readout: Rows
+    lags: Annotated[Vector, r"\tau_l [s]"]
+    thresholds: Annotated[PositiveRows, "r_{ik} [{in0}]"]
+    readout: Annotated[Rows, "R_{jk}"]
     degree: Annotated[int, Interval(ge=1, le=3)]
-    driven: Channels
+    driven: Annotated[Channels, "u_i"]
     scheduled: Channels
-    given: Channels
+    given: Annotated[Channels, "y_j"]
     crossed: bool = False
 
     def __post_init__(self) -> None:

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic.dataclasses import dataclass
@@ -29,7 +29,6 @@ from mckibben.blocks.base import SEVERAL
 from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import DERIVED, NOTHING, SLACK, fill, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import eliminate
 from mckibben.errors import ModelError
 
@@ -297,21 +296,16 @@ class FuzzyNetwork(Invertible):
     solved = True
     of_local_rules = True
     parameters = ("centres", "widths", "consequents")
-    notation = Notation(
+    formulas = (
         r"y_k = \frac{\sum_r \omega_r\, (P_{rk} \cdot x + c_{rk})}{\sum_r \omega_r},\quad "
         r"\omega_r = \prod_i \exp\left(-\frac{(x_i - m_{ir})^2}{2 \sigma_{ir}^2}\right)",
-        centres="m_{ij} [{in0}]",
-        widths=r"\sigma_{ij} [{in0}]",
-        consequents="P_i",
-        driven="x_i",
-        given="y_k",
     )
 
-    centres: Rows
-    widths: PositiveRows
-    consequents: Vector
-    driven: Channels
-    given: Channels
+    centres: Annotated[Rows, "m_{ij} [{in0}]"]
+    widths: Annotated[PositiveRows, r"\sigma_{ij} [{in0}]"]
+    consequents: Annotated[Vector, "P_i"]
+    driven: Annotated[Channels, "x_i"]
+    given: Annotated[Channels, "y_k"]
     scheduled: Channels = ()
     constants: bool = False
     limits: Rows | None = None

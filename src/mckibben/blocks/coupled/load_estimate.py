@@ -38,7 +38,6 @@ from mckibben.blocks.coupled.balance_law import (
 from mckibben.blocks.fields import STRICT, Channel
 from mckibben.blocks.kernels import fill, kernel, step
 from mckibben.blocks.memoryless import Affine
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
@@ -130,9 +129,9 @@ class LoadEstimate(Block):
     parameters = ("forward",)
     typical = (Balance.example(),)
     _of_model = same_as("forward")
-    notation = Notation(
+    formulas = (
         r"F = C^{+} \left(p A(y) - \text{springs} - \text{elasticity} - \text{friction} - "
-        r"\text{relaxation} - \text{damping} - \text{inertia}\right)"
+        r"\text{relaxation} - \text{damping} - \text{inertia}\right)",
     )
 
     forward: Annotated[InstanceOf[Balance], BeforeValidator(nested)]

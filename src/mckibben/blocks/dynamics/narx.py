@@ -28,7 +28,6 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Start
 from mckibben.blocks.hysteresis.play_operators import check_order, start_operators
 from mckibben.blocks.kernels import Step, kernel, remember, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.sample_times import own_sample_time
 from mckibben.errors import ModelError
 
@@ -54,12 +53,6 @@ REGRESSORS = (
     r"\bar{u}_{t-d-m+1},\, F_{r_1}[\bar{u}]_t, \ldots)",
     r"\bar{u} = (u - u_1) / u_2,\quad \bar{y} = (y - y_1) / y_2",
 )
-SYMBOLS = {
-    "thresholds": "r_i",
-    "input_scale": "u_i [{u}]",
-    "output_scale": "y_i [{y}]",
-    "sample_time": "T [s]",
-}
 
 
 @kernel
@@ -202,10 +195,10 @@ class Narx(Block):
     output_lags: Lags
     input_lags: Lags
     delay: Lags = 0
-    thresholds: fields.Vector = ()
-    input_scale: fields.Scale
-    output_scale: fields.Scale
-    sample_time: fields.Positive
+    thresholds: Annotated[fields.Vector, "r_i"] = ()
+    input_scale: Annotated[fields.Scale, "u_i [{u}]"]
+    output_scale: Annotated[fields.Scale, "y_i [{y}]"]
+    sample_time: Annotated[fields.Positive, "T [s]"]
     initial: fields.StoredInitial = "first_sample"
     input: fields.ChannelField = fields.PRESSURE
     output: fields.ChannelField = fields.DISPLACEMENT
@@ -270,12 +263,10 @@ class NarxPolynomial(Narx):
     kind = "narx-polynomial"
     kernel, start_kernel = narx_kernels(sum_of_terms)
     parameters = ("weights",)
-    notation = Notation(
-        r"\bar{y}_t = \sum_i w_i \prod_{j \in P_i} x_{j,t}", *REGRESSORS, weights="w_i", **SYMBOLS
-    )
+    formulas = (r"\bar{y}_t = \sum_i w_i \prod_{j \in P_i} x_{j,t}", *REGRESSORS)
 
     terms: Terms
-    weights: fields.Vector
+    weights: Annotated[fields.Vector, "w_i"]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -352,18 +343,11 @@ class NarxNetwork(Narx):
     kind = "narx-network"
     kernel, start_kernel = narx_kernels(network)
     parameters = ("bias", "linear", "hidden")
-    notation = Notation(
-        r"\bar{y}_t = b + l^\top x_t + \sum_h o_h\, a(w_h^\top x_t + s_h)",
-        *REGRESSORS,
-        bias="b",
-        linear="l_i",
-        hidden="h_i",
-        **SYMBOLS,
-    )
+    formulas = (r"\bar{y}_t = b + l^\top x_t + \sum_h o_h\, a(w_h^\top x_t + s_h)", *REGRESSORS)
 
-    bias: FiniteFloat
-    linear: fields.Vector
-    hidden: fields.Vector
+    bias: Annotated[FiniteFloat, "b"]
+    linear: Annotated[fields.Vector, "l_i"]
+    hidden: Annotated[fields.Vector, "h_i"]
     activation: Literal["tanh", "wavelet"] = "tanh"
 
     def __post_init__(self) -> None:

@@ -13,7 +13,7 @@ corner of the delayed input by matrix exponentials.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -23,7 +23,6 @@ from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block
 from mckibben.blocks.kernels import kernel, remember, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
@@ -97,23 +96,14 @@ class ProcessModel(Block):
     is_linear = True
     filters = True
     typical = (6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
-    notation = Notation(
-        gain="K [{y}/{u}]",
-        time_constants="T_{p,i} [s]",
-        damping=r"\zeta",
-        zero_time="T_z [s]",
-        delay="T_d [s]",
-        input_offset="u_0 [{u}]",
-        output_offset="y_0 [{y}]",
-    )
 
-    gain: FiniteFloat
-    time_constants: fields.PositiveVector
-    damping: fields.Positive | None = None
-    zero_time: FiniteFloat | None = None
-    delay: fields.NotNegative = 0.0
-    input_offset: FiniteFloat = 0.0
-    output_offset: FiniteFloat = 0.0
+    gain: Annotated[FiniteFloat, "K [{y}/{u}]"]
+    time_constants: Annotated[fields.PositiveVector, "T_{p,i} [s]"]
+    damping: Annotated[fields.Positive | None, r"\zeta"] = None
+    zero_time: Annotated[FiniteFloat | None, "T_z [s]"] = None
+    delay: Annotated[fields.NotNegative, "T_d [s]"] = 0.0
+    input_offset: Annotated[FiniteFloat, "u_0 [{u}]"] = 0.0
+    output_offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
     hold: Literal["first", "zero"] = "first"
     initial: fields.StoredInitial = "first_sample"
     input: fields.ChannelField = fields.PRESSURE

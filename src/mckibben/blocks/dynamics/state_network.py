@@ -14,7 +14,7 @@ models", 1995; in continuous time, as neural ordinary differential equations.
 from __future__ import annotations
 
 import math
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -25,7 +25,6 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
@@ -153,28 +152,20 @@ class StateNetwork(Block):
     steady_state = steady_state
     parameters = ("linear", "hidden", "readout")
     n_states = one_per("linear", 1)  # states, and the last input
-    notation = Notation(
+    formulas = (
         r"\dot{x} = \lambda \left(L v + R \tanh(H v)\right),\quad v = \left(x,\, \frac{u "
         r"- u_0}{u_s},\, 1\right)",
         "y = y_0 + y_s x_1",
-        linear="L_{ij}",
-        hidden="H_{ij}",
-        readout="R_{ij}",
-        rate=r"\lambda [1/s]",
-        input_offset="u_0 [{u}]",
-        input_scale="u_s [{u}]",
-        output_offset="y_0 [{y}]",
-        output_scale="y_s [{y}]",
     )
 
-    linear: fields.Rows
-    hidden: fields.Rows
-    readout: fields.Rows
-    rate: fields.Positive
-    input_offset: FiniteFloat = 0.0
-    input_scale: fields.Positive = 1.0
-    output_offset: FiniteFloat = 0.0
-    output_scale: fields.Positive = 1.0
+    linear: Annotated[fields.Rows, "L_{ij}"]
+    hidden: Annotated[fields.Rows, "H_{ij}"]
+    readout: Annotated[fields.Rows, "R_{ij}"]
+    rate: Annotated[fields.Positive, r"\lambda [1/s]"]
+    input_offset: Annotated[FiniteFloat, "u_0 [{u}]"] = 0.0
+    input_scale: Annotated[fields.Positive, "u_s [{u}]"] = 1.0
+    output_offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
+    output_scale: Annotated[fields.Positive, "y_s [{y}]"] = 1.0
     substeps: Substeps = 1
     hold: Hold = "first"
     initial: fields.StoredInitial = "first_sample"

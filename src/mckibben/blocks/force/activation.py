@@ -21,7 +21,6 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Ports
 from mckibben.blocks.hysteresis.play_operators import check_order
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.sample_times import needs_sample_time, rate_filter
 from mckibben.errors import ModelError
 
@@ -134,33 +133,24 @@ class ActivationPressure(Block):
         *((0.0, 0.0, 0.01, 0.3), (0.27, 0.67), 1.0),
     )
     n_states = 2  # previous contraction and filtered rate
-    notation = Notation(
+    formulas = (
         r"p = \sum_{k=0}^{3} b_k(F)\, \epsilon^k + \gamma\, \phi(F)\, \dot{\epsilon}",
         r"\text{the cubic goes through } (\epsilon_j(F),\, y_j(F)),\; j = 1, \ldots, 4,\; "
         r"\text{each coordinate a cubic of } F",
         r"\gamma = \gamma_1 \nu + \gamma_2,\quad \phi(F) = \phi_1 F^3 + \phi_2 F^2 + "
         r"\phi_3 F + \phi_4",
-        contractions=r"\epsilon_k [1/N^3|1/N^2|1/N|1]",
-        pressures="y_k [bar/N^3|bar/N^2|bar/N|bar]",
-        phi=r"\phi_k [bar s/N^3|bar s/N^2|bar s/N|bar s]",
-        gamma=r"\gamma_k [1/Hz|1]",
-        frequency=r"\nu [Hz]",
-        rate_time_constant="T [s]",
-        input=r"\epsilon",
-        force="F",
-        output="p",
     )
 
-    contractions: fields.Vector
-    pressures: fields.Vector
-    phi: fields.Vector
-    gamma: tuple[FiniteFloat, FiniteFloat]
-    frequency: fields.NotNegative
-    rate_time_constant: fields.NotNegative = 0.0
+    contractions: Annotated[fields.Vector, r"\epsilon_k [1/N^3|1/N^2|1/N|1]"]
+    pressures: Annotated[fields.Vector, "y_k [bar/N^3|bar/N^2|bar/N|bar]"]
+    phi: Annotated[fields.Vector, r"\phi_k [bar s/N^3|bar s/N^2|bar s/N|bar s]"]
+    gamma: Annotated[tuple[FiniteFloat, FiniteFloat], r"\gamma_k [1/Hz|1]"]
+    frequency: Annotated[fields.NotNegative, r"\nu [Hz]"]
+    rate_time_constant: Annotated[fields.NotNegative, "T [s]"] = 0.0
     initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.CONTRACTION
-    force: fields.ChannelField = fields.FORCE
-    output: fields.ChannelField = fields.PRESSURE
+    input: Annotated[fields.ChannelField, r"\epsilon"] = fields.CONTRACTION
+    force: Annotated[fields.ChannelField, "F"] = fields.FORCE
+    output: Annotated[fields.ChannelField, "p"] = fields.PRESSURE
     frequency_range: tuple[fields.NotNegative, fields.NotNegative] | None = None
 
     def __post_init__(self) -> None:
@@ -280,40 +270,28 @@ class ActivationMemory(Block):
         *((2.0, 0.5, 1.5, 0.1, 0.2, 0.0), (0.2, 0.8), (0.3, 0.2, 0.1, 0.0), (0.05, 0.01)),
         *((0.1, 0.02), (0.5,), 2, 1, (2.5, 2.5), (2.5, 2.5)),
     )
-    notation = Notation(
+    formulas = (
         r"p = \sum_{ij} c_{ij} x^i f^j + \sum_k (a_k + b_k f) S_k[\epsilon] + (d_0 + d_1 "
         r"f) \dot{\epsilon} + \sum_m (g_m + h_m f)(x_m - x)",
         r"x = (\epsilon - \epsilon_1) / \epsilon_2,\quad f = (F - F_1) / F_2,\quad "
         r"S_k[\epsilon] = \epsilon - F_{r_k}[\epsilon],\quad \tau_m \dot{x}_m = x - x_m",
-        surface="c_k [bar]",
-        thresholds="r_k",
-        friction="a_k [bar]",
-        viscosity="d_k from 0 [bar s]",
-        relaxation="g_k [bar]",
-        time_constants=r"\tau_m [s]",
-        input_scale=r"\epsilon_i",
-        force_scale="F_i [N]",
-        rate_time_constant="T [s]",
-        input=r"\epsilon",
-        force="F",
-        output="p",
     )
 
-    surface: fields.Vector
-    thresholds: fields.PositiveVector
-    friction: fields.Vector
-    viscosity: tuple[FiniteFloat, FiniteFloat]
-    relaxation: fields.Vector
-    time_constants: fields.PositiveVector
+    surface: Annotated[fields.Vector, "c_k [bar]"]
+    thresholds: Annotated[fields.PositiveVector, "r_k"]
+    friction: Annotated[fields.Vector, "a_k [bar]"]
+    viscosity: Annotated[tuple[FiniteFloat, FiniteFloat], "d_k from 0 [bar s]"]
+    relaxation: Annotated[fields.Vector, "g_k [bar]"]
+    time_constants: Annotated[fields.PositiveVector, r"\tau_m [s]"]
     degree: Annotated[int, Interval(ge=0, le=9)]
     force_degree: Annotated[int, Interval(ge=0, le=9)]
-    input_scale: fields.Scale
-    force_scale: fields.Scale
-    rate_time_constant: fields.NotNegative = 0.0
+    input_scale: Annotated[fields.Scale, r"\epsilon_i"]
+    force_scale: Annotated[fields.Scale, "F_i [N]"]
+    rate_time_constant: Annotated[fields.NotNegative, "T [s]"] = 0.0
     initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.CONTRACTION
-    force: fields.ChannelField = fields.FORCE
-    output: fields.ChannelField = fields.PRESSURE
+    input: Annotated[fields.ChannelField, r"\epsilon"] = fields.CONTRACTION
+    force: Annotated[fields.ChannelField, "F"] = fields.FORCE
+    output: Annotated[fields.ChannelField, "p"] = fields.PRESSURE
 
     def __post_init__(self) -> None:
         size = (self.degree + 1) * (self.force_degree + 1)

@@ -28,7 +28,6 @@ from mckibben.blocks.force.multistate_friction import (
 )
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.memoryless import Polynomial
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
@@ -93,7 +92,7 @@ class ForceFeedforward(Block):
     ports = ("law.output",), ("law.input",), ("law.pressure",)
     parameters = ("law", "friction")
     typical = (PolynomialForce((50.0, 5.0), (-10.0, 5.0)), MultistateFriction.example())
-    notation = Notation(
+    formulas = (
         r"p = \frac{f - h(l) - f_h (1 - g_p p_r)}{g(l) + g_p f_h}",
         r"f = p\, g(l) + h(l) + \left(1 + g_p (p - p_r)\right) f_h[l]",
     )

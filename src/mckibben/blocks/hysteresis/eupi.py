@@ -14,6 +14,8 @@ differ in how they write the falling edge; this general form contains them.
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
@@ -23,7 +25,6 @@ from mckibben.blocks import fields
 from mckibben.blocks.hysteresis.play_operators import check_thresholds, start_operators
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import inlined, kernel
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.solving import solved_kernels
 from mckibben.errors import ModelError
@@ -117,24 +118,20 @@ class EUPI(Invertible):
         *((1.0, 0.2, -0.02), 2.0, (0.0, 5.0)),
     )
     n_states = one_per("thresholds")  # one an operator
-    notation = Notation(
+    formulas = (
         r"y = y_0 + \sum_{k} a_k x^k + \sum_i w_i F_i[x],\quad x = u - u_{\min}",
         r"F_{i,t} = \begin{cases} \max(x_t - r_i,\, F_{i,t-1}) & x \text{ rises} \\ "
         r"\min(\alpha x_t + \beta r_i,\, F_{i,t-1}) & x \text{ falls} \end{cases}",
-        thresholds="r_i [{u}]",
-        weights="w_i [{y}/{u}]",
-        falling_slope=r"\alpha",
-        falling_threshold=r"\beta",
-        polynomial="a_k [{y}/{u}|{y}/{u}^2|{y}/{u}^3]",
-        offset="y_0 [{y}]",
     )
 
-    thresholds: fields.Vector
-    weights: fields.Vector
-    falling_slope: fields.Positive
-    falling_threshold: fields.NotNegative
-    polynomial: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-    offset: FiniteFloat
+    thresholds: Annotated[fields.Vector, "r_i [{u}]"]
+    weights: Annotated[fields.Vector, "w_i [{y}/{u}]"]
+    falling_slope: Annotated[fields.Positive, r"\alpha"]
+    falling_threshold: Annotated[fields.NotNegative, r"\beta"]
+    polynomial: Annotated[
+        tuple[FiniteFloat, FiniteFloat, FiniteFloat], "a_k [{y}/{u}|{y}/{u}^2|{y}/{u}^3]"
+    ]
+    offset: Annotated[FiniteFloat, "y_0 [{y}]"]
     input_range: fields.InputRange
     initial: fields.StoredInitial = "first_sample"
     input: fields.ChannelField = fields.PRESSURE

@@ -42,7 +42,6 @@ from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import inlined, kernel, step, summing_step
 from mckibben.blocks.learning import Learnable, learnable_operators, learning_kernels
 from mckibben.blocks.memoryless import Affine
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import one_per
 from mckibben.errors import ModelError
 
@@ -185,16 +184,14 @@ class GPI(Invertible):
     parameters = ("weights", "rising", "falling")
     n_states = one_per("thresholds", 1)  # and the previous input
     typical = ((0.0, 0.1, 0.3, 0.5), (9.0, 4.0, 2.0, 1.0), *Tanh.examples(), (0.0, 5.0))
-    notation = Notation(
+    formulas = (
         r"y = \sum_i x_i w_i",
         r"w_{i,t} = \begin{cases} \max(\gamma_R(u_t) - r_i,\, w_{i,t-1}) & u \text{ "
         r"rises} \\ \min(\gamma_L(u_t) + r_i,\, w_{i,t-1}) & u \text{ falls} \end{cases}",
-        thresholds="r_i",
-        weights="x_i [{y}]",
     )
 
-    thresholds: fields.Vector
-    weights: fields.Vector
+    thresholds: Annotated[fields.Vector, "r_i"]
+    weights: Annotated[fields.Vector, "x_i [{y}]"]
     rising: EnvelopeField
     falling: EnvelopeField
     input_range: fields.InputRange

@@ -12,6 +12,8 @@ et al. 2016 (the modified model, here with one ratio of each for all elements).
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
@@ -22,7 +24,6 @@ from mckibben.blocks.hysteresis.play_operators import check_thresholds
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.memoryless import least_slope, polynomial_at
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.solving import solve_input, solved_start
 
@@ -167,26 +168,19 @@ class MaxwellSlip(Invertible):
     )
     n_states = one_per("breakaways", 1)  # deflections and the previous input
     n_scratch = one_per("breakaways")  # what single precision loses of the deflections
-    notation = Notation(
+    formulas = (
         r"y = \sum_k c_k x^k + \sum_i w_i s_i,\quad x = \frac{u - m}{s}",
         r"s_{i,t} = \begin{cases} \min(s_{i,t-1} + \Delta u,\, r_i) & u \text{ rises} \\ "
         r"\max(s_{i,t-1} + \kappa \Delta u,\, -\lambda r_i) & u \text{ falls} \end{cases}",
-        breakaways="r_i [{u}]",
-        weights="w_i [{y}/{u}]",
-        polynomial="c_k from 0 [{y}]",
-        stiffness_ratio=r"\kappa",
-        limit_ratio=r"\lambda",
-        centre="m [{u}]",
-        scale="s [{u}]",
     )
 
-    breakaways: fields.PositiveVector
-    weights: fields.Vector
-    polynomial: fields.PolynomialField
-    stiffness_ratio: fields.Positive = 1.0
-    limit_ratio: fields.Positive = 1.0
-    centre: FiniteFloat = 0.0
-    scale: fields.Positive = 1.0
+    breakaways: Annotated[fields.PositiveVector, "r_i [{u}]"]
+    weights: Annotated[fields.Vector, "w_i [{y}/{u}]"]
+    polynomial: Annotated[fields.PolynomialField, "c_k from 0 [{y}]"]
+    stiffness_ratio: Annotated[fields.Positive, r"\kappa"] = 1.0
+    limit_ratio: Annotated[fields.Positive, r"\lambda"] = 1.0
+    centre: Annotated[FiniteFloat, "m [{u}]"] = 0.0
+    scale: Annotated[fields.Positive, "s [{u}]"] = 1.0
     input_range: fields.InputRange | None = None
     initial: fields.StoredInitial = "first_sample"
     input: fields.ChannelField = fields.PRESSURE

@@ -26,7 +26,7 @@ No estimator makes these models: they are for systems whose equations are known,
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -37,7 +37,6 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Start
 from mckibben.blocks.dynamics.repeating import Hold, Substeps
 from mckibben.blocks.kernels import Step, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import gathered
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
@@ -178,25 +177,18 @@ class BoucWenOscillator(Oscillator):
     elements = ("slope", "gamma", "delta")
     parameters = ("mass", "damping", "stiffness", "slope", "gamma", "delta", "output_offset")
     typical = (2.0, 0.004, 0.3, 0.2, 0.12, -0.15)
-    notation = Notation(
+    formulas = (
         r"m \ddot{q} + c \dot{q} + k q + z = u,\quad y = q + y_0",
         r"\dot{z} = a \dot{q} - \gamma |\dot{q}| z - \delta \dot{q} |z|",
-        mass="m [kg]",
-        damping="c [N s/mm]",
-        stiffness="k [N/mm]",
-        slope="a [N/mm]",
-        gamma=r"\gamma [1/mm]",
-        delta=r"\delta [1/mm]",
-        output_offset="y_0 [{y}]",
     )
 
-    mass: fields.Positive
-    damping: fields.NotNegative
-    stiffness: fields.Positive
-    slope: fields.Positive
-    gamma: FiniteFloat
-    delta: FiniteFloat
-    output_offset: FiniteFloat | None = None
+    mass: Annotated[fields.Positive, "m [kg]"]
+    damping: Annotated[fields.NotNegative, "c [N s/mm]"]
+    stiffness: Annotated[fields.Positive, "k [N/mm]"]
+    slope: Annotated[fields.Positive, "a [N/mm]"]
+    gamma: Annotated[FiniteFloat, r"\gamma [1/mm]"]
+    delta: Annotated[FiniteFloat, r"\delta [1/mm]"]
+    output_offset: Annotated[FiniteFloat | None, "y_0 [{y}]"] = None
     substeps: Substeps = 10
     hold: Hold = "first"
     initial: fields.StoredInitial = "first_sample"
@@ -239,28 +231,21 @@ class DuhemOscillator(Oscillator):
     elements = ("knots", "rising", "falling")
     typical = (2.0, 0.004, 0.3, (0.5, 0.2, 0.25), (0.25, 0.2, 0.5), (-2.0, 0.0, 2.0))
     parameters = ("mass", "damping", "stiffness", "rising", "falling", "output_offset")
-    notation = Notation(
+    formulas = (
         r"m \ddot{q} + c \dot{q} + k q + z = u,\quad y = q + y_0",
         r"\dot{z} = \begin{cases} r(z)\, \dot{q} & q \text{ rises} \\ s(z)\, \dot{q} & q "
         r"\text{ falls} \end{cases}",
         r"r, s \text{ straight between the knots } \zeta_k,\; r(\zeta_k) = r_k,\; "
         r"s(\zeta_k) = s_k",
-        mass="m [kg]",
-        damping="c [N s/mm]",
-        stiffness="k [N/mm]",
-        knots=r"\zeta_k [N]",
-        rising="r_k [N/mm]",
-        falling="s_k [N/mm]",
-        output_offset="y_0 [{y}]",
     )
 
-    mass: fields.Positive
-    damping: fields.NotNegative
-    stiffness: fields.Positive
-    rising: fields.Vector
-    falling: fields.Vector
-    knots: fields.Vector
-    output_offset: FiniteFloat | None = None
+    mass: Annotated[fields.Positive, "m [kg]"]
+    damping: Annotated[fields.NotNegative, "c [N s/mm]"]
+    stiffness: Annotated[fields.Positive, "k [N/mm]"]
+    rising: Annotated[fields.Vector, "r_k [N/mm]"]
+    falling: Annotated[fields.Vector, "s_k [N/mm]"]
+    knots: Annotated[fields.Vector, r"\zeta_k [N]"]
+    output_offset: Annotated[FiniteFloat | None, "y_0 [{y}]"] = None
     substeps: Substeps = 10
     hold: Hold = "first"
     initial: fields.StoredInitial = "first_sample"

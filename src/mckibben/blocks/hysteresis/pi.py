@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -41,7 +41,6 @@ from mckibben.blocks.learning import (
     learnable_operators,
     start_learning,
 )
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.sample_times import needs_sample_time, rate_filter
 from mckibben.blocks.solving import solved_kernels
@@ -144,17 +143,14 @@ class PI(Invertible):
     n_states = one_per("thresholds")  # one a play operator
     layout = ("offset", "thresholds", "weights")
     typical = ((0.0, 0.3, 0.8, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0))
-    notation = Notation(
+    formulas = (
         r"y = y_0 + \sum_i w_i F_{r_i}[u]",
         r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
-        thresholds="r_i [{u}]",
-        weights="w_i [{y}/{u}]",
-        offset="y_0 [{y}]",
     )
 
-    thresholds: fields.Vector
-    weights: fields.Vector
-    offset: FiniteFloat = 0.0
+    thresholds: Annotated[fields.Vector, "r_i [{u}]"]
+    weights: Annotated[fields.Vector, "w_i [{y}/{u}]"]
+    offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
     input_range: fields.InputRange | None = None
     initial: fields.StoredInitial = "first_sample"
     input: fields.ChannelField = fields.PRESSURE
@@ -270,21 +266,16 @@ class RateDependentPI(Invertible):
         *(2.0, 0.1, (0.0, 5.0)),
     )
     n_states = one_per("thresholds", 2)  # operators, previous input and filtered rate
-    notation = Notation(
+    formulas = (
         r"y = y_0 + \sum_i (d_i + k_i v) F_{r_i}[u],\quad T \dot{v} = \dot{u} - v",
         r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
-        thresholds="r_i [{u}]",
-        rate_weights="k_i [{y} s/{u}^2]",
-        weights="d_i [{y}/{u}]",
-        offset="y_0 [{y}]",
-        rate_time_constant="T [s]",
     )
 
-    thresholds: fields.Vector
-    rate_weights: fields.Vector
-    weights: fields.Vector
-    offset: FiniteFloat = 0.0
-    rate_time_constant: fields.NotNegative = 0.0
+    thresholds: Annotated[fields.Vector, "r_i [{u}]"]
+    rate_weights: Annotated[fields.Vector, "k_i [{y} s/{u}^2]"]
+    weights: Annotated[fields.Vector, "d_i [{y}/{u}]"]
+    offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
+    rate_time_constant: Annotated[fields.NotNegative, "T [s]"] = 0.0
     input_range: fields.InputRange | None = None
     initial: fields.StoredInitial = "first_sample"
     input: fields.ChannelField = fields.PRESSURE

@@ -10,6 +10,7 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator", Eq. (3) with both envelope
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -19,7 +20,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import VIRGIN, Block
 from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, StoredInitial
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 
@@ -210,12 +210,9 @@ class Play(Block):
     parameters = ("threshold",)
     n_states = 1  # the operator's own output
     typical = (0.5,)
-    notation = Notation(
-        r"y = F_r[u],\quad F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
-        threshold="r [{u}]",
-    )
+    formulas = (r"y = F_r[u],\quad F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",)
 
-    threshold: FiniteFloat
+    threshold: Annotated[FiniteFloat, "r [{u}]"]
     initial: StoredInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT

@@ -24,7 +24,7 @@ Preisach model by Banks, Kurdila and Webb, 1997.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -34,7 +34,6 @@ from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import Parametrised, one_per
 from mckibben.blocks.solving import solved_kernels, solved_start
 from mckibben.errors import ModelError
@@ -60,9 +59,9 @@ class Triangle(Parametrised):
     increasing: ClassVar[tuple[str, ...]] = ("levels",)
     parameters = ("weights", "offset")
 
-    levels: fields.Vector
-    weights: fields.Vector
-    offset: FiniteFloat = 0.0
+    levels: Annotated[fields.Vector, "a_i [{u}]"]
+    weights: Annotated[fields.Vector, "w_k [{y}]"]
+    offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
     initial: fields.StoredInitial = "first_sample"
     input: fields.ChannelField = fields.PRESSURE
     output: fields.ChannelField = fields.DISPLACEMENT
@@ -287,13 +286,10 @@ class Preisach(Triangle, Invertible):
     inverse_kernel = preisach_inverse_step
     inverse_start_kernel = solved_start(first_output, preisach_start, 1)
     n_states = CLIPPED
-    notation = Notation(
+    formulas = (
         r"y = y_0 + \sum_{j \le i} w_{ij} \left(1 + R_{ij}[u]\right)",
         r"R_{ij}[u] = +1 \text{ once } u \text{ rose through cell } i,\; -1 \text{ once "
         "it fell through cell } j",
-        levels="a_i [{u}]",
-        weights="w_k [{y}]",
-        offset="y_0 [{y}]",
     )
 
     def table(self) -> Array:
@@ -412,15 +408,12 @@ class KrasnoselskiiPokrovskii(Triangle, Invertible):
         ridges_output, ridges_advance, ridges_start
     )
     n_states = one_per("weights", 1)  # operators and the previous input
-    notation = Notation(
+    formulas = (
         r"y = y_0 + \sum_{j \le i} w_{ij} s_{ij}",
         r"s_{ij,t} = \begin{cases} \max(s_{ij,t-1},\, \rho_i(u_t)) & u \text{ rises} \\ "
         r"\min(s_{ij,t-1},\, \rho_j(u_t)) & u \text{ falls} \end{cases}",
         r"\rho_i(u) = \min\left(\max\left(\frac{u - a_i}{a_{i+1} - a_i},\, 0\right),\, "
         r"1\right)",
-        levels="a_i [{u}]",
-        weights="w_k [{y}]",
-        offset="y_0 [{y}]",
     )
 
     def coefficients(self, sample_time: float | None) -> Array:

@@ -42,7 +42,7 @@ def elastic_plastic_start(coefficients: Array, state: Array, inputs: Array, virg
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class ElasticPlastic(Invertible):
+class ElasticPlastic(fields.WithMemory, Invertible):
     """Elastic-plastic model.
 
     Parameters
@@ -67,9 +67,6 @@ class ElasticPlastic(Invertible):
     weight: Annotated[FiniteFloat, "w [{y}/{u}]"]
     threshold: Annotated[fields.NotNegative, "r [{u}]"]
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
     n_states = 1
 
     def peaks(self) -> Array:  # input from which the operator just returns to its lowest state

@@ -119,9 +119,6 @@ class Block(DrawsItself, Parametrised):
     instead: ClassVar[str] = "invert a hysteresis model (pi, gpi, mpi, cpi)"
     """The remedy of that error."""
 
-    increasing: ClassVar[tuple[str, ...]] = ()
-    """Fields that must be strictly increasing, also after rounding to single precision."""
-
     is_linear: ClassVar[bool] = False
     """Whether outputs are linear in inputs and state, but for constant offsets."""
 

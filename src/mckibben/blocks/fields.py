@@ -67,6 +67,15 @@ NotNegative = Annotated[FiniteFloat, Ge(0)]
 PositiveVector = Annotated[
     tuple[Positive, ...], MaxLen(MOST_NUMBERS), BeforeValidator(plain_sequence)
 ]
+NotNegativeVector = Annotated[
+    tuple[NotNegative, ...], MaxLen(MOST_NUMBERS), BeforeValidator(plain_sequence)
+]
+Thresholds = Annotated[NotNegativeVector, MinLen(1)]
+"""Thresholds of operators, at least one."""
+
+Knots = Annotated[Vector, MinLen(2)]
+"""Places between which a function is straight."""
+
 PositiveRows = Annotated[tuple[PositiveVector, ...], BeforeValidator(rows)]
 
 Scale = tuple[FiniteFloat, Positive]
@@ -177,3 +186,20 @@ DISPLACEMENT = Channel("displacement", "mm")
 FORCE = Channel("force", "N")
 LENGTH = Channel("length", "mm")
 CONTRACTION = Channel("contraction", "")
+
+
+@validated_dataclass(frozen=True, kw_only=True, repr=False, config=STRICT)
+class WithMemory:
+    """Fields of a block of one input and one output that has memory.
+
+    Parameters
+    ----------
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT

@@ -116,20 +116,6 @@ def interpolate(x: float, knots: Array, values: Array) -> float:
     return values[high] - slope * (knots[high] - x)
 
 
-def check_increasing(what: str, knots: Sequence[float], values: Sequence[float]) -> None:
-    """Raise an error for fewer than two knots, or for knots or values that do not increase."""
-    if len(knots) < 2 or len(knots) != len(values):
-        raise ModelError(
-            f"a {what} has {len(knots)} knots and {len(values)} values",
-            remedy="give at least two knots and one value to each",
-        )
-    for name, numbers in (("knots", knots), ("values", values)):
-        if np.any(np.diff(numbers) <= 0):
-            raise ModelError(
-                f"the {name} of a {what} do not increase", remedy=f"give increasing {name}"
-            )
-
-
 @step
 def piecewise_linear_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Interpolate; coefficients are [knots, values]."""
@@ -155,7 +141,7 @@ class PiecewiseLinear(Block):
 
     kind = "piecewise-linear"
     kernel = piecewise_linear_step
-    increasing = ("knots", "values")
+    increasing = same_length = ("knots", "values")
     parameters = ("values",)
     layout = ("knots", "values")
     typical = ((0.0, 5.0, 15.0, 25.0), (0.0, 8.0, 20.0, 24.0))
@@ -164,13 +150,10 @@ class PiecewiseLinear(Block):
         r"\le \xi_{k+1}",
     )
 
-    knots: Annotated[fields.Vector, r"\xi_k [{u}]"]
+    knots: Annotated[fields.Knots, r"\xi_k [{u}]"]
     values: Annotated[fields.Vector, "v_k [{y}]"]
     input: fields.ChannelField = fields.DISPLACEMENT
     output: fields.ChannelField = fields.DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_increasing(f"{self.kind} block", self.knots, self.values)
 
     def inverse(self) -> PiecewiseLinear:
         return PiecewiseLinear(self.values, self.knots, self.output, self.input)

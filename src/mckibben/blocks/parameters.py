@@ -61,12 +61,15 @@ class Checked(ABCMeta):
     def __call__(cls: type[Made], /, *values: Any, **named: Any) -> Made:
         """Return an instance, its fields validated."""
         try:
-            return super().__call__(*values, **named)  # type: ignore[misc]
+            made: Made = super().__call__(*values, **named)  # type: ignore[misc]
+            if isinstance(made, Parametrised):
+                _check_declared(made)
+            return made
         except UNCOMPUTABLE as error:
             raise _beyond_sense(cls, error) from error
         except ValidationError as error:
             first = error.errors()[0]
-            names = [field.name for field in fields(cls)]  # type: ignore[arg-type]
+            names = [field.name for field in fields(cls) if not field.kw_only]  # type: ignore[arg-type]
             field, *inside = first["loc"]
             if isinstance(field, int):
                 field = names[field] if field < len(names) else f"argument {field + 1}"
@@ -77,6 +80,20 @@ class Checked(ABCMeta):
                 f"{where} of {kind!r}: {first['msg']}{given}",
                 remedy=f"give what {cls.__name__} documents",
             ) from None
+
+
+def _check_declared(part: Parametrised) -> None:
+    """Raise an error for fields that do not increase, or have not as many entries, as declared."""
+    for name in part.increasing:
+        if np.any(np.diff(getattr(part, name)) <= 0):
+            raise ModelError(
+                f"the {name} of {part.kind!r} do not increase",
+                remedy="sort them and drop repeated ones",
+            )
+    sizes = {name: len(getattr(part, name)) for name in part.same_length}
+    if len(set(sizes.values())) > 1:
+        listed = ", ".join(f"{size} {name}" for name, size in sizes.items())
+        raise ModelError(f"{part.kind!r} has {listed}", remedy="give as many of each")
 
 
 class Parametrised(metaclass=Checked):
@@ -91,6 +108,12 @@ class Parametrised(metaclass=Checked):
 
     parameters: ClassVar[tuple[str, ...]] = ()
     """Names of the fields, in the order of the vector."""
+
+    increasing: ClassVar[tuple[str, ...]] = ()
+    """Fields that must be strictly increasing, also after rounding to single precision."""
+
+    same_length: ClassVar[tuple[str, ...]] = ()
+    """Fields of which each has as many entries."""
 
     formulas: ClassVar[tuple[str, ...]] = ()
     """Its equations, in LaTeX; symbols are declared with the fields, see `mckibben.blocks.notation`."""

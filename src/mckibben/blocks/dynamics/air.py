@@ -23,7 +23,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Le
-from pydantic import FiniteFloat
+from pydantic import Field, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
@@ -130,7 +130,7 @@ def air_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: 
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class Air(Invertible):
+class Air(fields.WithMemory, Invertible):
     """Valve or regulator with air, from command to measured pressure.
 
     Parameters
@@ -183,9 +183,8 @@ class Air(Invertible):
     ambient: Annotated[FiniteFloat | None, r"p_{\min} [{y}]"] = 0.0
     supply: Annotated[FiniteFloat | None, r"p_{\max} [{y}]"] = None
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.Channel("voltage", "V")
-    output: fields.ChannelField = fields.PRESSURE
+    input: fields.ChannelField = Field(default=fields.Channel("voltage", "V"), kw_only=True)
+    output: fields.ChannelField = Field(default=fields.PRESSURE, kw_only=True)
 
     def __post_init__(self) -> None:
         lowest, highest = self.pressures

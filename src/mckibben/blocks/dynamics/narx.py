@@ -26,7 +26,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Start
-from mckibben.blocks.hysteresis.play_operators import check_order, start_operators
+from mckibben.blocks.hysteresis.play_operators import start_operators
 from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.sample_times import own_sample_time
 from mckibben.errors import ModelError
@@ -166,7 +166,7 @@ def network(coefficients: Array, state: Array) -> float:
 
 
 @dataclass(frozen=True, kw_only=True, config=fields.STRICT)
-class Narx(Block):
+class Narx(fields.WithMemory, Block):
     """Fields and states shared by NARX models.
 
     Parameters
@@ -185,26 +185,21 @@ class Narx(Block):
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: at rest at the first input, which may have risen
         there; or at rest with the operators at the centre.
-    input, output : Channel
-        Channel driven and channel given.
     """
 
     rate_dependent = True
+    increasing = ("thresholds",)
     no_inverse = "has no exact inverse: its output need not increase with its input"
 
     output_lags: Lags
     input_lags: Lags
     delay: Lags = 0
-    thresholds: Annotated[fields.Vector, "r_i"] = ()
+    thresholds: Annotated[fields.NotNegativeVector, "r_i"] = ()
     input_scale: Annotated[fields.Scale, "u_i [{u}]"]
     output_scale: Annotated[fields.Scale, "y_i [{y}]"]
     sample_time: Annotated[fields.Positive, "T [s]"]
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
-        check_order(self.kind, self.thresholds)
         if not self.places:
             raise ModelError(f"{self.kind!r} has no regressors", remedy="give a lag or an operator")
 

@@ -64,7 +64,7 @@ def process_model_start(coefficients: Array, state: Array, inputs: Array, virgin
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class ProcessModel(Block):
+class ProcessModel(fields.WithMemory, Block):
     """Gain, one to three lags, optional zero and delay, about an operating point.
 
     Parameters
@@ -85,8 +85,6 @@ class ProcessModel(Block):
         What the input does between samples: go on in a straight line, or stay.
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: at rest at the first input, or at the operating point.
-    input, output : Channel
-        Channel driven and channel given.
     """
 
     kind = "process-model"
@@ -105,9 +103,6 @@ class ProcessModel(Block):
     input_offset: Annotated[FiniteFloat, "u_0 [{u}]"] = 0.0
     output_offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
     hold: Literal["first", "zero"] = "first"
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         n = len(self.time_constants)

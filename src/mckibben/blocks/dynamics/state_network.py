@@ -119,7 +119,7 @@ def state_network_start(
 
 
 @dataclass(frozen=True, kw_only=True, config=fields.STRICT)
-class StateNetwork(Block):
+class StateNetwork(fields.WithMemory, Block):
     """State-space model of a linear part and tanh units.
 
     Parameters
@@ -141,8 +141,6 @@ class StateNetwork(Block):
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: as after the first input has long been held, or states
         and input 0.
-    input, output : Channel
-        Channel driven and channel given.
     """
 
     kind = "state-network"
@@ -168,9 +166,7 @@ class StateNetwork(Block):
     output_scale: Annotated[fields.Positive, "y_s [{y}]"] = 1.0
     substeps: Substeps = 1
     hold: Hold = "first"
-    initial: fields.StoredInitial = "first_sample"
     input: fields.ChannelField = fields.FORCE
-    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         n, units = len(self.linear), len(self.hidden)

@@ -57,7 +57,7 @@ def filter_start(coefficients: Array, state: Array, inputs: Array, virgin: bool)
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class TransferFunction(Block):
+class TransferFunction(fields.WithMemory, Block):
     """Discrete transfer function about an operating point.
 
     Parameters
@@ -73,8 +73,6 @@ class TransferFunction(Block):
         u_0 and y_0, the operating point.
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: at rest at the first input, or at u_0.
-    input, output : Channel
-        Channel driven and channel given.
     noise_numerator, noise_denominator : sequence of float
         c_1, c_2, ... and d_1, d_2, ... of the noise model C / D, its leading ones left out.
     noise_deviation : float or None
@@ -106,9 +104,6 @@ class TransferFunction(Block):
     sample_time: Annotated[fields.Positive, "T [s]"]
     input_offset: Annotated[FiniteFloat, "u_0 [{u}]"] = 0.0
     output_offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
     noise_numerator: Annotated[fields.Coefficients, "c_k"] = ()
     noise_denominator: Annotated[fields.Coefficients, "d_k"] = ()
     noise_deviation: Annotated[fields.NotNegative | None, r"\sigma_e [{y}]"] = None
@@ -176,7 +171,7 @@ class TransferFunction(Block):
             self.sample_time,
             self.output_offset,
             self.input_offset,
-            self.initial if isinstance(self.initial, str) else "first_sample",
-            self.output,
-            self.input,
+            initial=self.initial if isinstance(self.initial, str) else "first_sample",
+            input=self.output,
+            output=self.input,
         )

@@ -33,16 +33,27 @@ def braid(angle: float, diameter: float) -> tuple[float, float, float]:
     return area, 3.0 / math.tan(angle) ** 2, 1.0 / math.sin(angle) ** 2
 
 
-class ForceLaw(Block):
-    """A static force law: from length [mm], scheduled by pressure [bar], to force [N]."""
+@dataclass(frozen=True, kw_only=True, repr=False, config=fields.STRICT)
+class ForceByLength:
+    """Channels of a force by length, scheduled by pressure.
+
+    Parameters
+    ----------
+    input, pressure, output : Channel
+        Length [mm], pressure [bar] and force [N].
+    """
+
+    input: Annotated[fields.ChannelField, "l"] = fields.LENGTH
+    pressure: Annotated[fields.ChannelField, "p"] = fields.PRESSURE
+    output: Annotated[fields.ChannelField, "f"] = fields.FORCE
+
+
+class ForceLaw(ForceByLength, Block):
+    """A static force law: from length, scheduled by pressure, to force."""
 
     ports = ("input",), ("pressure",), ("output",)
     no_inverse = "has no inverse by length, since several lengths may have the same force"
     instead = "for the pressure that gives a force at a length, use ForceFeedforward(law)"
-
-    input: fields.Channel
-    pressure: fields.Channel
-    output: fields.Channel
 
     terms_kernel: ClassVar[Callable[[float, Array], tuple[float, float]]]
     """Computes force per pressure [N/bar] and force at zero pressure [N] from a length and
@@ -105,8 +116,6 @@ class PolynomialForce(ForceLaw):
         h, ascending, [N]; at least one.
     centre, scale : float
         Of the length [mm]; scale positive.
-    input, pressure, output : Channel
-        Length, pressure and force.
     """
 
     kind = "polynomial-force"
@@ -120,9 +129,6 @@ class PolynomialForce(ForceLaw):
     elastic: Annotated[fields.PolynomialField, "h_j from 0 [N]"]
     centre: Annotated[FiniteFloat, "m [mm]"] = 0.0
     scale: Annotated[fields.Positive, "s [mm]"] = 1.0
-    input: Annotated[fields.ChannelField, "l"] = fields.LENGTH
-    pressure: Annotated[fields.ChannelField, "p"] = fields.PRESSURE
-    output: Annotated[fields.ChannelField, "f"] = fields.FORCE
 
     def unscaled(self) -> Self:
         """Return the same law as polynomials of the unscaled length, as printed in papers."""
@@ -168,8 +174,6 @@ class ChouHannaford(ForceLaw):
         n, positive.
     constant : float
         Added [N].
-    input, pressure, output : Channel
-        Length, pressure and force.
     """
 
     kind = "chou-hannaford"
@@ -182,9 +186,6 @@ class ChouHannaford(ForceLaw):
     thread_length: Annotated[fields.Positive, "b [mm]"]
     turns: Annotated[fields.Positive, "n"]
     constant: Annotated[FiniteFloat, "c [N]"] = 0.0
-    input: Annotated[fields.ChannelField, "l"] = fields.LENGTH
-    pressure: Annotated[fields.ChannelField, "p"] = fields.PRESSURE
-    output: Annotated[fields.ChannelField, "f"] = fields.FORCE
 
     def coefficients(self, sample_time: float | None) -> Array:
         per_bar = 3 * NEWTONS_PER_BAR / (4 * math.pi * self.turns**2)
@@ -240,8 +241,6 @@ class TonduLopez(ForceLaw):
         kappa_1 and kappa_0.
     constant : float
         Added [N].
-    input, pressure, output : Channel
-        Length, pressure and force.
     """
 
     kind = "tondu-lopez"
@@ -263,9 +262,6 @@ class TonduLopez(ForceLaw):
     mu: Annotated[tuple[FiniteFloat, FiniteFloat], r"\mu_i"] = (0.0, 1.0)
     kappa: Annotated[tuple[FiniteFloat, FiniteFloat], r"\kappa_i"] = (0.0, 1.0)
     constant: Annotated[FiniteFloat, "c [N]"] = 0.0
-    input: Annotated[fields.ChannelField, "l"] = fields.LENGTH
-    pressure: Annotated[fields.ChannelField, "p"] = fields.PRESSURE
-    output: Annotated[fields.ChannelField, "f"] = fields.FORCE
 
     def coefficients(self, sample_time: float | None) -> Array:
         cylinder = braid(self.braid_angle, self.diameter)

@@ -26,12 +26,13 @@ from dataclasses import replace
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, FiniteFloat
+from pydantic import BeforeValidator, Field, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block
+from mckibben.blocks.force.laws import ForceByLength
 from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.sample_times import needs_sample_time
@@ -144,7 +145,7 @@ def multistate_friction_start(
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class MultistateFriction(Block):
+class MultistateFriction(ForceByLength, Block):
     """Friction force by length, with elements that switch with the direction of motion.
 
     Parameters
@@ -162,8 +163,6 @@ class MultistateFriction(Block):
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: as if the length had only grown, or nothing
         deflected.
-    input, pressure, output : Channel
-        Length, pressure and force.
     """
 
     kind = "multistate-friction"
@@ -194,10 +193,7 @@ class MultistateFriction(Block):
     values: fields.PositiveVector
     pressure_gain: Annotated[FiniteFloat, "g_p [1/bar]"] = 0.0
     reference_pressure: Annotated[FiniteFloat, "p_r [bar]"] = 0.0
-    initial: fields.StoredInitial = "first_sample"
-    input: Annotated[fields.ChannelField, "l"] = fields.LENGTH
-    pressure: Annotated[fields.ChannelField, "p"] = fields.PRESSURE
-    output: Annotated[fields.ChannelField, "f"] = fields.FORCE
+    initial: fields.StoredInitial = Field(default="first_sample", kw_only=True)
 
     def __post_init__(self) -> None:
         wanted = sum(SIZES[element] for element in self.elements)

@@ -161,7 +161,7 @@ def bouc_wen_output(u: float, z: float, c: Array) -> float:
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class BoucWen(Invertible):
+class BoucWen(fields.WithMemory, Invertible):
     """Normalised Bouc-Wen model with a reversible polynomial.
 
     Parameters
@@ -181,8 +181,8 @@ class BoucWen(Invertible):
         Of the input in the polynomial; scale positive.
     input_range : (float, float), optional
         Lowest and highest input; the inverse needs it and clips there.
-    initial, input, output
-        Default memory before the first sample, z = 1 or virgin z = 0, and the channels driven and given.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample, z = 1 or virgin z = 0.
     """
 
     kind = "bouc-wen"
@@ -209,9 +209,6 @@ class BoucWen(Invertible):
     centre: Annotated[FiniteFloat, "m [{u}]"] = 0.0
     scale: Annotated[fields.Positive, "s [{u}]"] = 1.0
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
 
     def least_slope(self) -> float:
         steepest = self.rate * max(1.0, 2.0 * self.sigma)
@@ -254,7 +251,7 @@ def generalized_output(u: float, z: float, c: Array) -> float:
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class GeneralizedBoucWen(Invertible):
+class GeneralizedBoucWen(fields.WithMemory, Invertible):
     """Generalized Bouc-Wen model with a reversible polynomial.
 
     Parameters
@@ -274,8 +271,8 @@ class GeneralizedBoucWen(Invertible):
         Of the input in the polynomial; scale positive.
     input_range : (float, float), optional
         Lowest and highest input; the inverse needs it and clips there.
-    initial, input, output
-        Default memory before the first sample, z = 1 or virgin z = 0, and the channels driven and given.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample, z = 1 or virgin z = 0.
     """
 
     kind = "generalized-bouc-wen"
@@ -307,9 +304,6 @@ class GeneralizedBoucWen(Invertible):
     centre: Annotated[FiniteFloat, "m [{u}]"] = 0.0
     scale: Annotated[fields.Positive, "s [{u}]"] = 1.0
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         if len(self.shape) != 5 or not np.abs(self.shape).sum() < 1:
@@ -380,7 +374,7 @@ def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: flo
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class Duhem(Invertible):
+class Duhem(fields.WithMemory, Invertible):
     """Duhem model with polynomial limit curve and polynomial slope.
 
     Parameters
@@ -397,8 +391,6 @@ class Duhem(Invertible):
         Lowest and highest input; the inverse needs it and clips there.
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: on the curve of inputs that have only risen, or on f.
-    input, output : Channel
-        Channel driven and channel given.
     """
 
     kind = "duhem"
@@ -422,9 +414,6 @@ class Duhem(Invertible):
     centre: Annotated[FiniteFloat, "m [{u}]"] = 0.0
     scale: Annotated[fields.Positive, "s [{u}]"] = 1.0
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [alpha, centre, scale, P rising, P falling, f], padded to the length of P."""

@@ -19,9 +19,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.fields import STRICT, Positive, Vector
+from mckibben.blocks.fields import STRICT, Knots, Positive, Vector
 from mckibben.blocks.kernels import inlined, kernel
-from mckibben.blocks.memoryless import check_increasing, interpolate
+from mckibben.blocks.memoryless import interpolate
 from mckibben.blocks.parameters import Parametrised
 from mckibben.blocks.saving import part_from_dict
 from mckibben.errors import ModelError
@@ -50,9 +50,6 @@ def envelope_kernel(function: Callable[[float, Array], float]) -> EnvelopeKernel
 
 class Envelope(Parametrised):
     """A strictly increasing function of the input, with its inverse."""
-
-    increasing: ClassVar[tuple[str, ...]] = ()
-    """Fields that must be strictly increasing, also after rounding to single precision."""
 
     value: ClassVar[EnvelopeKernel]
     inverse: ClassVar[EnvelopeKernel]
@@ -210,7 +207,7 @@ class PiecewiseLinear(Envelope):
     kind = "piecewise-linear"
     value = piecewise_linear_value
     inverse = piecewise_linear_inverse
-    increasing = ("knots", "values")
+    increasing = same_length = ("knots", "values")
     parameters = ("values",)
     typical = (
         ((0.0, 1.0, 2.5, 4.0, 5.0), (0.0, 0.1, 0.5, 0.9, 1.0)),
@@ -221,11 +218,8 @@ class PiecewiseLinear(Envelope):
         r"\xi_k \le u \le \xi_{k+1}",
     )
 
-    knots: Annotated[Vector, r"\xi_k [{u}]"]
+    knots: Annotated[Knots, r"\xi_k [{u}]"]
     values: Annotated[Vector, "v_k"]
-
-    def __post_init__(self) -> None:
-        check_increasing("piecewise-linear envelope", self.knots, self.values)
 
     def coefficients(self) -> Array:
         """Return [knots, values]."""

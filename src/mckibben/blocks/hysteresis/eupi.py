@@ -22,7 +22,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.hysteresis.play_operators import check_thresholds, start_operators
+from mckibben.blocks.hysteresis.play_operators import start_operators
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import inlined, kernel
 from mckibben.blocks.parameters import one_per
@@ -81,7 +81,7 @@ def eupi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class EUPI(Invertible):
+class EUPI(fields.WithMemory, Invertible):
     """Extended unparallel Prandtl-Ishlinskii model.
 
     Parameters
@@ -100,8 +100,6 @@ class EUPI(Invertible):
         Constant of the output.
     input_range : (float, float)
         Lowest and highest input; x counts from the lowest, and the inverse clips to both.
-    initial, input, output
-        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "eupi"
@@ -112,6 +110,7 @@ class EUPI(Invertible):
         eupi_output, eupi_advance, eupi_start
     )
     increasing = ("thresholds",)
+    same_length = ("thresholds", "weights")
     parameters = ("weights", "falling_slope", "falling_threshold", "polynomial", "offset")
     typical = (
         *((0.0, 0.3, 0.8, 1.5), (2.0, 1.5, 1.0, 0.5), 1.1, 0.8),
@@ -124,7 +123,7 @@ class EUPI(Invertible):
         r"\min(\alpha x_t + \beta r_i,\, F_{i,t-1}) & x \text{ falls} \end{cases}",
     )
 
-    thresholds: Annotated[fields.Vector, "r_i [{u}]"]
+    thresholds: Annotated[fields.Thresholds, "r_i [{u}]"]
     weights: Annotated[fields.Vector, "w_i [{y}/{u}]"]
     falling_slope: Annotated[fields.Positive, r"\alpha"]
     falling_threshold: Annotated[fields.NotNegative, r"\beta"]
@@ -133,12 +132,6 @@ class EUPI(Invertible):
     ]
     offset: Annotated[FiniteFloat, "y_0 [{y}]"]
     input_range: fields.InputRange
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_thresholds(self.kind, self.thresholds, self.weights)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [u_0, alpha, beta, offset, a_1, a_2, a_3, thresholds, weights]."""

@@ -27,7 +27,6 @@ from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.hysteresis.play_operators import (
     check_invertible_sum,
-    check_thresholds,
     follow,
     start_operators,
     start_sum,
@@ -115,7 +114,7 @@ def pi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: 
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class PI(Invertible):
+class PI(fields.WithMemory, Invertible):
     """Classical Prandtl-Ishlinskii model.
 
     Parameters
@@ -128,8 +127,6 @@ class PI(Invertible):
         Constant of the output.
     input_range : (float, float), optional
         Lowest and highest input that may be asked for; the inverse clips there. Default none.
-    initial, input, output
-        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "pi"
@@ -139,6 +136,7 @@ class PI(Invertible):
     inverse_start_kernel = pi_inverse_start
     inverse_memory = "output"
     increasing = ("thresholds",)
+    same_length = ("thresholds", "weights")
     parameters = ("weights", "offset")
     n_states = one_per("thresholds")  # one a play operator
     layout = ("offset", "thresholds", "weights")
@@ -148,16 +146,10 @@ class PI(Invertible):
         r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
     )
 
-    thresholds: Annotated[fields.Vector, "r_i [{u}]"]
+    thresholds: Annotated[fields.Thresholds, "r_i [{u}]"]
     weights: Annotated[fields.Vector, "w_i [{y}/{u}]"]
     offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_thresholds(self.kind, self.thresholds, self.weights)
 
     def peaks(self) -> Array:
         """Return the peaks from which each operator just returns to the lowest input."""
@@ -229,7 +221,7 @@ def rate_pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class RateDependentPI(Invertible):
+class RateDependentPI(fields.WithMemory, Invertible):
     """Prandtl-Ishlinskii model whose weights are linear in the input's rate.
 
     Parameters
@@ -246,8 +238,6 @@ class RateDependentPI(Invertible):
         Time constant of the filter of the rate [s]; 0, as in the paper, for none.
     input_range : (float, float), optional
         Lowest and highest input; the inverse needs it and clips there.
-    initial, input, output
-        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "rate-dependent-pi"
@@ -260,6 +250,7 @@ class RateDependentPI(Invertible):
     inverse_memory = "input"
     rate_dependent = True
     increasing = ("thresholds",)
+    same_length = ("thresholds", "rate_weights", "weights")
     parameters = ("rate_weights", "weights", "offset")
     typical = (
         *((0.0, 0.3, 0.8, 1.5), (-0.05, 0.02, 0.04, 0.01), (3.0, 1.5, 1.0, 0.5)),
@@ -271,19 +262,12 @@ class RateDependentPI(Invertible):
         r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
     )
 
-    thresholds: Annotated[fields.Vector, "r_i [{u}]"]
+    thresholds: Annotated[fields.Thresholds, "r_i [{u}]"]
     rate_weights: Annotated[fields.Vector, "k_i [{y} s/{u}^2]"]
     weights: Annotated[fields.Vector, "d_i [{y}/{u}]"]
     offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
     rate_time_constant: Annotated[fields.NotNegative, "T [s]"] = 0.0
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_thresholds(self.kind, self.thresholds, self.weights)
-        check_thresholds(self.kind, self.thresholds, self.rate_weights)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [smoothing, gain of the rate, offset, thresholds, k, d]."""

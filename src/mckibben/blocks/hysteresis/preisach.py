@@ -24,7 +24,7 @@ Preisach model by Banks, Kurdila and Webb, 1997.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -40,7 +40,7 @@ from mckibben.errors import ModelError
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class Triangle(Parametrised):
+class Triangle(fields.WithMemory, Parametrised):
     """Fields of a model with a cell for each pair of intervals of the input levels.
 
     Parameters
@@ -52,26 +52,17 @@ class Triangle(Parametrised):
         threshold to the diagonal: w_00, w_10, w_11, w_20, ...
     offset : float
         Output with all cells down.
-    initial, input, output
-        Default memory before the first sample, and the channels driven and given.
     """
 
-    increasing: ClassVar[tuple[str, ...]] = ("levels",)
+    increasing = ("levels",)
     parameters = ("weights", "offset")
 
-    levels: Annotated[fields.Vector, "a_i [{u}]"]
+    levels: Annotated[fields.Knots, "a_i [{u}]"]
     weights: Annotated[fields.Vector, "w_k [{y}]"]
     offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         n = len(self.levels) - 1
-        if n < 1 or np.any(np.diff(self.levels) <= 0):
-            raise ModelError(
-                f"the levels of {self.kind!r} do not increase", remedy="give two or more, in order"
-            )
         fields.wide(self.input_range)
         if len(self.weights) != n * (n + 1) // 2:
             raise ModelError(

@@ -225,9 +225,8 @@ class SDCHMEstimator(CoupledEstimator):
             vector(weights),
             offset,
             (low - margin, high + margin),
-            "first_sample",
-            channel,
-            channel,
+            input=channel,
+            output=channel,
         )
 
     def hysteresis(self, run: Run, muscle: int, data: TrainingData) -> Block:

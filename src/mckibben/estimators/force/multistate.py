@@ -208,7 +208,7 @@ class MultistateEstimator(SeparableEstimator):
             tuple(values),
             0.0,
             float(np.median(data.stacked("scheduled"))),
-            self.starting_rule,
+            initial=self.starting_rule,
             **self.channels(data),
         )
 

@@ -184,9 +184,9 @@ class CreepPIEstimator(SeparableEstimator):
             vector(weights),
             float(-bottom / (top - bottom)),
             (float(low), float(high)),
-            self.starting_rule,
-            given,
-            result,
+            initial=self.starting_rule,
+            input=given,
+            output=result,
         )
         settled = offset / (1.0 + self.creep(theta)[1].sum())
         output_map = PolynomialMap(self.map_size)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Interval
@@ -49,7 +49,8 @@ class PreisachEstimator(SeparableEstimator):
         """Return the model of these levels, without weights."""
         block = Preisach if self.relays == "sudden" else KrasnoselskiiPokrovskii
         n = self.n_levels * (self.n_levels + 1) // 2
-        return block(self.levels(data), (0.0,) * n, 0.0, self.starting_rule, **self.channels(data))
+        own: dict[str, Any] = {"initial": self.starting_rule} | self.channels(data)
+        return block(self.levels(data), (0.0,) * n, 0.0, **own)
 
     def levels(self, data: TrainingData) -> tuple[float, ...]:
         """Return the levels: evenly spread over the input range."""

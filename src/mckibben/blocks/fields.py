@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, MaxLen, MinLen
+from annotated_types import Ge, Gt, Interval, MaxLen, MinLen
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, FiniteFloat
 from pydantic.dataclasses import dataclass as validated_dataclass
@@ -57,6 +57,12 @@ def rows(value: Any) -> Any:
 
 Rows = Annotated[tuple[Vector, ...], BeforeValidator(rows)]
 """Rows of finite numbers."""
+
+Substeps = Annotated[int, Interval(ge=1, le=10_000)]
+"""Steps of integration from sample to sample."""
+
+Hold = Literal["first", "zero"]
+"""Input between samples: in a straight line, or held."""
 
 LONGEST_DELAY = 254
 """Largest delay of an output [samples]."""

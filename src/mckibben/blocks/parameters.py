@@ -182,6 +182,19 @@ def plain(part: Any) -> Any:
     return part
 
 
+def with_parts(value: Any, change: Callable[[Any], Any]) -> Any:
+    """Return a value with every part in it, inner ones first, replaced by ``change(part)``."""
+    if isinstance(value, tuple):
+        items = tuple(with_parts(item, change) for item in value)
+        return value if all(a is b for a, b in zip(items, value, strict=True)) else items
+    if not (isinstance(value, Parametrised) and is_dataclass(value)):
+        return value
+    now = {field.name: getattr(value, field.name) for field in fields(value)}
+    new = {name: with_parts(item, change) for name, item in now.items()}
+    changed = {name: item for name, item in new.items() if item is not now[name]}
+    return change(replace(value, **changed) if changed else value)
+
+
 def same_as(path: str) -> Any:
     """Return a property that refers to an attribute of a part: ``"part.attribute"``."""
     return property(attrgetter(path), doc=f"``{path}``")
@@ -242,10 +255,6 @@ def leaves(value: Any, index: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int,
         yield index, value
 
 
-def one_per(field: str, more: int = 0) -> Any:
-    """Return a property: the number of entries of a field, plus ``more``."""
-
-    def size(part: Any) -> int:
-        return len(getattr(part, field)) + more
-
-    return property(size)
+def one_per(field: str, more: int = 0, *, times: int = 1) -> Any:
+    """Return a property: the number of entries of a field, ``times`` that, plus ``more``."""
+    return property(lambda part: times * len(getattr(part, field)) + more)

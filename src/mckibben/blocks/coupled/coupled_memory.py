@@ -156,7 +156,6 @@ class CoupledMemory(Block):
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether there are lags."""
         return any(self.lags)
 
     @property
@@ -165,7 +164,6 @@ class CoupledMemory(Block):
         return len(self.lags) * len(self.inputs) * (1 + len(self.thresholds[0]))
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return sizes, decays per sample, thresholds and readout."""
         step = needs_sample_time(self.kind, sample_time) if self.rate_dependent else 1.0
         head = [len(self.lags), len(self.thresholds[0]), self.degree, self.crossed]
         decays = [math.exp(-step / tau) if tau else 0.0 for tau in self.lags]
@@ -173,7 +171,6 @@ class CoupledMemory(Block):
         return np.concatenate([head, decays, radii, self.pack()])
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
-        """Return the unit of a parameter: for the readout, the output per product of inputs."""
         if field != "readout":
             return super().unit_of(field, index)
         units = [channel.unit for channel in self.inputs]
@@ -187,12 +184,10 @@ class CoupledMemory(Block):
                 for unit in units
                 for other in per[1 + len(units) : 1 + self.n_states]
             ]
-        given = self.outputs[index[0]].unit
-        return f"{given or '1'}/{per[index[1]]}" if per[index[1]].strip() else given
+        return f"{self.outputs[index[0]].unit or '1'}/{per[index[1]].strip() or '1'}"
 
     @classmethod
     def example(cls) -> Self:
-        """Return a model of two inputs and one tip."""
         width = readout_width(2, 2, 1, 2)
         readout = 0.5 / (1.0 + np.arange(width))
         return cls(

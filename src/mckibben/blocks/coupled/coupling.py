@@ -105,7 +105,6 @@ class Coupling(Block):
         return Coupling(rows(invert(self.matrix)), self.given, self.driven)
 
     def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return the range of each output over a box of inputs."""
         at_low, at_high = self.matrix.T * low, self.matrix.T * high
         return np.minimum(at_low, at_high).sum(axis=1), np.maximum(at_low, at_high).sum(axis=1)
 

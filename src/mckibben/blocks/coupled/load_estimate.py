@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
@@ -173,7 +173,6 @@ class LoadEstimate(Block):
         return self.forward.n_scratch + len(self.forward.scheduled)
 
     def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Yield the balance's."""
         return self.forward.strictly_increasing()
 
     def coefficients(self, sample_time: float | None) -> Array:
@@ -193,10 +192,10 @@ class ForceCompensator(Composition):
         displacement and on its pressure.
     """
 
-    kind: ClassVar[str] = "force-compensator"
-    inverts: ClassVar[bool] = True
-    path_dependent: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = ("forward",)
+    kind = "force-compensator"
+    inverts = True
+    path_dependent = True
+    parameters = ("forward",)
 
     forward: Annotated[InstanceOf[Block], BeforeValidator(nested)]
 
@@ -253,7 +252,6 @@ class ForceCompensator(Composition):
         return Series(self.parts).wired(board, [place, *scheduled, force])
 
     def joined(self, parts: Sequence[str]) -> str:
-        """Return the nested expression of the series."""
         return rf"p = {'['.join(reversed(parts))}[x{']' * len(parts)}"
 
     def reachable(self) -> tuple[Array, Array]:
@@ -263,7 +261,6 @@ class ForceCompensator(Composition):
 
     @classmethod
     def example(cls) -> Self:
-        """Return that of a muscle behind a length."""
         pressure, force = Channel("pressure", "bar"), Channel("force", "N")
         displacement = Channel("displacement", "mm")
         balance = Balance(

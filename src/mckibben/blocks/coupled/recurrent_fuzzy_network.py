@@ -218,7 +218,6 @@ class RecurrentFuzzyNetwork(Block):
         return past + self.n_regressors * self.n_sets
 
     def state_at(self, first: Array, output: Array) -> Array:
-        """Return the equilibrium state at the first inputs if the output is known."""
         state = self.initial_state(first, sample_time=self.sample_time)
         state[: self.output_lags] = output[0]
         return state
@@ -239,12 +238,9 @@ class RecurrentFuzzyNetwork(Block):
         return units
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
-        """Return the unit of a parameter: of a consequent, the output, or output per input."""
         if field in ("centres", "widths", "feedbacks"):
             return self._regressor_units[index[0]]
         if field != "consequents":
             return super().unit_of(field, index)
-        per = self._regressor_units
-        place = index[-1] % (len(per) + self.constants)
-        given = self.outputs[0].unit
-        return f"{given or '1'}/{per[place]}" if place < len(per) and per[place] else given
+        per = [*self._regressor_units, *[""] * self.constants]
+        return f"{self.outputs[0].unit or '1'}/{per[index[-1] % len(per)] or '1'}"

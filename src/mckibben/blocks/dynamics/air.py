@@ -244,7 +244,6 @@ class Air(fields.WithMemory, Invertible):
         return np.array([self.gain, *self.offsets, *shares, *self.pressures, round(late)])
 
     def inverse_state(self, state: Array) -> Array:
-        """Return the pressure, and a clip count of 0."""
         return np.array([state[0], 0.0])
 
     def reachable(self) -> tuple[Array, Array]:
@@ -261,7 +260,6 @@ class Air(fields.WithMemory, Invertible):
         return np.array([lowest + left]), np.array([highest - left])
 
     def inverse_complaint(self, state: Array) -> str:
-        """Return a warning about clipped references."""
         low, high = self.reachable()
         return (
             f"{int(state[-1])} sample(s) of the reference {self.output.name!r} were clipped: they are "

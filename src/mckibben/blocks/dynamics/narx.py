@@ -233,7 +233,6 @@ class Narx(fields.WithMemory, Block):
         """
 
     def state_at(self, first: Array, output: Array) -> Array | None:
-        """Return the equilibrium state at a first input if the output is known."""
         centre, half = self.output_scale
         state = self.initial_state(first, "first_sample", self.sample_time)
         state[: self.output_lags] = (float(output[0]) - centre) / half
@@ -295,7 +294,6 @@ class NarxPolynomial(Narx):
 
     @classmethod
     def example(cls) -> Self:
-        """Return a first-order model with a quadratic term and a play operator."""
         return cls(
             output_lags=1,
             input_lags=2,
@@ -373,7 +371,6 @@ class NarxNetwork(Narx):
 
     @classmethod
     def example(cls) -> Self:
-        """Return a first-order model with two units."""
         return cls(
             output_lags=1,
             input_lags=2,

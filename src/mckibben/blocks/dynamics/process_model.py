@@ -13,7 +13,7 @@ corner of the delayed input by matrix exponentials.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -102,7 +102,7 @@ class ProcessModel(fields.WithMemory, Block):
     delay: Annotated[fields.NotNegative, "T_d [s]"] = 0.0
     input_offset: Annotated[FiniteFloat, "u_0 [{u}]"] = 0.0
     output_offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
-    hold: Literal["first", "zero"] = "first"
+    hold: fields.Hold = "first"
 
     def __post_init__(self) -> None:
         n = len(self.time_constants)
@@ -134,7 +134,6 @@ class ProcessModel(fields.WithMemory, Block):
 
     @property
     def no_inverse(self) -> str:  # type: ignore[override]
-        """Why this structure has no inverse."""
         return (
             f"({self.name}) has no exact inverse: its output lags its input, so following a reference "
             "would take derivatives of it"
@@ -160,7 +159,6 @@ class ProcessModel(fields.WithMemory, Block):
         return _discretised(self, sample_time).copy()
 
     def equations(self) -> tuple[str, ...]:
-        """Return the transfer function of this structure."""
         below = r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1"
         if self.damping is None:
             below = "".join(f"(T_{{p,{k + 1}}} s + 1)" for k in range(self.order))

@@ -111,7 +111,6 @@ class TransferFunction(fields.WithMemory, Block):
 
     @property
     def n_states(self) -> int:
-        """The order."""
         return max(len(self.numerator) - 1, len(self.denominator))
 
     @property

@@ -304,7 +304,6 @@ class ActivationMemory(Activation):
 
     @property
     def n_states(self) -> int:
-        """States: play operators, previous contraction, filtered rate, relaxation."""
         return len(self.thresholds) + 2 + len(self.time_constants)
 
     def coefficients(self, sample_time: float | None) -> Array:

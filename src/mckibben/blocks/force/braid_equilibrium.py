@@ -142,7 +142,6 @@ class BraidEquilibrium(Invertible):
 
     @property
     def input_range(self) -> tuple[float, float]:
-        """Lowest and highest pressure for which the balance is solved [bar]."""
         c = self.coefficients(None)
         return float(balance(c[LOW], c)), float(balance(c[HIGH], c))
 

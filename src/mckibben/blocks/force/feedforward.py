@@ -131,12 +131,10 @@ class ForceFeedforward(Block):
 
     @property
     def forward_model(self) -> Block:
-        """The force model: the law alone, or with friction."""
         return self.law if self.friction is None else Parallel((self.law, self.friction))
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether there is friction."""
         return self.friction is not None
 
     @property
@@ -153,7 +151,6 @@ class ForceFeedforward(Block):
 
     @property
     def n_scratch(self) -> int:
-        """Scratch of the friction."""
         return 3 + (0 if self.friction is None else self.friction.n_scratch)
 
     @property

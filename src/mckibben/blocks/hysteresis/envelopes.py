@@ -58,7 +58,6 @@ class Envelope(Parametrised):
     """Arguments of `examples`."""
 
     def coefficients(self) -> Array:
-        """Return the coefficients of the kernels; by default the parameters."""
         return self.pack()
 
     def shifted(self, offset: float) -> Self:
@@ -226,5 +225,4 @@ class PiecewiseLinear(Envelope):
         return np.array([*self.knots, *self.values])
 
     def shifted(self, offset: float) -> Self:
-        """Return this envelope shifted up by a constant."""
         return replace(self, values=tuple(value + offset for value in self.values))

@@ -144,7 +144,6 @@ class EUPI(fields.WithMemory, Invertible):
         return self.input_range[0] + (1 + self.falling_threshold) * np.array(self.thresholds)
 
     def check_invertible(self) -> None:
-        """Require non-negative weights, and an increasing memoryless part."""
         if min(self.weights) < 0 or self.least_slope() <= 0:
             raise ModelError(
                 "'eupi' has no inverse: a weight is negative, or its part without memory "
@@ -153,7 +152,6 @@ class EUPI(fields.WithMemory, Invertible):
             )
 
     def least_slope(self) -> float:
-        """Return a lower bound of the slope of the memoryless part by the input."""
         low, high = self.input_range
         a1, a2, a3 = self.polynomial
         turn = -a2 / (3 * a3) if a3 else 0.0

@@ -212,7 +212,6 @@ class GPI(fields.WithMemory, Invertible):
         return np.asarray(self.rising.solve(edges[edges < self.rising(high)]))
 
     def check_invertible(self) -> None:
-        """Require a first threshold of 0, an increasing sum, and ordered envelopes within the limits."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
         gap, where = smallest_gap(self.rising, self.falling, self.input_range)
         if gap < 0:

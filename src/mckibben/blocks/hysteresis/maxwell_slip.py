@@ -187,6 +187,5 @@ class MaxwellSlip(fields.WithMemory, Invertible):
         return least_slope(self.polynomial, self.centre, self.scale, self.input_limits) + softening
 
     def peaks(self) -> Array:
-        """Return the peaks at which one more spring slips."""
         low, _ = self.input_limits
         return low + 2.0 * np.array(self.breakaways)

@@ -35,7 +35,6 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Start
-from mckibben.blocks.dynamics.repeating import Hold, Substeps
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.parameters import gathered
 from mckibben.blocks.sample_times import needs_sample_time
@@ -144,8 +143,8 @@ class Oscillator(fields.WithMemory, Block):
     damping: Annotated[fields.NotNegative, "c [N s/mm]"]
     stiffness: Annotated[fields.Positive, "k [N/mm]"]
     output_offset: Annotated[FiniteFloat | None, "y_0 [{y}]"] = Field(default=None, kw_only=True)
-    substeps: Substeps = Field(default=10, kw_only=True)
-    hold: Hold = Field(default="first", kw_only=True)
+    substeps: fields.Substeps = Field(default=10, kw_only=True)
+    hold: fields.Hold = Field(default="first", kw_only=True)
     input: fields.ChannelField = Field(default=fields.FORCE, kw_only=True)
 
     def coefficients(self, sample_time: float | None) -> Array:

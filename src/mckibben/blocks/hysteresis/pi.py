@@ -32,14 +32,8 @@ from mckibben.blocks.hysteresis.play_operators import (
     start_sum,
 )
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import kernel, step, summing_step
-from mckibben.blocks.learning import (
-    Learnable,
-    follow_learning,
-    inverse_at,
-    learnable_operators,
-    start_learning,
-)
+from mckibben.blocks.kernels import inlined, kernel, step, summing_step
+from mckibben.blocks.learning import Learnable, learnable_operators, learning_kernels
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.sample_times import needs_sample_time, rate_filter
 from mckibben.blocks.solving import solved_kernels
@@ -92,25 +86,10 @@ def pi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: b
     state[n], state[n + 1] = inputs[0], 0.0
 
 
-@step
-def pi_adaptive_step(
-    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
-) -> None:
-    """Advance the inverse of a PI model, and adapt its weights and offset to measurements."""
-    n = int(coefficients[0]) - 1
-    r = coefficients[inverse_at(coefficients) + 3 : inverse_at(coefficients) + n + 3]
-    s, last, adapted = state[:n], state[n : n + 3], state[n + 3 :]
-    follow_learning(coefficients, r, s, last, adapted, scratch, inputs[0], inputs[1])
-    outputs[0] = s[0]
-
-
-@kernel
-def pi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start as the inverse does, with the fitted weights."""
-    n = int(coefficients[0]) - 1
-    pi_inverse_start(coefficients[inverse_at(coefficients) :], state[: n + 2], inputs, virgin)
-    state[n + 2] = 0.0
-    start_learning(coefficients, state[n + 3 :])
+@inlined
+def take_edge(way: float, c: Array, state: Array, n: int) -> float:
+    """Return the input, which is the operators' edge: that of the first, without threshold."""
+    return state[0]
 
 
 @dataclass(frozen=True, config=fields.STRICT)
@@ -134,6 +113,7 @@ class PI(fields.WithMemory, Invertible):
     start_kernel = pi_start
     inverse_kernel = pi_inverse_step
     inverse_start_kernel = pi_inverse_start
+    adaptive_step, adaptive_start = learning_kernels(pi_inverse_start, take_edge, 0)
     inverse_memory = "output"
     increasing = ("thresholds",)
     same_length = ("thresholds", "weights")
@@ -156,11 +136,9 @@ class PI(fields.WithMemory, Invertible):
         return self.input_limits[0] + 2 * np.array(self.thresholds)
 
     def check_invertible(self) -> None:
-        """Require a first threshold of 0, and positive partial sums of the weights."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
 
     def inverse_numbers(self, own: Array) -> Array:
-        """Return [lowest, highest input, offset, thresholds, weights]."""
         return np.array([*self.input_limits, *own])
 
     def stored_for_inverse(self, state: Array) -> tuple[float, ...]:
@@ -168,15 +146,14 @@ class PI(fields.WithMemory, Invertible):
 
     @property
     def learnable(self) -> Learnable:
-        """Adaptive parameters: weights and offset."""
         return learnable_operators(
             self,
             self.thresholds,
             self.weights,
             self.input_limits,
             self.offset,
-            pi_adaptive_step,
-            pi_adaptive_start,
+            self.adaptive_step,
+            self.adaptive_start,
             lambda theta: replace(self, weights=fields.vector(theta[:-1]), offset=float(theta[-1])),
         )
 
@@ -276,7 +253,6 @@ class RateDependentPI(fields.WithMemory, Invertible):
         return np.array([*rate, self.offset, *sums])
 
     def check_invertible(self) -> None:
-        """Require an input range, a first threshold of 0, and an output that increases at rest."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
         super().check_invertible()
 

@@ -72,7 +72,6 @@ class Triangle(fields.WithMemory, Parametrised):
 
     @property
     def input_range(self) -> tuple[float, float]:
-        """The first and last level."""
         return self.levels[0], self.levels[-1]
 
     def peaks(self) -> Array:
@@ -311,7 +310,6 @@ class Preisach(Triangle, Invertible):
         return np.array([len(self.levels), *self.levels, *self.table().ravel(), self.offset])
 
     def check_invertible(self) -> None:
-        """Require non-negative weights, positive on the diagonal."""
         if min(self.weights) < 0 or on_diagonal(self.weights).min() <= 0:
             raise ModelError(
                 "'preisach' has no inverse: its weights must not be negative, and "

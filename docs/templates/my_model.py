@@ -5,6 +5,8 @@ F_r is the play operator of threshold r. Source: title of the paper, equations, 
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
@@ -14,7 +16,6 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import kernel
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solved_kernels
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator
@@ -41,7 +42,7 @@ def elastic_plastic_start(coefficients: Array, state: Array, inputs: Array, virg
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class ElasticPlastic(Invertible):
+class ElasticPlastic(fields.WithMemory, Invertible):
     """Elastic-plastic model.
 
     Parameters
@@ -60,17 +61,12 @@ class ElasticPlastic(Invertible):
     solved, inverse_memory = True, "input"
     parameters = ("gain", "weight", "threshold")  # the kernel's coefficients, in this order
     typical = (4.0, -1.5, 0.4, (0.0, 5.0))  # arguments of `example`, which the tests use
-    notation = Notation(
-        r"y = g u + w (u - F_r[u])", gain="g [{y}/{u}]", weight="w [{y}/{u}]", threshold="r [{u}]"
-    )
+    formulas = (r"y = g u + w (u - F_r[u])",)
 
-    gain: fields.Positive
-    weight: FiniteFloat
-    threshold: fields.NotNegative
+    gain: Annotated[fields.Positive, "g [{y}/{u}]"]
+    weight: Annotated[FiniteFloat, "w [{y}/{u}]"]
+    threshold: Annotated[fields.NotNegative, "r [{u}]"]
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
     n_states = 1
 
     def peaks(self) -> Array:  # input from which the operator just returns to its lowest state

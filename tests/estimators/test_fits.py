@@ -59,7 +59,7 @@ def test_slope_rule_recovers_the_weights_of_every_kind_of_branch(
     initial: Literal["virgin", "first_sample"], start: int, stop: int
 ) -> None:
     """Operators begin after r on the rise from rest, after 2 r on the fall and the rise that follow."""
-    truth = PI((0.0, 0.5, 1.0, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0), initial)
+    truth = PI((0.0, 0.5, 1.0, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0), initial=initial)
     t = np.concatenate([np.linspace(0, 5, 401), np.linspace(5, 0, 401), np.linspace(0, 5, 401)])
     loop = Recording({"pressure": t, "displacement": truth.simulate(t)}, 0.01)
     one_branch = np.zeros(t.size, dtype=bool)

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from annotated_types import Gt
@@ -25,7 +25,7 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Advance, Block, Board, Ports, Start
+from mckibben.blocks.base import Advance, Block, Board, Start
 from mckibben.blocks.compose import Layout, Series
 from mckibben.blocks.fields import (
     LONGEST_DELAY,
@@ -39,7 +39,6 @@ from mckibben.blocks.fields import (
 from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.learning import READY, SENSES, USUAL, Learnable, start_root
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
@@ -119,19 +118,17 @@ class Prompt(Block):
         Reference, and its measurement.
     """
 
-    kind: ClassVar[str] = "prompt"
-    kernel: ClassVar[Step] = prompt_step
-    start_kernel: ClassVar[Start] = prompt_start
-    ports: ClassVar[Ports] = ("reference", "measured"), (), ("measured",)
-    rate_dependent: ClassVar[bool] = True
-    n_missable: ClassVar[int] = 1  # the measurement
-    n_states: ClassVar[int] = LONGEST_DELAY + 1
-    parameters: ClassVar[tuple[str, ...]] = ("late",)
-    notation: ClassVar[Notation] = Notation(
-        r"y_t = y_{m,t} + r_{t-1} - r_{t-T_d/T}", late="T_d [s]"
-    )
+    kind = "prompt"
+    kernel = prompt_step
+    start_kernel = prompt_start
+    ports = ("reference", "measured"), (), ("measured",)
+    rate_dependent = True
+    n_missable = 1  # the measurement
+    n_states = LONGEST_DELAY + 1
+    parameters = ("late",)
+    formulas = (r"y_t = y_{m,t} + r_{t-1} - r_{t-T_d/T}",)
 
-    late: Annotated[FiniteFloat, Gt(0)]
+    late: Annotated[FiniteFloat, Gt(0), "T_d [s]"]
     reference: ChannelField
     measured: ChannelField
 
@@ -164,10 +161,10 @@ class Adaptive(Block):
         the fit.
     """
 
-    kind: ClassVar[str] = "adaptive"
-    inverts: ClassVar[bool] = True
-    rate_dependent: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = ("forward",)
+    kind = "adaptive"
+    inverts = True
+    rate_dependent = True
+    parameters = ("forward",)
 
     forward: Annotated[InstanceOf[Block], BeforeValidator(nested)]
     time: Annotated[FiniteFloat, Gt(0)]
@@ -265,7 +262,6 @@ class Adaptive(Block):
 
     @cached_property
     def learnable(self) -> Learnable:
-        """The adaptive parameters."""
         found = learnable_of(self.core.forward)
         assert found is not None
         return found
@@ -287,7 +283,6 @@ class Adaptive(Block):
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
-        """References, scheduling inputs of the forward block, and measurements."""
         return (*self.fixed.inputs, *self.measured)
 
     @property
@@ -451,7 +446,6 @@ class Adaptive(Block):
         return Series((*before, found, *behind)) if isinstance(self.forward, Series) else found
 
     def equations(self) -> tuple[str, ...]:
-        """Return the equations of the inverse and of the parameter update."""
         return (
             r"\hat{u}_t = P_{\theta_t}^{-1}[y]_t",
             r"\theta_t = \Pi\left(\theta_{t-1} + \frac{C \varphi}{1 + \varphi^T C \varphi}\, e_t"

@@ -10,19 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Board, Ports, Start
+from mckibben.blocks.base import Block, Board
 from mckibben.blocks.compose import Composition
 from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Rows, Vector
-from mckibben.blocks.kernels import Step, kernel, step
-from mckibben.blocks.notation import Notation
-from mckibben.blocks.parameters import same_as
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.parameters import one_per, same_as
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError, require
@@ -82,21 +81,19 @@ class Band(Block):
         (`mckibben.control.Twin`).
     """
 
-    kind: ClassVar[str] = "band"
-    ports: ClassVar[Ports] = ("given",), (), ("given",)
-    kernel: ClassVar[Step] = band_step
-    start_kernel: ClassVar[Start] = band_start
-    parameters: ClassVar[tuple[str, ...]] = ("widening",)
-    made_again: ClassVar[str] = "calibrate the model again, with `calibrate()`"
-    notation: ClassVar[Notation] = Notation(
-        r"y^{\pm} = y \pm q\,(1 + k\,|\dot y|)",
-        widening="k_{k} [s/{out0}]",
-    )
+    kind = "band"
+    ports = ("given",), (), ("given",)
+    kernel = band_step
+    start_kernel = band_start
+    parameters = ("widening",)
+    n_states = one_per("given", 1)  # the last outputs, and whether there were any
+    made_again = "calibrate the model again, with `calibrate()`"
+    formulas = (r"y^{\pm} = y \pm q\,(1 + k\,|\dot y|)",)
 
     driving: Channels
     given: Channels
     ends: Rows
-    widening: Vector
+    widening: Annotated[Vector, "k_{k} [s/{out0}]"]
     scores: Rows
     units: Annotated[int, Field(ge=1)]
     unit: Literal["run", "block"] = "run"
@@ -131,11 +128,6 @@ class Band(Block):
             for end in ("", "_lower", "_upper")
         )
 
-    @property
-    def n_states(self) -> int:
-        """The last outputs, and whether there were any."""
-        return len(self.given) + 1
-
     def coefficients(self, sample_time: float | None) -> Array:
         step = needs_sample_time(self.kind, sample_time) if self.rate_dependent else 1.0
         half = np.array(
@@ -145,7 +137,6 @@ class Band(Block):
 
     @classmethod
     def example(cls) -> Self:
-        """Return a band of a displacement by pressure that is wider where the motion is fast."""
         return cls(
             driving=(Channel("pressure", "bar"),),
             given=(Channel("displacement", "mm"),),
@@ -190,10 +181,10 @@ class Banded(Composition):
     ['displacement', 'displacement_lower', 'displacement_upper']
     """
 
-    kind: ClassVar[str] = "banded"
-    no_inverse: ClassVar[str] = "is a model with a band and has no inverse: a band is of outputs"
-    instead: ClassVar[str] = "invert the model that was calibrated, or banded.forward"
-    parameters: ClassVar[tuple[str, ...]] = ("forward", "band")
+    kind = "banded"
+    no_inverse = "is a model with a band and has no inverse: a band is of outputs"
+    instead = "invert the model that was calibrated, or banded.forward"
+    parameters = ("forward", "band")
 
     forward: Annotated[InstanceOf[Block], BeforeValidator(nested)]
     band: Annotated[InstanceOf[Band], BeforeValidator(nested)]
@@ -205,7 +196,6 @@ class Banded(Composition):
     start = same_as("forward.start")
 
     def __post_init__(self) -> None:
-        self.check_parts()
         if (self.band.driving, self.band.given) != (self.forward.inputs, self.forward.outputs):
             raise ModelError(
                 f"the band is of other channels than {self.forward.title!r}",
@@ -242,7 +232,6 @@ class Banded(Composition):
         return np.concatenate([own, np.zeros(self.band.n_states)])
 
     def start_on(self, recording: Recording) -> Array:
-        """Return the initial state on a recording: the model's, and the band at rest."""
         own = self.forward.start_on(recording)
         return np.concatenate([own, np.zeros(self.band.n_states)])
 
@@ -254,7 +243,6 @@ class Banded(Composition):
 
     @classmethod
     def example(cls) -> Self:
-        """Return a Prandtl-Ishlinskii model with a band."""
         return cls(load("blocks", "pi").example(), Band.example())
 
 

@@ -119,9 +119,6 @@ class Block(DrawsItself, Parametrised):
     instead: ClassVar[str] = "invert a hysteresis model (pi, gpi, mpi, cpi)"
     """The remedy of that error."""
 
-    increasing: ClassVar[tuple[str, ...]] = ()
-    """Fields that must be strictly increasing, also after rounding to single precision."""
-
     is_linear: ClassVar[bool] = False
     """Whether outputs are linear in inputs and state, but for constant offsets."""
 
@@ -373,17 +370,7 @@ class Block(DrawsItself, Parametrised):
         outputs = self._first_outputs(run)
         if outputs is None or self.n_driven != 1 or self.state_at(run.first, outputs) is not None:
             return np.empty((0, run.first.size))
-        driven = self
-        while parts := getattr(driven, "parts", ()):
-            driven = parts[0]
-        return explaining_past(
-            partial(self._from_rest, sample_time=run.sample_time),
-            run.inputs,
-            outputs,
-            linear=self.is_linear,
-            rate_dependent=self.rate_dependent,
-            ends=getattr(driven, "input_range", None),
-        )
+        return explaining_past(self, run, outputs)
 
     def _first_outputs(self, run: Run) -> Array | None:
         """Return the first outputs of a run, from which the block begins; None where they have no say.
@@ -402,12 +389,6 @@ class Block(DrawsItself, Parametrised):
         """Return whether no part states another start than rest at the first input."""
         parts = getattr(self, "parts", ())
         return self.start == "first_sample" and all(part._starts_at_rest() for part in parts)
-
-    def _from_rest(self, inputs: Array, sample_time: float | None) -> Array:
-        outputs, state = self.run(inputs, sample_time, "first_sample")
-        if self.n_clipped(state):  # a past that the model itself warns of is none
-            outputs[:] = np.inf
-        return outputs
 
     # -- its kernel --------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@ from itertools import groupby, pairwise
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
+from annotated_types import MinLen
 from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
@@ -114,7 +115,6 @@ class Layout:
     def bind(
         self, sample_time: float | None, state: Array, inputs: Array, outputs: Array
     ) -> Advance:
-        """Return a function that runs all blocks, as in `Block.bind`."""
         tables = {tuple(range(self.n_inputs)): inputs}
         places = [(inputs, column) for column in range(self.n_inputs)]  # of signals
         runs: list[Advance] = []
@@ -160,7 +160,7 @@ def _parts(value: object) -> object:
     return tuple(nested(part) for part in value) if isinstance(value, tuple | list) else value
 
 
-Parts = Annotated[tuple[InstanceOf[Block], ...], BeforeValidator(_parts)]
+Parts = Annotated[tuple[InstanceOf[Block], ...], MinLen(1), BeforeValidator(_parts)]
 
 
 def _of_any(name: str) -> Any:
@@ -183,7 +183,6 @@ class Composition(Block):
         """Return the LaTeX expression of the composition, from the names of the parts."""
 
     def equations(self) -> tuple[str, ...]:
-        """Return the equations of the composition."""
         marks = [f"{self.letter}_{{{place + 1}}}" for place in range(len(self.parts))]
         return (self.joined(marks),)
 
@@ -193,7 +192,6 @@ class Composition(Block):
 
     @property
     def is_linear(self) -> bool:  # type: ignore[override]
-        """Whether all parts are linear."""
         return all(part.is_linear for part in self.parts)
 
     @property
@@ -204,11 +202,6 @@ class Composition(Block):
     def sample_time(self) -> float | None:  # type: ignore[override]
         """The first fixed sample time of a part [s]; None if none has one."""
         return next((part.sample_time for part in self.parts if part.sample_time), None)
-
-    def check_parts(self) -> None:
-        """Raise an error for no parts."""
-        if not self.parts:
-            raise ModelError(f"{self.kind!r} has no parts", remedy="give at least one block")
 
     @cached_property
     def wiring(self) -> Layout:
@@ -238,13 +231,12 @@ class Series(Composition):
         In the order of the signal; at least one.
     """
 
-    kind: ClassVar[str] = "series"
-    together: ClassVar[Callable[[Iterable[float]], float]] = sum
+    kind = "series"
+    together = sum
 
     parts: Parts
 
     def __post_init__(self) -> None:
-        self.check_parts()
         for before, after in pairwise(self.parts):
             driven = after.n_driven
             if len(before.outputs) != driven:
@@ -265,7 +257,6 @@ class Series(Composition):
 
     @cached_property
     def scheduling(self) -> tuple[str, ...]:
-        """Names of all scheduling inputs."""
         first = self.parts[0]
         driven = {c.name for c in first.inputs[: first.n_driven]}
         return tuple(c.name for c in self.inputs if c.name not in driven)
@@ -329,12 +320,10 @@ class Series(Composition):
         return low, high
 
     def joined(self, parts: Sequence[str]) -> str:
-        """Return the nested expression of the series."""
         return rf"y = {'['.join(reversed(parts))}[u{']' * len(parts)}"
 
     @classmethod
     def example(cls) -> Self:
-        """Return a modified Prandtl-Ishlinskii model: a PI model and a saturating curve."""
         return cls((load("blocks", "pi").example(), load("blocks", "piecewise-linear").example()))
 
 
@@ -348,12 +337,11 @@ class Parallel(Composition):
         At least one. Each takes its inputs, by their names, from those of all.
     """
 
-    kind: ClassVar[str] = "parallel"
+    kind = "parallel"
 
     parts: Parts
 
     def __post_init__(self) -> None:
-        self.check_parts()
         for side in ("inputs", "outputs"):
             units: dict[str, str] = {}
             for channel in (c for part in self.parts for c in getattr(part, side)):
@@ -372,7 +360,6 @@ class Parallel(Composition):
 
     @property
     def scheduling(self) -> tuple[str, ...]:
-        """Names of inputs that drive no part."""
         return tuple(c.name for c in self.inputs if c.name not in self._driving)
 
     @cached_property
@@ -400,12 +387,10 @@ class Parallel(Composition):
         return [board.add(own) for own in terms]
 
     def joined(self, parts: Sequence[str]) -> str:
-        """Return their sum."""
         return f"y = {' + '.join(f'{part}[u]' for part in parts)}"
 
     @classmethod
     def example(cls) -> Self:
-        """Return the sum of a PI model and a play operator."""
         return cls((load("blocks", "pi").example(), load("blocks", "play").example()))
 
 
@@ -419,13 +404,12 @@ class PerChannel(Composition):
         One a channel, each with one input and one output, all channel names different.
     """
 
-    kind: ClassVar[str] = "per-channel"
-    letter: ClassVar[str] = "C"
+    kind = "per-channel"
+    letter = "C"
 
     parts: Parts
 
     def __post_init__(self) -> None:
-        self.check_parts()
         for part in self.parts:
             if len(part.inputs) != 1 or len(part.outputs) != 1:
                 raise ModelError(
@@ -455,12 +439,10 @@ class PerChannel(Composition):
         return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
 
     def joined(self, parts: Sequence[str]) -> str:
-        """Return the expressions of the parts, separately."""
         return r",\quad ".join(f"y_{{{k}}} = {part}[u_{{{k}}}]" for k, part in enumerate(parts, 1))
 
     @classmethod
     def example(cls) -> Self:
-        """Return two muscles with separate models."""
         pressures = [Channel(f"pressure_{number}", "bar") for number in (1, 2)]
         displacements = [Channel(f"displacement_{number}", "mm") for number in (1, 2)]
         first = replace(load("blocks", "pi").example(), input=pressures[0], output=displacements[0])

@@ -18,6 +18,8 @@ from mckibben.blocks.notation import (
     meanings,
     resolved,
     short,
+    symbol_of,
+    symbols,
     tex,
     with_unit,
 )
@@ -101,7 +103,7 @@ def _quantities(part: Parametrised, prefix: str, units: Units) -> Iterator[tuple
     for field in part.parameters:
         meaning, symbol, whole = (
             short(said.get(field, "")),
-            part.notation.of(field),
+            symbol_of(type(part), field),
             getattr(part, field),
         )
         for index, value in leaves(whole):
@@ -169,14 +171,14 @@ def _title(part: Parametrised, called: str = "") -> str:
 
 def _channels(part: Any) -> Iterator[str]:
     """Yield the meanings of the channel letters u, x and y."""
-    if not hasattr(part, "ports") or not part.notation.equations:
+    if not hasattr(part, "ports") or not part.formulas:
         return
     ports = zip("uxy", part.ports, strict=True)
     letters: list[str] = []
     for field, letter in {field: letter for letter, names in ports for field in names}.items():
         channels: Any = getattr(part, field, ())
         one = not isinstance(channels, tuple)
-        symbol = part.notation.symbols.get(field, Symbol(letter if one else f"{letter}_i"))
+        symbol = symbols(part.__class__).get(field, Symbol(letter if one else f"{letter}_i"))
         letters += lettered(symbol.letter, (channels,) if one else channels)
     if letters:
         yield r",\quad ".join(letters)
@@ -184,7 +186,7 @@ def _channels(part: Any) -> Iterator[str]:
 
 def _numbers(part: Parametrised, units: Units) -> Iterator[str]:
     """Yield the values of numbers, vectors and matrices; of large ones their shape."""
-    for field, symbol in part.notation.symbols.items():
+    for field, symbol in symbols(type(part)).items():
         value: Any = getattr(part, field, None)
         if isinstance(value, float):
             text = f"{symbol.letter} = {tex(value)}"

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from annotated_types import Ge
@@ -20,12 +20,11 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Board, Ports, Start
+from mckibben.blocks.base import SEVERAL, Block, Board
 from mckibben.blocks.compose import Composition
 from mckibben.blocks.fields import STRICT, Channel, Channels, Vector
-from mckibben.blocks.kernels import Step, accumulate, kernel, step
-from mckibben.blocks.notation import Notation
-from mckibben.blocks.parameters import same_as
+from mckibben.blocks.kernels import accumulate, kernel, step
+from mckibben.blocks.parameters import one_per, same_as
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
@@ -98,61 +97,44 @@ class PIDFeedback(Block):
         Whether the measurement answers the reference of the step before, as behind a compensator.
     """
 
-    kind: ClassVar[str] = "pid"
-    ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Step] = pid_step
-    start_kernel: ClassVar[Start] = pid_start
-    rate_dependent: ClassVar[bool] = True
-    no_inverse: ClassVar[str] = "has no inverse"
-    instead: ClassVar[str] = "invert the model of the muscle"
-    parameters: ClassVar[tuple[str, ...]] = ("kp", "ki", "kd")
-    notation: ClassVar[Notation] = Notation(
+    kind = "pid"
+    n_states = one_per("driven", times=4)  # integrals, rates, last measurements and references
+    n_scratch = one_per("driven")  # what single precision loses of the integrals
+    ports = SEVERAL
+    kernel = pid_step
+    start_kernel = pid_start
+    rate_dependent = True
+    no_inverse = "has no inverse"
+    instead = "invert the model of the muscle"
+    parameters = ("kp", "ki", "kd")
+    same_length = (*parameters, "driven", "given")
+    formulas = (
         r"p_i = p_{b,i} + k_{p,i} e_i + k_{i,i} \int e_i\, dt - k_{d,i} \dot{y}_i,\quad "
         "e_i = r_i - y_i",
-        kp="k_{p,i} [bar/mm]",
-        ki="k_{i,i} [bar/mm s]",
-        kd="k_{d,i} [bar s/mm]",
-        filter_time="T [s]",
-        limits=r"p_{\pm,i} [bar]",
-        driven="r_i",
-        scheduled="x_i",
-        given="p_i",
     )
 
-    kp: Vector
-    ki: Vector
-    kd: Vector
-    limits: tuple[FiniteFloat, FiniteFloat]
-    filter_time: Annotated[FiniteFloat, Ge(0)]
-    driven: Channels
-    scheduled: Channels
-    given: Channels
+    kp: Annotated[Vector, "k_{p,i} [bar/mm]"]
+    ki: Annotated[Vector, "k_{i,i} [bar/mm s]"]
+    kd: Annotated[Vector, "k_{d,i} [bar s/mm]"]
+    limits: Annotated[tuple[FiniteFloat, FiniteFloat], r"p_{\pm,i} [bar]"]
+    filter_time: Annotated[FiniteFloat, Ge(0), "T [s]"]
+    driven: Annotated[Channels, "r_i"]
+    scheduled: Annotated[Channels, "x_i"]
+    given: Annotated[Channels, "p_i"]
     late: bool = False
 
     def __post_init__(self) -> None:
         self.check_channels()
         n = len(self.driven)
-        sizes = (len(self.kp), len(self.ki), len(self.kd), len(self.given))
-        if set(sizes) != {n} or len(self.scheduled) not in (n, 2 * n):
+        if len(self.scheduled) not in (n, 2 * n):
             raise ModelError(
-                f"{self.kind!r} of {n} references has {sizes} kp, ki, kd and outputs, and "
-                f"{len(self.scheduled)} measurements and bases",
+                f"{self.kind!r} of {n} references has {len(self.scheduled)} measurements and bases",
                 remedy=f"give {n} of each",
             )
         if not self.limits[0] < self.limits[1]:
             raise ModelError(
                 f"limits of {self.kind!r} are {self.limits}", remedy="give lowest, then highest"
             )
-
-    @property
-    def n_states(self) -> int:
-        """Integrals, filtered rates, last measurements, last references."""
-        return 4 * len(self.driven)
-
-    @property
-    def n_scratch(self) -> int:
-        """Scratch: rounding errors of the integrals in single precision."""
-        return len(self.driven)
 
     def coefficients(self, sample_time: float | None) -> Array:
         step = needs_sample_time(self.kind, sample_time)
@@ -246,9 +228,9 @@ class FeedforwardFeedback(Composition):
         Whose references are the compensator's, and whose bases are its outputs.
     """
 
-    kind: ClassVar[str] = "feedforward-feedback"
-    rate_dependent: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = ("compensator", "feedback")
+    kind = "feedforward-feedback"
+    rate_dependent = True
+    parameters = ("compensator", "feedback")
 
     compensator: Annotated[InstanceOf[Block], BeforeValidator(nested)]
     feedback: Annotated[InstanceOf[PIDFeedback], BeforeValidator(nested)]
@@ -259,7 +241,6 @@ class FeedforwardFeedback(Composition):
     outputs = same_as("compensator.outputs")
 
     def __post_init__(self) -> None:
-        self.check_parts()
         made = self.feedback.behind(self.compensator)
         if made.inputs != self.feedback.inputs:
             raise ModelError(
@@ -292,7 +273,6 @@ class FeedforwardFeedback(Composition):
 
     @cached_property
     def scheduling(self) -> tuple[str, ...]:
-        """All inputs but the references."""
         return tuple(channel.name for channel in self.inputs[len(self.feedback.driven) :])
 
     def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
@@ -303,7 +283,6 @@ class FeedforwardFeedback(Composition):
         return [found[self.feedback.given.index(channel)] for channel in self.outputs]
 
     def joined(self, parts: Sequence[str]) -> str:
-        """Return the sum of the outputs of both."""
         return f"p = {parts[0]}[r] + {parts[1]}[r, y]"
 
     @classmethod

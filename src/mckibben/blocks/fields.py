@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, MaxLen, MinLen
+from annotated_types import Ge, Gt, Interval, MaxLen, MinLen
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, FiniteFloat
 from pydantic.dataclasses import dataclass as validated_dataclass
@@ -58,6 +58,12 @@ def rows(value: Any) -> Any:
 Rows = Annotated[tuple[Vector, ...], BeforeValidator(rows)]
 """Rows of finite numbers."""
 
+Substeps = Annotated[int, Interval(ge=1, le=10_000)]
+"""Steps of integration from sample to sample."""
+
+Hold = Literal["first", "zero"]
+"""Input between samples: in a straight line, or held."""
+
 LONGEST_DELAY = 254
 """Largest delay of an output [samples]."""
 
@@ -67,6 +73,15 @@ NotNegative = Annotated[FiniteFloat, Ge(0)]
 PositiveVector = Annotated[
     tuple[Positive, ...], MaxLen(MOST_NUMBERS), BeforeValidator(plain_sequence)
 ]
+NotNegativeVector = Annotated[
+    tuple[NotNegative, ...], MaxLen(MOST_NUMBERS), BeforeValidator(plain_sequence)
+]
+Thresholds = Annotated[NotNegativeVector, MinLen(1)]
+"""Thresholds of operators, at least one."""
+
+Knots = Annotated[Vector, MinLen(2)]
+"""Places between which a function is straight."""
+
 PositiveRows = Annotated[tuple[PositiveVector, ...], BeforeValidator(rows)]
 
 Scale = tuple[FiniteFloat, Positive]
@@ -177,3 +192,20 @@ DISPLACEMENT = Channel("displacement", "mm")
 FORCE = Channel("force", "N")
 LENGTH = Channel("length", "mm")
 CONTRACTION = Channel("contraction", "")
+
+
+@validated_dataclass(frozen=True, kw_only=True, repr=False, config=STRICT)
+class WithMemory:
+    """Fields of a block of one input and one output that has memory.
+
+    Parameters
+    ----------
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT

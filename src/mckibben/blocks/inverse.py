@@ -162,9 +162,9 @@ class Inverse(Block):
         The inverted block, which declares how.
     """
 
-    kind: ClassVar[str] = "inverse"
-    inverts: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = ("forward",)
+    kind = "inverse"
+    inverts = True
+    parameters = ("forward",)
 
     forward: Annotated[InstanceOf[Invertible], BeforeValidator(nested)]
 
@@ -188,7 +188,6 @@ class Inverse(Block):
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
-        """The forward block's outputs, then its scheduling inputs."""
         return (*self.forward.outputs, *self.forward.inputs[self.forward.n_driven :])
 
     @property
@@ -217,7 +216,6 @@ class Inverse(Block):
         return self.forward.inverse_numbers(self.forward.coefficients(sample_time))
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the range of the forward block's inputs."""
         if len(self.outputs) == 1:
             low, high = self.forward.input_limits
             return np.array([low]), np.array([high])
@@ -227,7 +225,6 @@ class Inverse(Block):
         return self.forward
 
     def report(self, state: Array) -> None:
-        """Warn about counted samples, such as clipped references."""
         if self.n_clipped(state):
             warnings.warn(self.forward.inverse_complaint(state), ModelWarning, stacklevel=4)
 
@@ -245,7 +242,6 @@ class Inverse(Block):
         return self.forward.known_inputs[: self.forward.n_driven]
 
     def equations(self) -> tuple[str, ...]:
-        """Return the equation of the inverse; those of the forward block follow."""
         return (r"\hat{u} = P^{-1}[y] \quad\text{such that}\quad P[\hat{u}] = y",)
 
     @classmethod

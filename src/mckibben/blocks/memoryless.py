@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -17,7 +18,6 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block
 from mckibben.blocks.inverse import Invertible, nothing_clipped
 from mckibben.blocks.kernels import DERIVED, SLACK, improved, inlined, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton
 from mckibben.errors import ModelError
 
@@ -52,10 +52,10 @@ class Affine(Block):
     is_linear = True
     parameters = ("gain", "offset")
     typical = (6.8, -1.5)
-    notation = Notation("y = K u + y_0", gain="K [{y}/{u}]", offset="y_0 [{y}]")
+    formulas = ("y = K u + y_0",)
 
-    gain: FiniteFloat
-    offset: FiniteFloat = 0.0
+    gain: Annotated[FiniteFloat, "K [{y}/{u}]"]
+    offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
     input: fields.ChannelField = fields.DISPLACEMENT
     output: fields.ChannelField = fields.DISPLACEMENT
 
@@ -87,7 +87,7 @@ class Negative(Block):
     kernel = negative_step
     is_linear = True
     typical = ()
-    notation = Notation("y = -u")
+    formulas = ("y = -u",)
 
     input: fields.ChannelField = fields.DISPLACEMENT
     output: fields.ChannelField = fields.DISPLACEMENT
@@ -116,20 +116,6 @@ def interpolate(x: float, knots: Array, values: Array) -> float:
     return values[high] - slope * (knots[high] - x)
 
 
-def check_increasing(what: str, knots: Sequence[float], values: Sequence[float]) -> None:
-    """Raise an error for fewer than two knots, or for knots or values that do not increase."""
-    if len(knots) < 2 or len(knots) != len(values):
-        raise ModelError(
-            f"a {what} has {len(knots)} knots and {len(values)} values",
-            remedy="give at least two knots and one value to each",
-        )
-    for name, numbers in (("knots", knots), ("values", values)):
-        if np.any(np.diff(numbers) <= 0):
-            raise ModelError(
-                f"the {name} of a {what} do not increase", remedy=f"give increasing {name}"
-            )
-
-
 @step
 def piecewise_linear_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Interpolate; coefficients are [knots, values]."""
@@ -155,24 +141,19 @@ class PiecewiseLinear(Block):
 
     kind = "piecewise-linear"
     kernel = piecewise_linear_step
-    increasing = ("knots", "values")
+    increasing = same_length = ("knots", "values")
     parameters = ("values",)
     layout = ("knots", "values")
     typical = ((0.0, 5.0, 15.0, 25.0), (0.0, 8.0, 20.0, 24.0))
-    notation = Notation(
+    formulas = (
         r"y = v_k + (v_{k+1} - v_k) \frac{u - \xi_k}{\xi_{k+1} - \xi_k},\quad \xi_k \le u "
         r"\le \xi_{k+1}",
-        knots=r"\xi_k [{u}]",
-        values="v_k [{y}]",
     )
 
-    knots: fields.Vector
-    values: fields.Vector
+    knots: Annotated[fields.Knots, r"\xi_k [{u}]"]
+    values: Annotated[fields.Vector, "v_k [{y}]"]
     input: fields.ChannelField = fields.DISPLACEMENT
     output: fields.ChannelField = fields.DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_increasing(f"{self.kind} block", self.knots, self.values)
 
     def inverse(self) -> PiecewiseLinear:
         return PiecewiseLinear(self.values, self.knots, self.output, self.input)
@@ -283,16 +264,11 @@ class Polynomial(Invertible):
     parameters = ("polynomial",)
     layout = ("centre", "scale", "polynomial")
     typical = ((12.0, 20.0, 3.0, -4.0), 5.0, 5.0, (0.0, 10.0))
-    notation = Notation(
-        r"y = \sum_{k} c_k x^k,\quad x = \frac{u - m}{s}",
-        polynomial="c_k from 0 [{y}]",
-        centre="m [{u}]",
-        scale="s [{u}]",
-    )
+    formulas = (r"y = \sum_{k} c_k x^k,\quad x = \frac{u - m}{s}",)
 
-    polynomial: fields.PolynomialField
-    centre: FiniteFloat = 0.0
-    scale: fields.Positive = 1.0
+    polynomial: Annotated[fields.PolynomialField, "c_k from 0 [{y}]"]
+    centre: Annotated[FiniteFloat, "m [{u}]"] = 0.0
+    scale: Annotated[fields.Positive, "s [{u}]"] = 1.0
     input_range: fields.InputRange | None = None
     input: fields.ChannelField = fields.DISPLACEMENT
     output: fields.ChannelField = fields.DISPLACEMENT
@@ -347,7 +323,7 @@ class Raised(Block):
     parameters = ("offset",)
     typical = (0.5,)
 
-    offset: fields.NotNegative = 0.0
+    offset: Annotated[fields.NotNegative, "c [{u}]"] = 0.0
     input: fields.ChannelField = fields.PRESSURE
     output: fields.ChannelField = fields.PRESSURE
 
@@ -370,7 +346,7 @@ class Logarithm(Raised):
 
     kind = "logarithm"
     kernel = logarithm_step
-    notation = Notation(r"y = \ln(u + c)", offset="c [{u}]")
+    formulas = (r"y = \ln(u + c)",)
 
     def inverse(self) -> Block:
         return Exponential(self.offset, self.output, self.input)
@@ -390,7 +366,9 @@ class Exponential(Raised):
 
     kind = "exponential"
     kernel = exponential_step
-    notation = Notation("y = e^{u} - c", offset="c [{y}]")
+    formulas = ("y = e^{u} - c",)
+
+    offset: Annotated[fields.NotNegative, "c [{y}]"] = 0.0
 
     def inverse(self) -> Block:
         return Logarithm(self.offset, self.output, self.input)
@@ -455,13 +433,8 @@ class Contact(Invertible):
     counts_clipped = False
     parameters = ("pressure",)
     typical = (0.125,)
-    notation = Notation(
-        r"y = u - \frac{19}{20}\, c \left(1 - e^{-|u| / c}\right) \operatorname{sgn} u",
-        pressure="c [{u}]",
-        output="y",
-        input="u",
-    )
+    formulas = (r"y = u - \frac{19}{20}\, c \left(1 - e^{-|u| / c}\right) \operatorname{sgn} u",)
 
-    pressure: fields.Positive
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.PRESSURE
+    pressure: Annotated[fields.Positive, "c [{u}]"]
+    input: Annotated[fields.ChannelField, "u"] = fields.PRESSURE
+    output: Annotated[fields.ChannelField, "y"] = fields.PRESSURE

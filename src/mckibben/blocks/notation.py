@@ -1,6 +1,6 @@
-"""Notation of models: equations in LaTeX, and symbol and unit of every parameter.
+"""Notation of models: symbol and unit of every field, as declared in its annotation, in LaTeX.
 
-A block declares both once, with its fields; their meanings are in its docstring.
+A class has its equations in ``formulas``, and the meanings of its fields in its docstring.
 """
 
 from __future__ import annotations
@@ -20,7 +20,14 @@ MANY = 12
 
 
 class Symbol(NamedTuple):
-    """Notation of a field: LaTeX symbol, first index, and unit (None if undeclared)."""
+    """Notation of a field: LaTeX symbol, first index, and unit (None if undeclared).
+
+    In its annotation a field of numbers has its symbol, ``" from 0"`` where its index does not begin at
+    1, and its unit in brackets: ``Annotated[Vector, "w_i [{y}/{u}]"]``. In units, ``{u}``, ``{y}`` and
+    ``{x}`` are those of the first input, output and scheduling input, ``{in0}`` and ``{out0}``
+    (``{in1}``, ``{out1}``) those of the channel that the first (second) index counts; units between bars
+    belong to the numbers of a row, over and over. A field of channels has their symbol alone.
+    """
 
     letter: str
     first: int = 1
@@ -37,33 +44,23 @@ class Symbol(NamedTuple):
         return rf"{self.stem} \in \mathbb{{R}}^{{{shape}}}"
 
 
-class Notation:
-    """Equations and symbols of a class of blocks.
+@cache
+def symbols(cls: type) -> dict[str, Symbol]:
+    """Return the symbols that fields of a class have in their annotations."""
+    found = {}
+    for name, field in getattr(cls, "__pydantic_fields__", {}).items():
+        for text in field.metadata:
+            if isinstance(text, str):
+                parts = re.fullmatch(r"(.*?)(?: from (\d))?(?: \[(.*)\])?", text)
+                assert parts is not None
+                found[name] = Symbol(parts[1], int(parts[2] or 1), parts[3] or "")
+    return found
 
-    Parameters
-    ----------
-    *equations : str
-        In LaTeX.
-    **symbols : str
-        For a field of numbers its symbol, ``" from 0"`` where its index does not begin at 1, and its
-        unit in brackets: ``"w_i [{y}/{u}]"``. In units, ``{u}``, ``{y}`` and ``{x}`` are those of the
-        first input, output and scheduling input, ``{in0}`` and ``{out0}`` (``{in1}``, ``{out1}``) those
-        of the channel that the first (second) index counts; units between bars belong to the numbers of
-        a row, over and over. For a field of channels, their symbol.
-    """
 
-    def __init__(self, *equations: str, **symbols: str) -> None:
-        self.equations, self.symbols = equations, dict[str, Symbol]()
-        for field, text in symbols.items():
-            found = re.fullmatch(r"(.*?)(?: from (\d))?(?: \[(.*)\])?", text)
-            assert found is not None
-            letter, first, unit = found.groups()
-            self.symbols[field] = Symbol(letter, int(first or 1), unit or "")
-
-    def of(self, field: str) -> Symbol:
-        """Return the notation of a field: as declared, or by its name."""
-        named = rf"\mathrm{{{field.replace('_', chr(92) + ' ')}}}"
-        return self.symbols.get(field, Symbol(named))
+def symbol_of(cls: type, field: str) -> Symbol:
+    """Return the symbol of a field: as declared, or by its name."""
+    named = rf"\mathrm{{{field.replace('_', chr(92) + ' ')}}}"
+    return symbols(cls).get(field, Symbol(named))
 
 
 @dataclass(frozen=True)

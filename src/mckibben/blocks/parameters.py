@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from mckibben.arrays import Array
-from mckibben.blocks.notation import Notation
+from mckibben.blocks.notation import symbol_of
 from mckibben.errors import ModelError
 
 Made = TypeVar("Made")
@@ -61,12 +61,15 @@ class Checked(ABCMeta):
     def __call__(cls: type[Made], /, *values: Any, **named: Any) -> Made:
         """Return an instance, its fields validated."""
         try:
-            return super().__call__(*values, **named)  # type: ignore[misc]
+            made: Made = super().__call__(*values, **named)  # type: ignore[misc]
+            if isinstance(made, Parametrised):
+                _check_declared(made)
+            return made
         except UNCOMPUTABLE as error:
             raise _beyond_sense(cls, error) from error
         except ValidationError as error:
             first = error.errors()[0]
-            names = [field.name for field in fields(cls)]  # type: ignore[arg-type]
+            names = [field.name for field in fields(cls) if not field.kw_only]  # type: ignore[arg-type]
             field, *inside = first["loc"]
             if isinstance(field, int):
                 field = names[field] if field < len(names) else f"argument {field + 1}"
@@ -77,6 +80,20 @@ class Checked(ABCMeta):
                 f"{where} of {kind!r}: {first['msg']}{given}",
                 remedy=f"give what {cls.__name__} documents",
             ) from None
+
+
+def _check_declared(part: Parametrised) -> None:
+    """Raise an error for fields that do not increase, or have not as many entries, as declared."""
+    for name in part.increasing:
+        if np.any(np.diff(getattr(part, name)) <= 0):
+            raise ModelError(
+                f"the {name} of {part.kind!r} do not increase",
+                remedy="sort them and drop repeated ones",
+            )
+    sizes = {name: len(getattr(part, name)) for name in part.same_length}
+    if len(set(sizes.values())) > 1:
+        listed = ", ".join(f"{size} {name}" for name, size in sizes.items())
+        raise ModelError(f"{part.kind!r} has {listed}", remedy="give as many of each")
 
 
 class Parametrised(metaclass=Checked):
@@ -92,17 +109,23 @@ class Parametrised(metaclass=Checked):
     parameters: ClassVar[tuple[str, ...]] = ()
     """Names of the fields, in the order of the vector."""
 
-    notation: ClassVar[Notation] = Notation()
-    """Its equations, and the symbols and units of its numbers."""
+    increasing: ClassVar[tuple[str, ...]] = ()
+    """Fields that must be strictly increasing, also after rounding to single precision."""
+
+    same_length: ClassVar[tuple[str, ...]] = ()
+    """Fields of which each has as many entries."""
+
+    formulas: ClassVar[tuple[str, ...]] = ()
+    """Its equations, in LaTeX; symbols are declared with the fields, see `mckibben.blocks.notation`."""
 
     def equations(self) -> tuple[str, ...]:
         """Return the equations of this structure, in LaTeX; by default those of its class."""
-        return self.notation.equations
+        return self.formulas
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
-        """Return the unit of a number of a field, as `Notation` writes it; None if none is declared."""
+        """Return the unit of a number of a field, as `Symbol` writes it; None if none is declared."""
         del index
-        return self.notation.of(field).unit
+        return symbol_of(type(self), field).unit
 
     def name_of(self, field: str, index: tuple[int, ...]) -> str:
         """Return the label of a parameter: the field's name, and its indices."""
@@ -157,6 +180,19 @@ def plain(part: Any) -> Any:
     if isinstance(part, tuple):
         return [plain(item) for item in part]
     return part
+
+
+def with_parts(value: Any, change: Callable[[Any], Any]) -> Any:
+    """Return a value with every part in it, inner ones first, replaced by ``change(part)``."""
+    if isinstance(value, tuple):
+        items = tuple(with_parts(item, change) for item in value)
+        return value if all(a is b for a, b in zip(items, value, strict=True)) else items
+    if not (isinstance(value, Parametrised) and is_dataclass(value)):
+        return value
+    now = {field.name: getattr(value, field.name) for field in fields(value)}
+    new = {name: with_parts(item, change) for name, item in now.items()}
+    changed = {name: item for name, item in new.items() if item is not now[name]}
+    return change(replace(value, **changed) if changed else value)
 
 
 def same_as(path: str) -> Any:
@@ -219,10 +255,6 @@ def leaves(value: Any, index: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int,
         yield index, value
 
 
-def one_per(field: str, more: int = 0) -> Any:
-    """Return a property: the number of entries of a field, plus ``more``."""
-
-    def size(part: Any) -> int:
-        return len(getattr(part, field)) + more
-
-    return property(size)
+def one_per(field: str, more: int = 0, *, times: int = 1) -> Any:
+    """Return a property: the number of entries of a field, ``times`` that, plus ``more``."""
+    return property(lambda part: times * len(getattr(part, field)) + more)

@@ -30,8 +30,7 @@ from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.kernels import Step, fill, in_scratch, kernel, step
-from mckibben.blocks.notation import Notation
-from mckibben.blocks.parameters import same_as
+from mckibben.blocks.parameters import same_as, with_parts
 from mckibben.blocks.planning import clip_path, plan_path, plan_scratch
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.blocks.saving import nested
@@ -86,12 +85,12 @@ def model_state(compensator: Block, state: Array) -> Array:
 
 def without_dead_time(block: Any) -> Any:
     """Return a block without its dead times, which its inverse does not compensate."""
-    match block:
-        case Series() | PerChannel():
-            return replace(block, parts=tuple(map(without_dead_time, block.parts)))
-        case Inverse():
-            return replace(block, forward=without_dead_time(block.forward))
-    return replace(block, dead_time=0.0) if block.dead_time > 0 else block
+
+    def prompt(part: Any) -> Any:
+        late = "dead_time" in part.__dataclass_fields__ and part.dead_time > 0
+        return replace(part, dead_time=0.0) if late else part
+
+    return with_parts(block, prompt)
 
 
 def inverse_state_of(compensator: Block) -> Callable[[Array], Array]:
@@ -356,21 +355,20 @@ class Predictive(Block):
         Lowest and highest pressure [bar]; default the compensator's own.
     """
 
-    kind: ClassVar[str] = "predictive"
-    inverts: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = ("compensator",)
+    kind = "predictive"
+    inverts = True
+    parameters = ("compensator",)
     retired: ClassVar[Mapping[str, Any]] = {"total_limit": None, "flow_limit": None, "volumes": ()}
-    rate_dependent: ClassVar[bool] = True
-    path_dependent: ClassVar[bool] = True
-    notation: ClassVar[Notation] = Notation(
+    rate_dependent = True
+    path_dependent = True
+    formulas = (
         r"\min_{p} \sum_{t=0}^{N-1} \left(r_t - P[p]_t\right)^2 \quad\text{such that}\quad "
         r"p_{\min} \le p_t \le p_{\max},\quad |p_t - p_{t-1}| \le \rho T",
-        rate_limit=r"\rho [bar/s]",
     )
 
     compensator: Annotated[InstanceOf[Block], BeforeValidator(nested)]
     horizon: Annotated[int, Interval(ge=1, le=200)] = 20
-    rate_limit: Limit | None = None
+    rate_limit: Annotated[Limit | None, r"\rho [bar/s]"] = None
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
 
     inputs = same_as("compensator.inputs")
@@ -417,7 +415,6 @@ class Predictive(Block):
 
     @property
     def samples_ahead(self) -> int:  # type: ignore[override]
-        """Preview of the references [samples]."""
         return self.horizon - 1
 
     @property
@@ -429,7 +426,6 @@ class Predictive(Block):
     def initial_state(
         self, first: Array, initial: Initial | None = None, sample_time: float | None = None
     ) -> Array:
-        """Return the initial state: as if its reference had always been applied."""
         if initial is not None and not isinstance(initial, str):
             return stated(self.kind, self.n_states, initial)
         own = model_state(self._inverse, self._inverse.initial_state(first, initial, sample_time))
@@ -517,5 +513,4 @@ class Predictive(Block):
 
     @classmethod
     def example(cls) -> Self:
-        """Return the inverse of a Prandtl-Ishlinskii model after a slow valve."""
         return cls(PI.example().inverse(), horizon=8, rate_limit=10.0)

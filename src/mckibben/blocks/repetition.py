@@ -9,7 +9,7 @@ motion, so on a robot the controller is started with it.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 import numpy as np
 from annotated_types import Gt
@@ -17,10 +17,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Ports, Start
+from mckibben.blocks.base import Block
 from mckibben.blocks.fields import DISPLACEMENT, STRICT, Channels, Rows, vector
-from mckibben.blocks.kernels import Step, kernel, step
-from mckibben.blocks.notation import Notation
+from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.sample_times import own_sample_time
 from mckibben.errors import ModelError
 
@@ -61,41 +60,30 @@ class Repetition(Block):
         correction is held.
     """
 
-    kind: ClassVar[str] = "repetition"
-    ports: ClassVar[Ports] = ("driven",), (), ("given",)
-    kernel: ClassVar[Step] = repetition_step
-    start_kernel: ClassVar[Start] = repetition_start
-    rate_dependent: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = ("corrections",)
-    notation: ClassVar[Notation] = Notation(
-        r"y_i(t) = u_i(t) + c_{i,t}",
-        corrections="c_{i,t} [{out0}]",
-        sample_time="T_s [s]",
-        driven="u_i",
-        given="y_i",
-    )
+    kind = "repetition"
+    ports = ("driven",), (), ("given",)
+    kernel = repetition_step
+    start_kernel = repetition_start
+    rate_dependent = True
+    n_states = 1  # sample since the start
+    parameters = ("corrections",)
+    same_length = ("corrections", "driven", "given")
+    formulas = (r"y_i(t) = u_i(t) + c_{i,t}",)
 
-    corrections: Rows
-    sample_time: Annotated[FiniteFloat, Gt(0)]
-    driven: Channels = (DISPLACEMENT,)
-    given: Channels = (DISPLACEMENT,)
+    corrections: Annotated[Rows, "c_{i,t} [{out0}]"]
+    sample_time: Annotated[FiniteFloat, Gt(0), "T_s [s]"]
+    driven: Annotated[Channels, "u_i"] = (DISPLACEMENT,)
+    given: Annotated[Channels, "y_i"] = (DISPLACEMENT,)
     repeats: bool = False
 
     def __post_init__(self) -> None:
         self.check_channels()
         sizes = {len(row) for row in self.corrections}
-        counts = {len(self.corrections), len(self.driven), len(self.given)}
-        if len(counts) > 1 or len(sizes) > 1 or 0 in sizes:
+        if len(sizes) > 1 or 0 in sizes:
             raise ModelError(
-                f"{self.kind!r} has {len(self.corrections)} rows of {sorted(sizes)} corrections for "
-                f"{len(self.driven)} inputs and {len(self.given)} outputs",
+                f"{self.kind!r} has rows of {sorted(sizes)} corrections",
                 remedy="give a row a channel, all of the same length",
             )
-
-    @property
-    def n_states(self) -> int:
-        """Sample since the start."""
-        return 1
 
     def coefficients(self, sample_time: float | None) -> Array:
         own_sample_time(self.kind, self.sample_time, sample_time)
@@ -107,6 +95,5 @@ class Repetition(Block):
 
     @classmethod
     def example(cls) -> Self:
-        """Return corrections of half a millimetre, over two seconds that repeat."""
         time = np.arange(200) / 200
         return cls((vector(0.5 * np.sin(2 * np.pi * time)),), 0.01, repeats=True)

@@ -8,6 +8,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from mckibben.blocks.base import Block
+from mckibben.blocks.parameters import with_parts
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.numerals import numeral
 
@@ -43,7 +44,12 @@ def with_fields(model: Block, values: Mapping[str, Any]) -> Block:
                 f"{name!r} of {model.title!r} cannot be set: it is identified, or no such field",
                 remedy=f"{listed}",
             )
-    changed: Block = _changed(model, values)
+
+    def change(part: Any) -> Any:
+        new = {name: values[name] for name in getattr(part, "settable", ()) if name in values}
+        return replace(part, **new) if new else part
+
+    changed: Block = with_parts(model, change)
     for part in _parts(changed):
         for name, range_field in part.settable.items():
             ends = range_field and getattr(part, range_field)
@@ -73,19 +79,6 @@ def _parts(value: Any) -> Iterator[Block]:
         yield value
         for field in fields(value):
             yield from _parts(getattr(value, field.name))
-
-
-def _changed(value: Any, values: Mapping[str, Any]) -> Any:
-    if isinstance(value, tuple):
-        items = tuple(_changed(item, values) for item in value)
-        return value if all(a is b for a, b in zip(items, value, strict=True)) else items
-    if not (isinstance(value, Block) and is_dataclass(value)):
-        return value
-    now = {field.name: getattr(value, field.name) for field in fields(value)}
-    new = {name: _changed(one, values) for name, one in now.items()}
-    new |= {name: values[name] for name in value.settable if name in values}
-    changed = {name: one for name, one in new.items() if one is not now[name]}
-    return replace(value, **changed) if changed else value
 
 
 def summary(model: Block) -> dict[str, Any]:

@@ -11,11 +11,13 @@ block, or where a start was stated, the block begins as it states: by default at
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.fields import Initial
+from mckibben.blocks.runs import Run
 from mckibben.errors import ModelError
 
 Outputs = Callable[[Array], Array]
@@ -47,39 +49,36 @@ def stated(kind: str, n_states: int, initial: Initial) -> Array:
     return state
 
 
-def explaining_past(
-    run: Outputs,
-    inputs: Array,
-    outputs: Array,
-    *,
-    linear: bool,
-    rate_dependent: bool,
-    ends: tuple[float, float] | None,
-) -> Array:
-    """Return the inputs before the first sample that explain the first outputs, shape (k, n_inputs).
+def explaining_past(block: Any, run: Run, outputs: Array) -> Array:
+    """Return the inputs before a run that explain its first outputs, shape (k, n_inputs).
 
     Parameters
     ----------
-    run : callable
-        Runs the block.
-    inputs : array, shape (n, n_inputs)
-        Of the recording; the first drives.
+    block : Block
+        Of one driven input.
+    run : Run
     outputs : array, shape (n_outputs,)
         Measured in the first sample.
-    linear, rate_dependent : bool
-        What the block is.
-    ends : (float, float) or None
-        Lowest and highest input of the block, if known; those of the recording count too.
     """
-    first, given = inputs[0], inputs[:, 0]
-    missed = outputs - run(first[np.newaxis])[-1]
+
+    def from_rest(inputs: Array) -> Array:
+        found, state = block.run(inputs, run.sample_time, "first_sample")
+        if block.n_clipped(state):  # a past that the model itself warns of is none
+            found[:] = np.inf
+        return found
+
+    first = run.first
+    missed = outputs - from_rest(first[np.newaxis])[-1]
     if np.abs(missed).max() <= EXPLAINED * np.abs(outputs).max():
         return np.empty((0, first.size))
-    if linear:
-        return _rest_elsewhere(run, first, missed)
-    low, high = ends or (first[0], first[0])
-    low, high = min(low, float(given.min())), max(high, float(given.max()))
-    return _excursion(run, first, outputs, rate_dependent, low, high)
+    if block.is_linear:
+        return _rest_elsewhere(from_rest, first, missed)
+    driven = block
+    while parts := getattr(driven, "parts", ()):
+        driven = parts[0]
+    low, high = getattr(driven, "input_range", None) or (first[0], first[0])
+    low, high = min(low, float(run.u.min())), max(high, float(run.u.max()))
+    return _excursion(from_rest, first, outputs, block.rate_dependent, low, high)
 
 
 def _rest_elsewhere(run: Outputs, first: Array, missed: Array) -> Array:

@@ -66,7 +66,6 @@ from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector, rows
 from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, fill, kernel, step
 from mckibben.blocks.learning import Learnable
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.ranges import unknown
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError, ModelWarning
@@ -220,51 +219,42 @@ class Balance(Invertible):
         *("damping", "lines", "walls", "friction_offset", "bladders", "pushes", "mass"),
         *("asymmetry", "friction_slopes", "obstacles"),
     )
-    notation: ClassVar[Notation] = Notation(
+    formulas = (
         r"A_k(y) = \sum_i a_{ki} (y / L)^i,\quad E_k(y) = b_k y + \sum_{i \ge 2} e_{ki} "
         "(y / L)^i",
-        **{name: f"{TABLE[name].symbol} [{TABLE[name].unit}]" for name in parameters},
-        limits="r_m [mm/bar]",
-        lags=r"\tau_l [s]",
-        scale="L [mm]",
-        directions="W_{ki}",
-        preload="p_s [bar]",
-        drive="D_{ki} [bar]",
-        driven="y_i",
-        given="p_i",
     )
 
-    springs: Rows
-    elasticity: Rows
-    areas: Rows
-    friction: Rows
-    relaxation: Rows
-    loads: Rows
-    damping: Vector
-    walls: Vector
-    limits: Vector
-    friction_offset: FiniteFloat
-    lags: Vector
+    springs: Annotated[Rows, TABLE["springs"].notation]
+    elasticity: Annotated[Rows, TABLE["elasticity"].notation]
+    areas: Annotated[Rows, TABLE["areas"].notation]
+    friction: Annotated[Rows, TABLE["friction"].notation]
+    relaxation: Annotated[Rows, TABLE["relaxation"].notation]
+    loads: Annotated[Rows, TABLE["loads"].notation]
+    damping: Annotated[Vector, TABLE["damping"].notation]
+    walls: Annotated[Vector, TABLE["walls"].notation]
+    limits: Annotated[Vector, "r_m [mm/bar]"]
+    friction_offset: Annotated[FiniteFloat, TABLE["friction_offset"].notation]
+    lags: Annotated[Vector, r"\tau_l [s]"]
     hull: Rows
-    scale: Annotated[FiniteFloat, Gt(0)]
+    scale: Annotated[FiniteFloat, Gt(0), "L [mm]"]
     degree: Annotated[int, Interval(ge=1, le=4)]
-    driven: Channels
+    driven: Annotated[Channels, "y_i"]
     scheduled: Channels
-    given: Channels
-    lines: Vector = ()
-    bladders: Vector = ()
-    pushes: Vector = ()
+    given: Annotated[Channels, "p_i"]
+    lines: Annotated[Vector, TABLE["lines"].notation] = ()
+    bladders: Annotated[Vector, TABLE["bladders"].notation] = ()
+    pushes: Annotated[Vector, TABLE["pushes"].notation] = ()
     tare: bool = False
     settled: bool = False
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
-    mass: Vector = ()
+    mass: Annotated[Vector, TABLE["mass"].notation] = ()
     known: Rows = ()
-    asymmetry: Annotated[FiniteFloat, Gt(0)] | None = None
-    friction_slopes: Vector = ()
-    obstacles: Rows = ()
-    directions: Rows = ()
-    preload: FiniteFloat = 0.0
-    drive: Rows = ()
+    asymmetry: Annotated[Annotated[FiniteFloat, Gt(0)] | None, TABLE["asymmetry"].notation] = None
+    friction_slopes: Annotated[Vector, TABLE["friction_slopes"].notation] = ()
+    obstacles: Annotated[Rows, TABLE["obstacles"].notation] = ()
+    directions: Annotated[Rows, "W_{ki}"] = ()
+    preload: Annotated[FiniteFloat, "p_s [bar]"] = 0.0
+    drive: Annotated[Rows, "D_{ki} [bar]"] = ()
     held: bool = False
 
     def __post_init__(self) -> None:
@@ -369,7 +359,7 @@ class Balance(Invertible):
             r"\dot{q}_{kl} = \dot{y}_k - q_{kl} / \tau_l": self.lags,
         }
         remembered = r",\quad ".join(line for line, numbers in memory.items() if numbers)
-        return tuple(line for line in (*balance, *self.notation.equations, remembered) if line)
+        return tuple(line for line in (*balance, *self.formulas, remembered) if line)
 
     @property
     def n_loads(self) -> int:

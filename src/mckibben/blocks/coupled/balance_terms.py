@@ -65,6 +65,11 @@ class Kind(NamedTuple):
     log: bool = False
     prior: bool = False
 
+    @property
+    def notation(self) -> str:
+        """Symbol and unit, as in the annotation of a field; see `mckibben.blocks.notation`."""
+        return f"{self.symbol} [{self.unit}]"
+
 
 TWICE = log(5.0)
 """Largest logarithm of a ratio of two directions."""

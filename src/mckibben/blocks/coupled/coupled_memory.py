@@ -24,7 +24,6 @@ from mckibben.blocks.base import SEVERAL, Block
 from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
 from mckibben.blocks.hysteresis.play_operators import start_operators
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
@@ -119,24 +118,19 @@ class CoupledMemory(Block):
     parameters = ("readout",)
     no_inverse = "has no inverse: its lags cannot be inverted within a sample"
     instead = "invert balance or sdchm, or close a loop"
-    notation = Notation(
+    formulas = (
         r"\tau_l \dot{x}_{li} = u_i - x_{li},\quad z_{lik} = F_{r_{ik}}[x_{li}]",
         r"y_j = R_j \cdot \left(1,\; x,\; z,\; x_{1i} x_{1k},\; x_{1i} x_{1k} x_{1q},\; "
         r"x_{1i} x_{lk},\; x_{1i} z_{lkm}\right)",
-        lags=r"\tau_l [s]",
-        thresholds="r_{ik} [{in0}]",
-        readout="R_{jk}",
-        driven="u_i",
-        given="y_j",
     )
 
-    lags: Vector
-    thresholds: PositiveRows
-    readout: Rows
+    lags: Annotated[Vector, r"\tau_l [s]"]
+    thresholds: Annotated[PositiveRows, "r_{ik} [{in0}]"]
+    readout: Annotated[Rows, "R_{jk}"]
     degree: Annotated[int, Interval(ge=1, le=3)]
-    driven: Channels
+    driven: Annotated[Channels, "u_i"]
     scheduled: Channels
-    given: Channels
+    given: Annotated[Channels, "y_j"]
     crossed: bool = False
 
     def __post_init__(self) -> None:
@@ -162,7 +156,6 @@ class CoupledMemory(Block):
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether there are lags."""
         return any(self.lags)
 
     @property
@@ -171,7 +164,6 @@ class CoupledMemory(Block):
         return len(self.lags) * len(self.inputs) * (1 + len(self.thresholds[0]))
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return sizes, decays per sample, thresholds and readout."""
         step = needs_sample_time(self.kind, sample_time) if self.rate_dependent else 1.0
         head = [len(self.lags), len(self.thresholds[0]), self.degree, self.crossed]
         decays = [math.exp(-step / tau) if tau else 0.0 for tau in self.lags]
@@ -179,7 +171,6 @@ class CoupledMemory(Block):
         return np.concatenate([head, decays, radii, self.pack()])
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
-        """Return the unit of a parameter: for the readout, the output per product of inputs."""
         if field != "readout":
             return super().unit_of(field, index)
         units = [channel.unit for channel in self.inputs]
@@ -193,12 +184,10 @@ class CoupledMemory(Block):
                 for unit in units
                 for other in per[1 + len(units) : 1 + self.n_states]
             ]
-        given = self.outputs[index[0]].unit
-        return f"{given or '1'}/{per[index[1]]}" if per[index[1]].strip() else given
+        return f"{self.outputs[index[0]].unit or '1'}/{per[index[1]].strip() or '1'}"
 
     @classmethod
     def example(cls) -> Self:
-        """Return a model of two inputs and one tip."""
         width = readout_width(2, 2, 1, 2)
         readout = 0.5 / (1.0 + np.arange(width))
         return cls(

@@ -8,7 +8,7 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (8) and (14).
 
 from __future__ import annotations
 
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic.dataclasses import dataclass
@@ -17,7 +17,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, rows
 from mckibben.blocks.kernels import step
-from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 WORST_CONDITION = 1e8
@@ -53,16 +52,11 @@ class Coupling(Block):
     kernel = coupling_step
     is_linear = True
     parameters = ("gains",)
-    notation = Notation(
-        r"h_j = \sum_i G_{ij} v_i",
-        gains="G_{ij} [{out1}/{in0}]",
-        driven="v_i",
-        given="h_j",
-    )
+    formulas = (r"h_j = \sum_i G_{ij} v_i",)
 
-    gains: Rows
-    driven: Channels
-    given: Channels
+    gains: Annotated[Rows, "G_{ij} [{out1}/{in0}]"]
+    driven: Annotated[Channels, "v_i"]
+    given: Annotated[Channels, "h_j"]
 
     def __post_init__(self) -> None:
         widths = [len(row) for row in self.gains]
@@ -111,7 +105,6 @@ class Coupling(Block):
         return Coupling(rows(invert(self.matrix)), self.given, self.driven)
 
     def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return the range of each output over a box of inputs."""
         at_low, at_high = self.matrix.T * low, self.matrix.T * high
         return np.minimum(at_low, at_high).sum(axis=1), np.maximum(at_low, at_high).sum(axis=1)
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic.dataclasses import dataclass
@@ -29,7 +29,7 @@ from mckibben.blocks.base import SEVERAL
 from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import DERIVED, NOTHING, SLACK, fill, kernel, step
-from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import one_per
 from mckibben.blocks.solving import eliminate
 from mckibben.errors import ModelError
 
@@ -294,24 +294,20 @@ class FuzzyNetwork(Invertible):
     inverse_kernel = fuzzy_network_inverse_step
     inverse_start_kernel = fuzzy_network_inverse_start
     inverse_path_dependent = True
+    n_inverse_states = one_per("driven", 1)  # the last solution, and the clip count
     solved = True
     of_local_rules = True
     parameters = ("centres", "widths", "consequents")
-    notation = Notation(
+    formulas = (
         r"y_k = \frac{\sum_r \omega_r\, (P_{rk} \cdot x + c_{rk})}{\sum_r \omega_r},\quad "
         r"\omega_r = \prod_i \exp\left(-\frac{(x_i - m_{ir})^2}{2 \sigma_{ir}^2}\right)",
-        centres="m_{ij} [{in0}]",
-        widths=r"\sigma_{ij} [{in0}]",
-        consequents="P_i",
-        driven="x_i",
-        given="y_k",
     )
 
-    centres: Rows
-    widths: PositiveRows
-    consequents: Vector
-    driven: Channels
-    given: Channels
+    centres: Annotated[Rows, "m_{ij} [{in0}]"]
+    widths: Annotated[PositiveRows, r"\sigma_{ij} [{in0}]"]
+    consequents: Annotated[Vector, "P_i"]
+    driven: Annotated[Channels, "x_i"]
+    given: Annotated[Channels, "y_k"]
     scheduled: Channels = ()
     constants: bool = False
     limits: Rows | None = None
@@ -343,7 +339,6 @@ class FuzzyNetwork(Invertible):
 
     @property
     def n_scratch(self) -> int:
-        """Memberships."""
         return len(self.centres) * max(map(len, self.centres))
 
     def coefficients(self, sample_time: float | None) -> Array:
@@ -356,18 +351,12 @@ class FuzzyNetwork(Invertible):
         return math.prod(map(len, self.centres[:n]))
 
     def check_invertible(self) -> None:
-        """Require as many outputs as driven inputs, and limits."""
         if len(self.given) != len(self.driven) or self.limits is None:
             raise ModelError(
                 f"{self.kind!r} with {len(self.driven)} driven inputs, {len(self.given)} "
                 f"outputs and limits {self.limits} has no inverse",
                 remedy="give as many of both, and limits",
             )
-
-    @property
-    def n_inverse_states(self) -> int:
-        """States of the inverse: the last solution, and the clip count."""
-        return len(self.driven) + 1
 
     @property
     def n_inverse_scratch(self) -> int:
@@ -377,28 +366,23 @@ class FuzzyNetwork(Invertible):
         return self.n_scratch + solving
 
     def inverse_numbers(self, own: Array) -> Array:
-        """Return the limits, lowest then highest, and the network's coefficients."""
         return np.concatenate([*np.array(self.limits).T, own])
 
     def inverse_complaint(self, state: Array) -> str:
-        """Return a warning about references out of reach."""
         return (
             f"{int(state[-1])} samples of the reference are out of reach of the network and were "
             "clipped to the nearest that is"
         )
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
-        """Return the unit of a parameter: of a consequent, the output, or output per input."""
         if field != "consequents":
             return super().unit_of(field, index)
-        per = [channel.unit for channel in self.inputs]
-        rule, place = divmod(index[-1], len(per) + self.constants)
-        given = self.outputs[rule % len(self.outputs)].unit
-        return f"{given or '1'}/{per[place]}" if place < len(per) and per[place] else given
+        per = [*(channel.unit for channel in self.inputs), *[""] * self.constants]
+        rule, place = divmod(index[-1], len(per))
+        return f"{self.outputs[rule % len(self.outputs)].unit or '1'}/{per[place] or '1'}"
 
     @classmethod
     def example(cls) -> Self:
-        """Return a small network of two muscles, scheduled by an extensor."""
         centres, widths = (0.0, 30.0), (20.0, 20.0)
         consequents = []
         for a, b, p in product((0, 1), repeat=3):

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
@@ -39,7 +39,6 @@ from mckibben.blocks.coupled.balance_law import (
 from mckibben.blocks.fields import STRICT, Channel
 from mckibben.blocks.kernels import fill, kernel, step
 from mckibben.blocks.memoryless import Affine
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
@@ -130,9 +129,9 @@ class LoadEstimate(Block):
     parameters = ("forward",)
     typical = (Balance.example(),)
     _of_model = same_as("forward")
-    notation = Notation(
+    formulas = (
         r"F = C^{+} \left(p A(y) - \text{springs} - \text{elasticity} - \text{friction} - "
-        r"\text{relaxation} - \text{damping} - \text{inertia}\right)"
+        r"\text{relaxation} - \text{damping} - \text{inertia}\right)",
     )
 
     forward: Annotated[InstanceOf[Balance], BeforeValidator(nested)]
@@ -174,7 +173,6 @@ class LoadEstimate(Block):
         return self.forward.n_scratch + len(self.forward.scheduled)
 
     def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Yield the balance's."""
         return self.forward.strictly_increasing()
 
     def coefficients(self, sample_time: float | None) -> Array:
@@ -194,10 +192,10 @@ class ForceCompensator(Composition):
         displacement and on its pressure.
     """
 
-    kind: ClassVar[str] = "force-compensator"
-    inverts: ClassVar[bool] = True
-    path_dependent: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = ("forward",)
+    kind = "force-compensator"
+    inverts = True
+    path_dependent = True
+    parameters = ("forward",)
 
     forward: Annotated[InstanceOf[Block], BeforeValidator(nested)]
 
@@ -254,7 +252,6 @@ class ForceCompensator(Composition):
         return Series(self.parts).wired(board, [place, *scheduled, force])
 
     def joined(self, parts: Sequence[str]) -> str:
-        """Return the nested expression of the series."""
         return rf"p = {'['.join(reversed(parts))}[x{']' * len(parts)}"
 
     def reachable(self) -> tuple[Array, Array]:
@@ -264,7 +261,6 @@ class ForceCompensator(Composition):
 
     @classmethod
     def example(cls) -> Self:
-        """Return that of a muscle behind a length."""
         pressure, force = Channel("pressure", "bar"), Channel("force", "N")
         displacement = Channel("displacement", "mm")
         balance = Balance(

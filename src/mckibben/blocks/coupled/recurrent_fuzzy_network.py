@@ -28,7 +28,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Block
 from mckibben.blocks.fields import STRICT, Channel, Channels, Positive, PositiveRows, Rows, Vector
 from mckibben.blocks.kernels import kernel, remember, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.sample_times import own_sample_time
 from mckibben.errors import ModelError
@@ -157,30 +156,22 @@ class RecurrentFuzzyNetwork(Block):
     no_inverse = "has no inverse: within one sample its input hardly changes its output"
     instead = "invert balance, or close a loop"
     parameters = ("centres", "widths", "feedbacks", "consequents")
-    notation = Notation(
+    formulas = (
         r"y_t = \frac{\sum_r \omega_r\, (P_r \cdot x_t + c_r)}{\sum_r \omega_r},\quad "
         r"\omega_r = \prod_i O_{ir,t}",
         r"O_{ij,t} = \exp\left(-\frac{(x_{i,t} - m_{ij} + \theta_{ij} O_{ij,t-1})^2}{2 "
         r"\sigma_{ij}^2}\right)",
         r"x_t = (y_{t-1}, \ldots,\; u_t, \ldots,\; s_t, \ldots)",
-        centres="m_{ij}",
-        widths=r"\sigma_{ij}",
-        feedbacks=r"\theta_{ij}",
-        consequents="P_i",
-        own_time="T [s]",
-        driven="u",
-        scheduled="s_i",
-        given="y",
     )
 
-    centres: Rows
-    widths: PositiveRows
-    feedbacks: Rows
-    consequents: Vector
-    own_time: Positive
-    driven: Channels
-    scheduled: Channels
-    given: Channels
+    centres: Annotated[Rows, "m_{ij}"]
+    widths: Annotated[PositiveRows, r"\sigma_{ij}"]
+    feedbacks: Annotated[Rows, r"\theta_{ij}"]
+    consequents: Annotated[Vector, "P_i"]
+    own_time: Annotated[Positive, "T [s]"]
+    driven: Annotated[Channels, "u"]
+    scheduled: Annotated[Channels, "s_i"]
+    given: Annotated[Channels, "y"]
     output_lags: Annotated[int, Interval(ge=1, le=10)] = 1
     input_lags: Lag = 0
     scheduling_lags: Lag = 0
@@ -227,7 +218,6 @@ class RecurrentFuzzyNetwork(Block):
         return past + self.n_regressors * self.n_sets
 
     def state_at(self, first: Array, output: Array) -> Array:
-        """Return the equilibrium state at the first inputs if the output is known."""
         state = self.initial_state(first, sample_time=self.sample_time)
         state[: self.output_lags] = output[0]
         return state
@@ -248,12 +238,9 @@ class RecurrentFuzzyNetwork(Block):
         return units
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
-        """Return the unit of a parameter: of a consequent, the output, or output per input."""
         if field in ("centres", "widths", "feedbacks"):
             return self._regressor_units[index[0]]
         if field != "consequents":
             return super().unit_of(field, index)
-        per = self._regressor_units
-        place = index[-1] % (len(per) + self.constants)
-        given = self.outputs[0].unit
-        return f"{given or '1'}/{per[place]}" if place < len(per) and per[place] else given
+        per = [*self._regressor_units, *[""] * self.constants]
+        return f"{self.outputs[0].unit or '1'}/{per[index[-1] % len(per)] or '1'}"

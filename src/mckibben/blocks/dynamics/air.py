@@ -23,14 +23,13 @@ from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Le
-from pydantic import FiniteFloat
+from pydantic import Field, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, remember, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError, ModelWarning
 
@@ -131,7 +130,7 @@ def air_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: 
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class Air(Invertible):
+class Air(fields.WithMemory, Invertible):
     """Valve or regulator with air, from command to measured pressure.
 
     Parameters
@@ -168,33 +167,24 @@ class Air(Invertible):
     rate_dependent = True
     parameters = (*("gain", "offset", "hysteresis", "filling_time", "venting_time"),)
     typical = (0.6, 0.1, 0.06, 0.03, 0.05, 0.02, 0.0, 6.0, (0.0, 10.0))
-    notation = Notation(
+    formulas = (
         r"\begin{cases} T_f \dot{x} = g_f - x & \text{filling, } g_f = K (u - u_0 - h/2) "
         r"> x \\ T_v \dot{x} = g_v - x & \text{venting, } g_v = K (u - u_0 + h/2) < x "
         r"\end{cases}",
         "y(t) = x(t - T_d)",
-        gain="K [{y}/{u}]",
-        offset="u_0 [{u}]",
-        hysteresis="h [{u}]",
-        filling_time="T_f [s]",
-        venting_time="T_v [s]",
-        dead_time="T_d [s]",
-        ambient=r"p_{\min} [{y}]",
-        supply=r"p_{\max} [{y}]",
     )
 
-    gain: fields.Positive
-    offset: FiniteFloat
-    hysteresis: fields.NotNegative
-    filling_time: Annotated[FiniteFloat, Ge(0), Le(LONGEST_LAG)]
-    venting_time: Annotated[FiniteFloat, Ge(0), Le(LONGEST_LAG)]
-    dead_time: fields.NotNegative = 0.0
-    ambient: FiniteFloat | None = 0.0
-    supply: FiniteFloat | None = None
+    gain: Annotated[fields.Positive, "K [{y}/{u}]"]
+    offset: Annotated[FiniteFloat, "u_0 [{u}]"]
+    hysteresis: Annotated[fields.NotNegative, "h [{u}]"]
+    filling_time: Annotated[FiniteFloat, Ge(0), Le(LONGEST_LAG), "T_f [s]"]
+    venting_time: Annotated[FiniteFloat, Ge(0), Le(LONGEST_LAG), "T_v [s]"]
+    dead_time: Annotated[fields.NotNegative, "T_d [s]"] = 0.0
+    ambient: Annotated[FiniteFloat | None, r"p_{\min} [{y}]"] = 0.0
+    supply: Annotated[FiniteFloat | None, r"p_{\max} [{y}]"] = None
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.Channel("voltage", "V")
-    output: fields.ChannelField = fields.PRESSURE
+    input: fields.ChannelField = Field(default=fields.Channel("voltage", "V"), kw_only=True)
+    output: fields.ChannelField = Field(default=fields.PRESSURE, kw_only=True)
 
     def __post_init__(self) -> None:
         lowest, highest = self.pressures
@@ -254,7 +244,6 @@ class Air(Invertible):
         return np.array([self.gain, *self.offsets, *shares, *self.pressures, round(late)])
 
     def inverse_state(self, state: Array) -> Array:
-        """Return the pressure, and a clip count of 0."""
         return np.array([state[0], 0.0])
 
     def reachable(self) -> tuple[Array, Array]:
@@ -271,7 +260,6 @@ class Air(Invertible):
         return np.array([lowest + left]), np.array([highest - left])
 
     def inverse_complaint(self, state: Array) -> str:
-        """Return a warning about clipped references."""
         low, high = self.reachable()
         return (
             f"{int(state[-1])} sample(s) of the reference {self.output.name!r} were clipped: they are "

@@ -8,6 +8,8 @@ a_k = exp(-T / tau_k), so the output answers at once and the inverse is in close
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 from pydantic.dataclasses import dataclass
 
@@ -16,16 +18,14 @@ from mckibben.blocks.fields import (
     DISPLACEMENT,
     STRICT,
     ChannelField,
+    NotNegativeVector,
     PositiveVector,
     StartRule,
-    Vector,
 )
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.sample_times import needs_sample_time
-from mckibben.errors import ModelError
 
 
 @step
@@ -115,32 +115,16 @@ class Creep(Invertible):
     rate_dependent = True
     is_linear = True
     counts_clipped = False
-    parameters = ("compliances", "time_constants")
+    parameters = same_length = ("compliances", "time_constants")
     n_states = one_per("compliances")  # one to every Kelvin-Voigt element
     typical = ((0.08, 0.05), (1.5, 40.0))
-    notation = Notation(
-        r"y = u + \sum_k c_k x_k,\quad \tau_k \dot{x}_k = u - x_k",
-        compliances="c_k",
-        time_constants=r"\tau_k [s]",
-    )
+    formulas = (r"y = u + \sum_k c_k x_k,\quad \tau_k \dot{x}_k = u - x_k",)
 
-    compliances: Vector
-    time_constants: PositiveVector
+    compliances: Annotated[NotNegativeVector, "c_k"]
+    time_constants: Annotated[PositiveVector, r"\tau_k [s]"]
     initial: StartRule = "first_sample"
     input: ChannelField = DISPLACEMENT
     output: ChannelField = DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        if len(self.compliances) != len(self.time_constants):
-            raise ModelError(
-                f"{self.kind!r} has {len(self.compliances)} compliances and "
-                f"{len(self.time_constants)} time constants",
-                remedy="give one to each",
-            )
-        if min(self.compliances, default=0.0) < 0:
-            raise ModelError(
-                f"{self.kind!r} has a negative compliance", remedy="give compliances of 0 or more"
-            )
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [decays per sample, compliances]."""

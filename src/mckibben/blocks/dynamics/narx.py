@@ -26,9 +26,8 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Start
-from mckibben.blocks.hysteresis.play_operators import check_order, start_operators
+from mckibben.blocks.hysteresis.play_operators import start_operators
 from mckibben.blocks.kernels import Step, kernel, remember, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.sample_times import own_sample_time
 from mckibben.errors import ModelError
 
@@ -54,12 +53,6 @@ REGRESSORS = (
     r"\bar{u}_{t-d-m+1},\, F_{r_1}[\bar{u}]_t, \ldots)",
     r"\bar{u} = (u - u_1) / u_2,\quad \bar{y} = (y - y_1) / y_2",
 )
-SYMBOLS = {
-    "thresholds": "r_i",
-    "input_scale": "u_i [{u}]",
-    "output_scale": "y_i [{y}]",
-    "sample_time": "T [s]",
-}
 
 
 @kernel
@@ -173,7 +166,7 @@ def network(coefficients: Array, state: Array) -> float:
 
 
 @dataclass(frozen=True, kw_only=True, config=fields.STRICT)
-class Narx(Block):
+class Narx(fields.WithMemory, Block):
     """Fields and states shared by NARX models.
 
     Parameters
@@ -192,26 +185,21 @@ class Narx(Block):
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: at rest at the first input, which may have risen
         there; or at rest with the operators at the centre.
-    input, output : Channel
-        Channel driven and channel given.
     """
 
     rate_dependent = True
+    increasing = ("thresholds",)
     no_inverse = "has no exact inverse: its output need not increase with its input"
 
     output_lags: Lags
     input_lags: Lags
     delay: Lags = 0
-    thresholds: fields.Vector = ()
-    input_scale: fields.Scale
-    output_scale: fields.Scale
-    sample_time: fields.Positive
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
+    thresholds: Annotated[fields.NotNegativeVector, "r_i"] = ()
+    input_scale: Annotated[fields.Scale, "u_i [{u}]"]
+    output_scale: Annotated[fields.Scale, "y_i [{y}]"]
+    sample_time: Annotated[fields.Positive, "T [s]"]
 
     def __post_init__(self) -> None:
-        check_order(self.kind, self.thresholds)
         if not self.places:
             raise ModelError(f"{self.kind!r} has no regressors", remedy="give a lag or an operator")
 
@@ -245,7 +233,6 @@ class Narx(Block):
         """
 
     def state_at(self, first: Array, output: Array) -> Array | None:
-        """Return the equilibrium state at a first input if the output is known."""
         centre, half = self.output_scale
         state = self.initial_state(first, "first_sample", self.sample_time)
         state[: self.output_lags] = (float(output[0]) - centre) / half
@@ -270,12 +257,10 @@ class NarxPolynomial(Narx):
     kind = "narx-polynomial"
     kernel, start_kernel = narx_kernels(sum_of_terms)
     parameters = ("weights",)
-    notation = Notation(
-        r"\bar{y}_t = \sum_i w_i \prod_{j \in P_i} x_{j,t}", *REGRESSORS, weights="w_i", **SYMBOLS
-    )
+    formulas = (r"\bar{y}_t = \sum_i w_i \prod_{j \in P_i} x_{j,t}", *REGRESSORS)
 
     terms: Terms
-    weights: fields.Vector
+    weights: Annotated[fields.Vector, "w_i"]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -309,7 +294,6 @@ class NarxPolynomial(Narx):
 
     @classmethod
     def example(cls) -> Self:
-        """Return a first-order model with a quadratic term and a play operator."""
         return cls(
             output_lags=1,
             input_lags=2,
@@ -352,18 +336,11 @@ class NarxNetwork(Narx):
     kind = "narx-network"
     kernel, start_kernel = narx_kernels(network)
     parameters = ("bias", "linear", "hidden")
-    notation = Notation(
-        r"\bar{y}_t = b + l^\top x_t + \sum_h o_h\, a(w_h^\top x_t + s_h)",
-        *REGRESSORS,
-        bias="b",
-        linear="l_i",
-        hidden="h_i",
-        **SYMBOLS,
-    )
+    formulas = (r"\bar{y}_t = b + l^\top x_t + \sum_h o_h\, a(w_h^\top x_t + s_h)", *REGRESSORS)
 
-    bias: FiniteFloat
-    linear: fields.Vector
-    hidden: fields.Vector
+    bias: Annotated[FiniteFloat, "b"]
+    linear: Annotated[fields.Vector, "l_i"]
+    hidden: Annotated[fields.Vector, "h_i"]
     activation: Literal["tanh", "wavelet"] = "tanh"
 
     def __post_init__(self) -> None:
@@ -394,7 +371,6 @@ class NarxNetwork(Narx):
 
     @classmethod
     def example(cls) -> Self:
-        """Return a first-order model with two units."""
         return cls(
             output_lags=1,
             input_lags=2,

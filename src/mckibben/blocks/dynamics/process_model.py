@@ -13,7 +13,7 @@ corner of the delayed input by matrix exponentials.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -23,7 +23,6 @@ from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block
 from mckibben.blocks.kernels import kernel, remember, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
@@ -65,7 +64,7 @@ def process_model_start(coefficients: Array, state: Array, inputs: Array, virgin
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class ProcessModel(Block):
+class ProcessModel(fields.WithMemory, Block):
     """Gain, one to three lags, optional zero and delay, about an operating point.
 
     Parameters
@@ -86,8 +85,6 @@ class ProcessModel(Block):
         What the input does between samples: go on in a straight line, or stay.
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: at rest at the first input, or at the operating point.
-    input, output : Channel
-        Channel driven and channel given.
     """
 
     kind = "process-model"
@@ -97,27 +94,15 @@ class ProcessModel(Block):
     is_linear = True
     filters = True
     typical = (6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
-    notation = Notation(
-        gain="K [{y}/{u}]",
-        time_constants="T_{p,i} [s]",
-        damping=r"\zeta",
-        zero_time="T_z [s]",
-        delay="T_d [s]",
-        input_offset="u_0 [{u}]",
-        output_offset="y_0 [{y}]",
-    )
 
-    gain: FiniteFloat
-    time_constants: fields.PositiveVector
-    damping: fields.Positive | None = None
-    zero_time: FiniteFloat | None = None
-    delay: fields.NotNegative = 0.0
-    input_offset: FiniteFloat = 0.0
-    output_offset: FiniteFloat = 0.0
-    hold: Literal["first", "zero"] = "first"
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
+    gain: Annotated[FiniteFloat, "K [{y}/{u}]"]
+    time_constants: Annotated[fields.PositiveVector, "T_{p,i} [s]"]
+    damping: Annotated[fields.Positive | None, r"\zeta"] = None
+    zero_time: Annotated[FiniteFloat | None, "T_z [s]"] = None
+    delay: Annotated[fields.NotNegative, "T_d [s]"] = 0.0
+    input_offset: Annotated[FiniteFloat, "u_0 [{u}]"] = 0.0
+    output_offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
+    hold: fields.Hold = "first"
 
     def __post_init__(self) -> None:
         n = len(self.time_constants)
@@ -149,7 +134,6 @@ class ProcessModel(Block):
 
     @property
     def no_inverse(self) -> str:  # type: ignore[override]
-        """Why this structure has no inverse."""
         return (
             f"({self.name}) has no exact inverse: its output lags its input, so following a reference "
             "would take derivatives of it"
@@ -175,7 +159,6 @@ class ProcessModel(Block):
         return _discretised(self, sample_time).copy()
 
     def equations(self) -> tuple[str, ...]:
-        """Return the transfer function of this structure."""
         below = r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1"
         if self.damping is None:
             below = "".join(f"(T_{{p,{k + 1}}} s + 1)" for k in range(self.order))

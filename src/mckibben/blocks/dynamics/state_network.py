@@ -14,7 +14,8 @@ models", 1995; in continuous time, as neural ordinary differential equations.
 from __future__ import annotations
 
 import math
-from typing import Self
+from dataclasses import replace
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -23,12 +24,12 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block
-from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
+from mckibben.recording import Recording
+from mckibben.signals.periodic import band_limited
 
 HEAD = 9
 SUBSTEP, N_SUBSTEPS, HOLDS, N_STATES, UNITS = range(5)
@@ -119,8 +120,61 @@ def state_network_start(
         state[n] = inputs[0]
 
 
+PERIODS, REPEATS = 100, 1e-9
+"""Maximum number of periods simulated, and the relative difference at which two are equal."""
+
+BETWEEN = 2
+"""Interpolated samples per substep of a band-limited input."""
+
+
+def steady_state(block: StateNetwork, recording: Recording) -> Recording:
+    """Return the steady-state response to a periodic recording.
+
+    The input is taken to be band-limited between samples, as a multisine measured over whole
+    periods is; neither holds of `simulate`, which starts somewhere and joins samples as `hold` says.
+
+    Parameters
+    ----------
+    block : StateNetwork
+    recording : Recording
+        A whole number of periods of the input, with time.
+
+    Returns
+    -------
+    Recording
+        Of the input, and the modelled output.
+
+    Raises
+    ------
+    ModelError
+        Where no response comes to repeat itself.
+    """
+    given = block._inputs_from(recording)
+    step, ratio = needs_sample_time(block.kind, recording.sample_time), BETWEEN * block.substeps
+    fine = np.ascontiguousarray(np.roll(band_limited(given[:, 0], ratio), -1)[:, np.newaxis])
+    finer = replace(block, substeps=1, hold="first")
+    state, found = block.initial_state(given[0], "virgin", step), np.empty_like(fine)
+    run = finer.bind(step / ratio, state, fine, found)
+    state[-1] = given[0, 0]
+    before = np.full(len(given), np.inf)
+    for _ in range(PERIODS):
+        run()
+        now = np.roll(found[ratio - 1 :: ratio, 0], 1)
+        change = np.abs(now - before).max()
+        if not np.isfinite(now).all() or change <= REPEATS * np.ptp(now):
+            break
+        before = now.copy()
+    if not change <= REPEATS * np.ptp(now):
+        raise ModelError(
+            f"the response of {block.kind!r} to {recording.name} is not periodic "
+            f"within {PERIODS} periods",
+            remedy="use simulate, which starts from rest",
+        )
+    return block._modelled(recording, now[:, np.newaxis])
+
+
 @dataclass(frozen=True, kw_only=True, config=fields.STRICT)
-class StateNetwork(Block):
+class StateNetwork(fields.WithMemory, Block):
     """State-space model of a linear part and tanh units.
 
     Parameters
@@ -142,8 +196,6 @@ class StateNetwork(Block):
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: as after the first input has long been held, or states
         and input 0.
-    input, output : Channel
-        Channel driven and channel given.
     """
 
     kind = "state-network"
@@ -153,33 +205,24 @@ class StateNetwork(Block):
     steady_state = steady_state
     parameters = ("linear", "hidden", "readout")
     n_states = one_per("linear", 1)  # states, and the last input
-    notation = Notation(
+    n_scratch = one_per("linear", times=3)  # a state, its rates, and their sum
+    formulas = (
         r"\dot{x} = \lambda \left(L v + R \tanh(H v)\right),\quad v = \left(x,\, \frac{u "
         r"- u_0}{u_s},\, 1\right)",
         "y = y_0 + y_s x_1",
-        linear="L_{ij}",
-        hidden="H_{ij}",
-        readout="R_{ij}",
-        rate=r"\lambda [1/s]",
-        input_offset="u_0 [{u}]",
-        input_scale="u_s [{u}]",
-        output_offset="y_0 [{y}]",
-        output_scale="y_s [{y}]",
     )
 
-    linear: fields.Rows
-    hidden: fields.Rows
-    readout: fields.Rows
-    rate: fields.Positive
-    input_offset: FiniteFloat = 0.0
-    input_scale: fields.Positive = 1.0
-    output_offset: FiniteFloat = 0.0
-    output_scale: fields.Positive = 1.0
-    substeps: Substeps = 1
-    hold: Hold = "first"
-    initial: fields.StoredInitial = "first_sample"
+    linear: Annotated[fields.Rows, "L_{ij}"]
+    hidden: Annotated[fields.Rows, "H_{ij}"]
+    readout: Annotated[fields.Rows, "R_{ij}"]
+    rate: Annotated[fields.Positive, r"\lambda [1/s]"]
+    input_offset: Annotated[FiniteFloat, "u_0 [{u}]"] = 0.0
+    input_scale: Annotated[fields.Positive, "u_s [{u}]"] = 1.0
+    output_offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
+    output_scale: Annotated[fields.Positive, "y_s [{y}]"] = 1.0
+    substeps: fields.Substeps = 1
+    hold: fields.Hold = "first"
     input: fields.ChannelField = fields.FORCE
-    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         n, units = len(self.linear), len(self.hidden)
@@ -193,13 +236,7 @@ class StateNetwork(Block):
                 f"{units} weights of units",
             )
 
-    @property
-    def n_scratch(self) -> int:
-        """Scratch: a state, its rates, and their sum."""
-        return 3 * len(self.linear)
-
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the coefficients for a sample time."""
         step = self.rate * needs_sample_time(self.kind, sample_time) / self.substeps
         if not step <= FASTEST:
             raise ModelError(
@@ -214,7 +251,6 @@ class StateNetwork(Block):
 
     @classmethod
     def example(cls) -> Self:
-        """Return an oscillator with a hardening spring."""
         linear = ((0.0, 1.0, 0.0, 0.0), (-1.5, -0.4, 1.0, 0.0))
         return cls(
             linear=linear,

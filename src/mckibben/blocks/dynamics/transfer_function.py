@@ -9,6 +9,8 @@ output answers at once (b_0 is not zero) and all zeros of B lie within the unit 
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import FiniteFloat
@@ -18,7 +20,6 @@ from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.sample_times import own_sample_time
 from mckibben.errors import ModelError
 
@@ -56,7 +57,7 @@ def filter_start(coefficients: Array, state: Array, inputs: Array, virgin: bool)
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class TransferFunction(Block):
+class TransferFunction(fields.WithMemory, Block):
     """Discrete transfer function about an operating point.
 
     Parameters
@@ -72,8 +73,6 @@ class TransferFunction(Block):
         u_0 and y_0, the operating point.
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: at rest at the first input, or at u_0.
-    input, output : Channel
-        Channel driven and channel given.
     noise_numerator, noise_denominator : sequence of float
         c_1, c_2, ... and d_1, d_2, ... of the noise model C / D, its leading ones left out.
     noise_deviation : float or None
@@ -95,35 +94,23 @@ class TransferFunction(Block):
         "output_offset",
     )
     typical = ((0.9, -0.85, 0.018), (-1.2, 0.21), 0.01, 1.0, 2.0)
-    notation = Notation(
+    formulas = (
         r"y_t - y_0 = \frac{B(q)}{F(q)} (u_t - u_0) + \frac{C(q)}{D(q)} e_t",
         r"B(q) = \sum_k b_k q^{-k},\quad F(q) = 1 + \sum_k f_k q^{-k}",
-        numerator="b_k from 0 [{y}/{u}]",
-        denominator="f_k",
-        sample_time="T [s]",
-        input_offset="u_0 [{u}]",
-        output_offset="y_0 [{y}]",
-        noise_numerator="c_k",
-        noise_denominator="d_k",
-        noise_deviation=r"\sigma_e [{y}]",
     )
 
-    numerator: fields.PolynomialField
-    denominator: fields.Coefficients
-    sample_time: fields.Positive
-    input_offset: FiniteFloat = 0.0
-    output_offset: FiniteFloat = 0.0
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
-    noise_numerator: fields.Coefficients = ()
-    noise_denominator: fields.Coefficients = ()
-    noise_deviation: fields.NotNegative | None = None
+    numerator: Annotated[fields.PolynomialField, "b_k from 0 [{y}/{u}]"]
+    denominator: Annotated[fields.Coefficients, "f_k"]
+    sample_time: Annotated[fields.Positive, "T [s]"]
+    input_offset: Annotated[FiniteFloat, "u_0 [{u}]"] = 0.0
+    output_offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
+    noise_numerator: Annotated[fields.Coefficients, "c_k"] = ()
+    noise_denominator: Annotated[fields.Coefficients, "d_k"] = ()
+    noise_deviation: Annotated[fields.NotNegative | None, r"\sigma_e [{y}]"] = None
     input_range: fields.InputRange | None = None
 
     @property
     def n_states(self) -> int:
-        """The order."""
         return max(len(self.numerator) - 1, len(self.denominator))
 
     @property
@@ -183,7 +170,7 @@ class TransferFunction(Block):
             self.sample_time,
             self.output_offset,
             self.input_offset,
-            self.initial if isinstance(self.initial, str) else "first_sample",
-            self.output,
-            self.input,
+            initial=self.initial if isinstance(self.initial, str) else "first_sample",
+            input=self.output,
+            output=self.input,
         )

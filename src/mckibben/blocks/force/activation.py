@@ -18,17 +18,37 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.base import Block, Ports
-from mckibben.blocks.hysteresis.play_operators import check_order
+from mckibben.blocks.base import Block
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.sample_times import needs_sample_time, rate_filter
 from mckibben.errors import ModelError
 
-PORTS: Ports = ("input",), ("force",), ("output",)
 
-INVERTS_A_MUSCLE = "has no inverse here: it already computes the pressure for a contraction"
-INSTEAD = "use it as the compensator, or fit pressure to contraction by another model"
+@dataclass(frozen=True, kw_only=True, config=fields.STRICT)
+class Activation(Block):
+    """Fields of a model of the pressure for a contraction under a force.
+
+    Parameters
+    ----------
+    rate_time_constant : float
+        Of the filter of the rate [s]; 0 for none.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: at rest.
+    input, force, output : Channel
+        Contraction, force and pressure.
+    """
+
+    settable: ClassVar[Mapping[str, str | None]] = {"rate_time_constant": None}
+    ports = ("input",), ("force",), ("output",)
+    rate_dependent = True
+    no_inverse = "has no inverse here: it already computes the pressure for a contraction"
+    instead = "use it as the compensator, or fit pressure to contraction by another model"
+
+    rate_time_constant: Annotated[fields.NotNegative, "T [s]"] = 0.0
+    initial: fields.StoredInitial = "first_sample"
+    input: Annotated[fields.ChannelField, r"\epsilon"] = fields.CONTRACTION
+    force: Annotated[fields.ChannelField, "F"] = fields.FORCE
+    output: Annotated[fields.ChannelField, "p"] = fields.PRESSURE
 
 
 # -- the published model ---------------------------------------------------------------------
@@ -82,7 +102,7 @@ def published_start(coefficients: Array, state: Array, inputs: Array, virgin: bo
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class ActivationPressure(Block):
+class ActivationPressure(Activation):
     """Pressure for a contraction under a force, at one frequency of excitation.
 
     Source: "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization and
@@ -101,12 +121,6 @@ class ActivationPressure(Block):
         Slope [1/Hz] and constant of gamma by frequency.
     frequency : float
         Of the excitation [Hz]; not negative.
-    rate_time_constant : float
-        Of the filter of the rate [s]; 0 for none.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample: at rest.
-    input, force, output : Channel
-        Contraction, force and pressure.
     frequency_range : (float, float), optional
         Lowest and highest frequency that it was identified at [Hz].
     """
@@ -116,12 +130,8 @@ class ActivationPressure(Block):
         "frequency": "frequency_range",
         "rate_time_constant": None,
     }
-    ports = PORTS
     kernel = published_step
     start_kernel = published_start
-    rate_dependent = True
-    no_inverse = INVERTS_A_MUSCLE
-    instead = INSTEAD
     parameters = ("contractions", "pressures", "phi", "gamma")
     typical = (
         (*[0.0] * 3, -1.0, *[0.0] * 2, 0.01, 6.0, *[0.0] * 3, 2.0, 0.0, 0.001, 0.0, 4.0),
@@ -134,33 +144,19 @@ class ActivationPressure(Block):
         *((0.0, 0.0, 0.01, 0.3), (0.27, 0.67), 1.0),
     )
     n_states = 2  # previous contraction and filtered rate
-    notation = Notation(
+    formulas = (
         r"p = \sum_{k=0}^{3} b_k(F)\, \epsilon^k + \gamma\, \phi(F)\, \dot{\epsilon}",
         r"\text{the cubic goes through } (\epsilon_j(F),\, y_j(F)),\; j = 1, \ldots, 4,\; "
         r"\text{each coordinate a cubic of } F",
         r"\gamma = \gamma_1 \nu + \gamma_2,\quad \phi(F) = \phi_1 F^3 + \phi_2 F^2 + "
         r"\phi_3 F + \phi_4",
-        contractions=r"\epsilon_k [1/N^3|1/N^2|1/N|1]",
-        pressures="y_k [bar/N^3|bar/N^2|bar/N|bar]",
-        phi=r"\phi_k [bar s/N^3|bar s/N^2|bar s/N|bar s]",
-        gamma=r"\gamma_k [1/Hz|1]",
-        frequency=r"\nu [Hz]",
-        rate_time_constant="T [s]",
-        input=r"\epsilon",
-        force="F",
-        output="p",
     )
 
-    contractions: fields.Vector
-    pressures: fields.Vector
-    phi: fields.Vector
-    gamma: tuple[FiniteFloat, FiniteFloat]
-    frequency: fields.NotNegative
-    rate_time_constant: fields.NotNegative = 0.0
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.CONTRACTION
-    force: fields.ChannelField = fields.FORCE
-    output: fields.ChannelField = fields.PRESSURE
+    contractions: Annotated[fields.Vector, r"\epsilon_k [1/N^3|1/N^2|1/N|1]"]
+    pressures: Annotated[fields.Vector, "y_k [bar/N^3|bar/N^2|bar/N|bar]"]
+    phi: Annotated[fields.Vector, r"\phi_k [bar s/N^3|bar s/N^2|bar s/N|bar s]"]
+    gamma: Annotated[tuple[FiniteFloat, FiniteFloat], r"\gamma_k [1/Hz|1]"]
+    frequency: Annotated[fields.NotNegative, r"\nu [Hz]"]
     frequency_range: tuple[fields.NotNegative, fields.NotNegative] | None = None
 
     def __post_init__(self) -> None:
@@ -235,7 +231,7 @@ def remembering_start(coefficients: Array, state: Array, inputs: Array, virgin: 
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class ActivationMemory(Block):
+class ActivationMemory(Activation):
     """Pressure for a contraction under a force, at any frequency.
 
     Dry friction is carried by stop operators, which keep it while the muscle rests and through minor
@@ -259,61 +255,36 @@ class ActivationMemory(Block):
         Of the surface.
     input_scale, force_scale : (float, float)
         Centre and half the range of contraction and force [N]; the latter positive.
-    rate_time_constant : float
-        Of the filter of the rate [s]; 0 for none.
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: the contraction has only risen, or has never moved.
-    input, force, output : Channel
-        Contraction, force and pressure.
     """
 
     kind = "activation-memory"
-    settable: ClassVar[Mapping[str, str | None]] = {"rate_time_constant": None}
-    ports = PORTS
+    increasing = ("thresholds",)
     kernel = remembering_step
     start_kernel = remembering_start
-    rate_dependent = True
-    no_inverse = INVERTS_A_MUSCLE
-    instead = INSTEAD
     parameters = ("surface", "friction", "viscosity", "relaxation")
     typical = (
         *((2.0, 0.5, 1.5, 0.1, 0.2, 0.0), (0.2, 0.8), (0.3, 0.2, 0.1, 0.0), (0.05, 0.01)),
         *((0.1, 0.02), (0.5,), 2, 1, (2.5, 2.5), (2.5, 2.5)),
     )
-    notation = Notation(
+    formulas = (
         r"p = \sum_{ij} c_{ij} x^i f^j + \sum_k (a_k + b_k f) S_k[\epsilon] + (d_0 + d_1 "
         r"f) \dot{\epsilon} + \sum_m (g_m + h_m f)(x_m - x)",
         r"x = (\epsilon - \epsilon_1) / \epsilon_2,\quad f = (F - F_1) / F_2,\quad "
         r"S_k[\epsilon] = \epsilon - F_{r_k}[\epsilon],\quad \tau_m \dot{x}_m = x - x_m",
-        surface="c_k [bar]",
-        thresholds="r_k",
-        friction="a_k [bar]",
-        viscosity="d_k from 0 [bar s]",
-        relaxation="g_k [bar]",
-        time_constants=r"\tau_m [s]",
-        input_scale=r"\epsilon_i",
-        force_scale="F_i [N]",
-        rate_time_constant="T [s]",
-        input=r"\epsilon",
-        force="F",
-        output="p",
     )
 
-    surface: fields.Vector
-    thresholds: fields.PositiveVector
-    friction: fields.Vector
-    viscosity: tuple[FiniteFloat, FiniteFloat]
-    relaxation: fields.Vector
-    time_constants: fields.PositiveVector
+    surface: Annotated[fields.Vector, "c_k [bar]"]
+    thresholds: Annotated[fields.PositiveVector, "r_k"]
+    friction: Annotated[fields.Vector, "a_k [bar]"]
+    viscosity: Annotated[tuple[FiniteFloat, FiniteFloat], "d_k from 0 [bar s]"]
+    relaxation: Annotated[fields.Vector, "g_k [bar]"]
+    time_constants: Annotated[fields.PositiveVector, r"\tau_m [s]"]
     degree: Annotated[int, Interval(ge=0, le=9)]
     force_degree: Annotated[int, Interval(ge=0, le=9)]
-    input_scale: fields.Scale
-    force_scale: fields.Scale
-    rate_time_constant: fields.NotNegative = 0.0
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.CONTRACTION
-    force: fields.ChannelField = fields.FORCE
-    output: fields.ChannelField = fields.PRESSURE
+    input_scale: Annotated[fields.Scale, r"\epsilon_i"]
+    force_scale: Annotated[fields.Scale, "F_i [N]"]
 
     def __post_init__(self) -> None:
         size = (self.degree + 1) * (self.force_degree + 1)
@@ -324,7 +295,6 @@ class ActivationMemory(Block):
                 f"{len(self.friction)} of friction",
                 remedy=f"give {size} and {n}",
             )
-        check_order(self.kind, self.thresholds)
         if len(self.relaxation) != 2 * len(self.time_constants):
             raise ModelError(
                 f"{self.kind!r} has {len(self.relaxation)} numbers of relaxation and the "
@@ -334,7 +304,6 @@ class ActivationMemory(Block):
 
     @property
     def n_states(self) -> int:
-        """States: play operators, previous contraction, filtered rate, relaxation."""
         return len(self.thresholds) + 2 + len(self.time_constants)
 
     def coefficients(self, sample_time: float | None) -> Array:

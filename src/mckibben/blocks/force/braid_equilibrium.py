@@ -23,7 +23,6 @@ from mckibben.blocks import fields
 from mckibben.blocks.force.laws import braid
 from mckibben.blocks.inverse import Invertible, nothing_clipped
 from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton
 
 LARGEST_SHARE = 0.995
@@ -124,34 +123,25 @@ class BraidEquilibrium(Invertible):
         "offset",
     )
     typical = (196.0, 150.0, 900.0, 0.45, 200.0)
-    notation = Notation(
+    formulas = (
         r"p A \left(a (1 - \epsilon)^2 - b\right) = F + k \epsilon + h \epsilon^3,\quad A "
         r"= \frac{\pi d^2}{4}",
         r"a = \frac{3}{\tan^2 \alpha},\quad b = \frac{1}{\sin^2 \alpha},\quad y = l_0 "
         r"\epsilon + y_0",
-        load="F [N]",
-        stiffness="k [N]",
-        hardening="h [N]",
-        braid_angle=r"\alpha [rad]",
-        rest_length="l_0 [mm]",
-        offset="y_0 [{y}]",
-        diameter="d [mm]",
-        input="p",
     )
 
-    load: fields.Positive
-    stiffness: fields.NotNegative
-    hardening: fields.NotNegative
-    braid_angle: Annotated[FiniteFloat, Interval(ge=0.1, le=0.95)]
-    rest_length: fields.Positive
-    offset: FiniteFloat = 0.0
-    diameter: fields.Positive = 20.0
-    input: fields.ChannelField = fields.PRESSURE
+    load: Annotated[fields.Positive, "F [N]"]
+    stiffness: Annotated[fields.NotNegative, "k [N]"]
+    hardening: Annotated[fields.NotNegative, "h [N]"]
+    braid_angle: Annotated[FiniteFloat, Interval(ge=0.1, le=0.95), r"\alpha [rad]"]
+    rest_length: Annotated[fields.Positive, "l_0 [mm]"]
+    offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
+    diameter: Annotated[fields.Positive, "d [mm]"] = 20.0
+    input: Annotated[fields.ChannelField, "p"] = fields.PRESSURE
     output: fields.ChannelField = fields.DISPLACEMENT
 
     @property
     def input_range(self) -> tuple[float, float]:
-        """Lowest and highest pressure for which the balance is solved [bar]."""
         c = self.coefficients(None)
         return float(balance(c[LOW], c)), float(balance(c[HIGH], c))
 

@@ -28,7 +28,6 @@ from mckibben.blocks.force.multistate_friction import (
 )
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.memoryless import Polynomial
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
@@ -93,7 +92,7 @@ class ForceFeedforward(Block):
     ports = ("law.output",), ("law.input",), ("law.pressure",)
     parameters = ("law", "friction")
     typical = (PolynomialForce((50.0, 5.0), (-10.0, 5.0)), MultistateFriction.example())
-    notation = Notation(
+    formulas = (
         r"p = \frac{f - h(l) - f_h (1 - g_p p_r)}{g(l) + g_p f_h}",
         r"f = p\, g(l) + h(l) + \left(1 + g_p (p - p_r)\right) f_h[l]",
     )
@@ -132,12 +131,10 @@ class ForceFeedforward(Block):
 
     @property
     def forward_model(self) -> Block:
-        """The force model: the law alone, or with friction."""
         return self.law if self.friction is None else Parallel((self.law, self.friction))
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether there is friction."""
         return self.friction is not None
 
     @property
@@ -154,7 +151,6 @@ class ForceFeedforward(Block):
 
     @property
     def n_scratch(self) -> int:
-        """Scratch of the friction."""
         return 3 + (0 if self.friction is None else self.friction.n_scratch)
 
     @property

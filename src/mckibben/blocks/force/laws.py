@@ -18,7 +18,6 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.memoryless import polynomial_at
-from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 NEWTONS_PER_BAR = 0.1
@@ -34,16 +33,27 @@ def braid(angle: float, diameter: float) -> tuple[float, float, float]:
     return area, 3.0 / math.tan(angle) ** 2, 1.0 / math.sin(angle) ** 2
 
 
-class ForceLaw(Block):
-    """A static force law: from length [mm], scheduled by pressure [bar], to force [N]."""
+@dataclass(frozen=True, kw_only=True, repr=False, config=fields.STRICT)
+class ForceByLength:
+    """Channels of a force by length, scheduled by pressure.
+
+    Parameters
+    ----------
+    input, pressure, output : Channel
+        Length [mm], pressure [bar] and force [N].
+    """
+
+    input: Annotated[fields.ChannelField, "l"] = fields.LENGTH
+    pressure: Annotated[fields.ChannelField, "p"] = fields.PRESSURE
+    output: Annotated[fields.ChannelField, "f"] = fields.FORCE
+
+
+class ForceLaw(ForceByLength, Block):
+    """A static force law: from length, scheduled by pressure, to force."""
 
     ports = ("input",), ("pressure",), ("output",)
     no_inverse = "has no inverse by length, since several lengths may have the same force"
     instead = "for the pressure that gives a force at a length, use ForceFeedforward(law)"
-
-    input: fields.Channel
-    pressure: fields.Channel
-    output: fields.Channel
 
     terms_kernel: ClassVar[Callable[[float, Array], tuple[float, float]]]
     """Computes force per pressure [N/bar] and force at zero pressure [N] from a length and
@@ -106,8 +116,6 @@ class PolynomialForce(ForceLaw):
         h, ascending, [N]; at least one.
     centre, scale : float
         Of the length [mm]; scale positive.
-    input, pressure, output : Channel
-        Length, pressure and force.
     """
 
     kind = "polynomial-force"
@@ -115,24 +123,12 @@ class PolynomialForce(ForceLaw):
     terms_kernel = polynomial_force_terms
     parameters = ("per_bar", "elastic")
     typical = ((50.0, 20.0), (-10.0, 5.0, 8.0), 3.0, 2.0)
-    notation = Notation(
-        r"f = p \sum_i g_i x^i + \sum_j h_j x^j,\quad x = \frac{l - m}{s}",
-        per_bar="g_i from 0 [N/bar]",
-        elastic="h_j from 0 [N]",
-        centre="m [mm]",
-        scale="s [mm]",
-        input="l",
-        pressure="p",
-        output="f",
-    )
+    formulas = (r"f = p \sum_i g_i x^i + \sum_j h_j x^j,\quad x = \frac{l - m}{s}",)
 
-    per_bar: fields.PolynomialField
-    elastic: fields.PolynomialField
-    centre: FiniteFloat = 0.0
-    scale: fields.Positive = 1.0
-    input: fields.ChannelField = fields.LENGTH
-    pressure: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.FORCE
+    per_bar: Annotated[fields.PolynomialField, "g_i from 0 [N/bar]"]
+    elastic: Annotated[fields.PolynomialField, "h_j from 0 [N]"]
+    centre: Annotated[FiniteFloat, "m [mm]"] = 0.0
+    scale: Annotated[fields.Positive, "s [mm]"] = 1.0
 
     def unscaled(self) -> Self:
         """Return the same law as polynomials of the unscaled length, as printed in papers."""
@@ -178,8 +174,6 @@ class ChouHannaford(ForceLaw):
         n, positive.
     constant : float
         Added [N].
-    input, pressure, output : Channel
-        Length, pressure and force.
     """
 
     kind = "chou-hannaford"
@@ -187,22 +181,11 @@ class ChouHannaford(ForceLaw):
     terms_kernel = chou_hannaford_terms
     parameters = ("thread_length", "turns", "constant")
     typical = (6.0, 0.5, -1.0)
-    notation = Notation(
-        r"f = p\, \frac{3 l^2 - b^2}{4 \pi n^2} + c",
-        thread_length="b [mm]",
-        turns="n",
-        constant="c [N]",
-        input="l",
-        pressure="p",
-        output="f",
-    )
+    formulas = (r"f = p\, \frac{3 l^2 - b^2}{4 \pi n^2} + c",)
 
-    thread_length: fields.Positive
-    turns: fields.Positive
-    constant: FiniteFloat = 0.0
-    input: fields.ChannelField = fields.LENGTH
-    pressure: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.FORCE
+    thread_length: Annotated[fields.Positive, "b [mm]"]
+    turns: Annotated[fields.Positive, "n"]
+    constant: Annotated[FiniteFloat, "c [N]"] = 0.0
 
     def coefficients(self, sample_time: float | None) -> Array:
         per_bar = 3 * NEWTONS_PER_BAR / (4 * math.pi * self.turns**2)
@@ -258,8 +241,6 @@ class TonduLopez(ForceLaw):
         kappa_1 and kappa_0.
     constant : float
         Added [N].
-    input, pressure, output : Channel
-        Length, pressure and force.
     """
 
     kind = "tondu-lopez"
@@ -267,32 +248,20 @@ class TonduLopez(ForceLaw):
     terms_kernel = tondu_lopez_terms
     parameters = ("braid_angle", "mu", "kappa", "constant")
     typical = (5.0, 3.0, 0.45, (0.05, 0.9), (0.2, 1.1), -2.0)
-    notation = Notation(
+    formulas = (
         r"f = \mu(\epsilon)\, A\, p \left(a (1 - \kappa(p) \epsilon)^2 - b\right) + "
         r"c,\quad \epsilon = 1 - \frac{l}{l_0},\quad A = \frac{\pi d^2}{4}",
         r"a = \frac{3}{\tan^2 \alpha},\quad b = \frac{1}{\sin^2 \alpha},\quad "
         r"\mu(\epsilon) = \mu_1 e^{-40 \epsilon} + \mu_2,\quad \kappa(p) = \kappa_1 "
         r"e^{-p} + \kappa_2",
-        braid_angle=r"\alpha [rad]",
-        mu=r"\mu_i",
-        kappa=r"\kappa_i",
-        constant="c [N]",
-        rest_length="l_0 [mm]",
-        diameter="d [mm]",
-        input="l",
-        pressure="p",
-        output="f",
     )
 
-    rest_length: fields.Positive
-    diameter: fields.Positive
-    braid_angle: Annotated[FiniteFloat, Interval(ge=0.1, le=0.95)]
-    mu: tuple[FiniteFloat, FiniteFloat] = (0.0, 1.0)
-    kappa: tuple[FiniteFloat, FiniteFloat] = (0.0, 1.0)
-    constant: FiniteFloat = 0.0
-    input: fields.ChannelField = fields.LENGTH
-    pressure: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.FORCE
+    rest_length: Annotated[fields.Positive, "l_0 [mm]"]
+    diameter: Annotated[fields.Positive, "d [mm]"]
+    braid_angle: Annotated[FiniteFloat, Interval(ge=0.1, le=0.95), r"\alpha [rad]"]
+    mu: Annotated[tuple[FiniteFloat, FiniteFloat], r"\mu_i"] = (0.0, 1.0)
+    kappa: Annotated[tuple[FiniteFloat, FiniteFloat], r"\kappa_i"] = (0.0, 1.0)
+    constant: Annotated[FiniteFloat, "c [N]"] = 0.0
 
     def coefficients(self, sample_time: float | None) -> Array:
         cylinder = braid(self.braid_angle, self.diameter)

@@ -26,14 +26,14 @@ from dataclasses import replace
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, FiniteFloat
+from pydantic import BeforeValidator, Field, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block
+from mckibben.blocks.force.laws import ForceByLength
 from mckibben.blocks.kernels import accumulate, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
@@ -145,7 +145,7 @@ def multistate_friction_start(
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class MultistateFriction(Block):
+class MultistateFriction(ForceByLength, Block):
     """Friction force by length, with elements that switch with the direction of motion.
 
     Parameters
@@ -163,8 +163,6 @@ class MultistateFriction(Block):
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: as if the length had only grown, or nothing
         deflected.
-    input, pressure, output : Channel
-        Length, pressure and force.
     """
 
     kind = "multistate-friction"
@@ -183,27 +181,19 @@ class MultistateFriction(Block):
     instead = "compensate it by ForceFeedforward(law, friction), in closed form"
     n_states = one_per("elements", 1)  # deflections, and the previous length
     n_scratch = one_per("elements")  # what single precision loses of the deflections
-    notation = Notation(
+    formulas = (
         r"f = \left(1 + g_p (p - p_r)\right) \sum_i \operatorname{sat}(F_{c,i},\, k_i x_i "
         r"+ \sigma_i \dot{l})",
         r"\dot{x}_i = \frac{\operatorname{sat}(F_{c,i},\, k_i x_i + \sigma_i \dot{l}) - "
         r"k_i x_i}{\sigma_i},\quad k_i, \sigma_i, F_{c,i} \text{ switch with the sign of "
         r"} \dot{l}",
-        pressure_gain="g_p [1/bar]",
-        reference_pressure="p_r [bar]",
-        input="l",
-        pressure="p",
-        output="f",
     )
 
     elements: Annotated[tuple[Direction, ...], BeforeValidator(fields.plain_sequence)]
     values: fields.PositiveVector
-    pressure_gain: FiniteFloat = 0.0
-    reference_pressure: FiniteFloat = 0.0
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.LENGTH
-    pressure: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.FORCE
+    pressure_gain: Annotated[FiniteFloat, "g_p [1/bar]"] = 0.0
+    reference_pressure: Annotated[FiniteFloat, "p_r [bar]"] = 0.0
+    initial: fields.StoredInitial = Field(default="first_sample", kw_only=True)
 
     def __post_init__(self) -> None:
         wanted = sum(SIZES[element] for element in self.elements)

@@ -41,7 +41,6 @@ from mckibben.blocks.base import Start
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.memoryless import least_slope, polynomial_at
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solved_inverse
 from mckibben.errors import ModelError
 
@@ -162,7 +161,7 @@ def bouc_wen_output(u: float, z: float, c: Array) -> float:
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class BoucWen(Invertible):
+class BoucWen(fields.WithMemory, Invertible):
     """Normalised Bouc-Wen model with a reversible polynomial.
 
     Parameters
@@ -182,8 +181,8 @@ class BoucWen(Invertible):
         Of the input in the polynomial; scale positive.
     input_range : (float, float), optional
         Lowest and highest input; the inverse needs it and clips there.
-    initial, input, output
-        Default memory before the first sample, z = 1 or virgin z = 0, and the channels driven and given.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample, z = 1 or virgin z = 0.
     """
 
     kind = "bouc-wen"
@@ -196,29 +195,20 @@ class BoucWen(Invertible):
     parameters = ("polynomial", "weight", "rate", "sigma")
     layout = ("rate", "centre", "scale", "exponent", "weight", "sigma", "polynomial")
     typical = ((14.0, 16.0, -1.0, -1.0), -2.5, 1.2, 0.7, 1, 2.5, 2.5, (0.0, 5.0))
-    notation = Notation(
+    formulas = (
         r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",
         r"\frac{dz}{du} = \rho \left(1 - |z|^n \left[\sigma \operatorname{sgn}(z\, du) + "
         r"1 - \sigma\right]\right)",
-        polynomial="c_k from 0 [{y}]",
-        weight="w [{y}]",
-        rate=r"\rho [1/{u}]",
-        sigma=r"\sigma",
-        centre="m [{u}]",
-        scale="s [{u}]",
     )
 
-    polynomial: fields.PolynomialField
-    weight: FiniteFloat
-    rate: fields.Positive
-    sigma: Annotated[FiniteFloat, Ge(0.5)]
+    polynomial: Annotated[fields.PolynomialField, "c_k from 0 [{y}]"]
+    weight: Annotated[FiniteFloat, "w [{y}]"]
+    rate: Annotated[fields.Positive, r"\rho [1/{u}]"]
+    sigma: Annotated[FiniteFloat, Ge(0.5), r"\sigma"]
     exponent: Literal[1, 2] = 1
-    centre: FiniteFloat = 0.0
-    scale: fields.Positive = 1.0
+    centre: Annotated[FiniteFloat, "m [{u}]"] = 0.0
+    scale: Annotated[fields.Positive, "s [{u}]"] = 1.0
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
 
     def least_slope(self) -> float:
         steepest = self.rate * max(1.0, 2.0 * self.sigma)
@@ -261,7 +251,7 @@ def generalized_output(u: float, z: float, c: Array) -> float:
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class GeneralizedBoucWen(Invertible):
+class GeneralizedBoucWen(fields.WithMemory, Invertible):
     """Generalized Bouc-Wen model with a reversible polynomial.
 
     Parameters
@@ -281,8 +271,8 @@ class GeneralizedBoucWen(Invertible):
         Of the input in the polynomial; scale positive.
     input_range : (float, float), optional
         Lowest and highest input; the inverse needs it and clips there.
-    initial, input, output
-        Default memory before the first sample, z = 1 or virgin z = 0, and the channels driven and given.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample, z = 1 or virgin z = 0.
     """
 
     kind = "generalized-bouc-wen"
@@ -298,31 +288,22 @@ class GeneralizedBoucWen(Invertible):
         *((14.0, 16.0, -1.0, -1.0), -0.9, 1.2, (0.1, -0.1, 0.15, 0.05, -0.1)),
         *(1, 2.5, 2.5, (0.0, 5.0)),
     )
-    notation = Notation(
+    formulas = (
         r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",
         r"\frac{dz}{du} = \rho \left(1 - |z|^n \psi\right)",
         r"\psi = \operatorname{sgn}(z\,du) + b_2 \operatorname{sgn}(x\,du) + b_3 "
         r"\operatorname{sgn}(x z) + b_4 \operatorname{sgn}(du) + b_5 "
         r"\operatorname{sgn}(z) + b_6 \operatorname{sgn}(x)",
-        polynomial="c_k from 0 [{y}]",
-        weight="w [{y}]",
-        rate=r"\rho [1/{u}]",
-        shape="b_k from 2",
-        centre="m [{u}]",
-        scale="s [{u}]",
     )
 
-    polynomial: fields.PolynomialField
-    weight: FiniteFloat
-    rate: fields.Positive
-    shape: fields.Vector
+    polynomial: Annotated[fields.PolynomialField, "c_k from 0 [{y}]"]
+    weight: Annotated[FiniteFloat, "w [{y}]"]
+    rate: Annotated[fields.Positive, r"\rho [1/{u}]"]
+    shape: Annotated[fields.Vector, "b_k from 2"]
     exponent: Literal[1, 2] = 1
-    centre: FiniteFloat = 0.0
-    scale: fields.Positive = 1.0
+    centre: Annotated[FiniteFloat, "m [{u}]"] = 0.0
+    scale: Annotated[fields.Positive, "s [{u}]"] = 1.0
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         if len(self.shape) != 5 or not np.abs(self.shape).sum() < 1:
@@ -393,7 +374,7 @@ def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: flo
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class Duhem(Invertible):
+class Duhem(fields.WithMemory, Invertible):
     """Duhem model with polynomial limit curve and polynomial slope.
 
     Parameters
@@ -410,8 +391,6 @@ class Duhem(Invertible):
         Lowest and highest input; the inverse needs it and clips there.
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: on the curve of inputs that have only risen, or on f.
-    input, output : Channel
-        Channel driven and channel given.
     """
 
     kind = "duhem"
@@ -423,26 +402,18 @@ class Duhem(Invertible):
     )
     parameters = ("target", "slope", "alpha")
     typical = ((14.0, 16.0, -1.0), (12.0, -1.0), 1.5, 2.5, 2.5, (0.0, 5.0))
-    notation = Notation(
+    formulas = (
         r"\frac{dy}{dx} = \alpha \operatorname{sgn}(dx) \left(f(x) - y\right) + "
         r"g(x),\quad x = \frac{u - m}{s}",
         r"f(x) = \sum_k f_k x^k,\quad g(x) = \sum_k g_k x^k",
-        target="f_k from 0 [{y}]",
-        slope="g_k from 0 [{y}]",
-        alpha=r"\alpha",
-        centre="m [{u}]",
-        scale="s [{u}]",
     )
 
-    target: fields.PolynomialField
-    slope: fields.PolynomialField
-    alpha: fields.Positive
-    centre: FiniteFloat = 0.0
-    scale: fields.Positive = 1.0
+    target: Annotated[fields.PolynomialField, "f_k from 0 [{y}]"]
+    slope: Annotated[fields.PolynomialField, "g_k from 0 [{y}]"]
+    alpha: Annotated[fields.Positive, r"\alpha"]
+    centre: Annotated[FiniteFloat, "m [{u}]"] = 0.0
+    scale: Annotated[fields.Positive, "s [{u}]"] = 1.0
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [alpha, centre, scale, P rising, P falling, f], padded to the length of P."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, ClassVar, Protocol, Self, cast
+from typing import Annotated, Any, ClassVar, Protocol, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,10 +19,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.fields import STRICT, Positive, Vector
+from mckibben.blocks.fields import STRICT, Knots, Positive, Vector
 from mckibben.blocks.kernels import inlined, kernel
-from mckibben.blocks.memoryless import check_increasing, interpolate
-from mckibben.blocks.notation import Notation
+from mckibben.blocks.memoryless import interpolate
 from mckibben.blocks.parameters import Parametrised
 from mckibben.blocks.saving import part_from_dict
 from mckibben.errors import ModelError
@@ -52,9 +51,6 @@ def envelope_kernel(function: Callable[[float, Array], float]) -> EnvelopeKernel
 class Envelope(Parametrised):
     """A strictly increasing function of the input, with its inverse."""
 
-    increasing: ClassVar[tuple[str, ...]] = ()
-    """Fields that must be strictly increasing, also after rounding to single precision."""
-
     value: ClassVar[EnvelopeKernel]
     inverse: ClassVar[EnvelopeKernel]
 
@@ -62,7 +58,6 @@ class Envelope(Parametrised):
     """Arguments of `examples`."""
 
     def coefficients(self) -> Array:
-        """Return the coefficients of the kernels; by default the parameters."""
         return self.pack()
 
     def shifted(self, offset: float) -> Self:
@@ -126,11 +121,11 @@ class Tanh(Envelope):
     inverse = tanh_inverse
     parameters = ("slope", "shift", "offset")
     typical = (0.5, -1.3, 0.0), (0.45, -0.9, 0.1)
-    notation = Notation(r"\gamma(u) = \tanh(a u + b) + c", slope="a [1/{u}]", shift="b", offset="c")
+    formulas = (r"\gamma(u) = \tanh(a u + b) + c",)
 
-    slope: Positive
-    shift: FiniteFloat
-    offset: FiniteFloat = 0.0
+    slope: Annotated[Positive, "a [1/{u}]"]
+    shift: Annotated[FiniteFloat, "b"]
+    offset: Annotated[FiniteFloat, "c"] = 0.0
 
 
 @envelope_kernel
@@ -169,16 +164,11 @@ class Exponential(Envelope):
     inverse = exponential_inverse
     parameters = ("rate", "shift", "offset")
     typical = (0.3, 0.2, 0.0), (0.4, 0.2, 0.2)
-    notation = Notation(
-        r"\gamma(u) = c + \operatorname{sgn}(a) \left(1 - e^{b - a u}\right)",
-        rate="a [1/{u}]",
-        shift="b",
-        offset="c",
-    )
+    formulas = (r"\gamma(u) = c + \operatorname{sgn}(a) \left(1 - e^{b - a u}\right)",)
 
-    rate: FiniteFloat
-    shift: FiniteFloat
-    offset: FiniteFloat = 0.0
+    rate: Annotated[FiniteFloat, "a [1/{u}]"]
+    shift: Annotated[FiniteFloat, "b"]
+    offset: Annotated[FiniteFloat, "c"] = 0.0
 
     def __post_init__(self) -> None:
         if self.rate == 0:
@@ -216,29 +206,23 @@ class PiecewiseLinear(Envelope):
     kind = "piecewise-linear"
     value = piecewise_linear_value
     inverse = piecewise_linear_inverse
-    increasing = ("knots", "values")
+    increasing = same_length = ("knots", "values")
     parameters = ("values",)
     typical = (
         ((0.0, 1.0, 2.5, 4.0, 5.0), (0.0, 0.1, 0.5, 0.9, 1.0)),
         ((0.0, 1.0, 2.5, 4.0, 5.0), (0.05, 0.3, 0.7, 0.95, 1.05)),
     )
-    notation = Notation(
+    formulas = (
         r"\gamma(u) = v_k + (v_{k+1} - v_k) \frac{u - \xi_k}{\xi_{k+1} - \xi_k},\quad "
         r"\xi_k \le u \le \xi_{k+1}",
-        knots=r"\xi_k [{u}]",
-        values="v_k",
     )
 
-    knots: Vector
-    values: Vector
-
-    def __post_init__(self) -> None:
-        check_increasing("piecewise-linear envelope", self.knots, self.values)
+    knots: Annotated[Knots, r"\xi_k [{u}]"]
+    values: Annotated[Vector, "v_k"]
 
     def coefficients(self) -> Array:
         """Return [knots, values]."""
         return np.array([*self.knots, *self.values])
 
     def shifted(self, offset: float) -> Self:
-        """Return this envelope shifted up by a constant."""
         return replace(self, values=tuple(value + offset for value in self.values))

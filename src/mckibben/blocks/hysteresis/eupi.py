@@ -14,16 +14,17 @@ differ in how they write the falling edge; this general form contains them.
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.hysteresis.play_operators import check_thresholds, start_operators
+from mckibben.blocks.hysteresis.play_operators import start_operators
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import inlined, kernel
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.solving import solved_kernels
 from mckibben.errors import ModelError
@@ -80,7 +81,7 @@ def eupi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class EUPI(Invertible):
+class EUPI(fields.WithMemory, Invertible):
     """Extended unparallel Prandtl-Ishlinskii model.
 
     Parameters
@@ -99,8 +100,6 @@ class EUPI(Invertible):
         Constant of the output.
     input_range : (float, float)
         Lowest and highest input; x counts from the lowest, and the inverse clips to both.
-    initial, input, output
-        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "eupi"
@@ -111,37 +110,28 @@ class EUPI(Invertible):
         eupi_output, eupi_advance, eupi_start
     )
     increasing = ("thresholds",)
+    same_length = ("thresholds", "weights")
     parameters = ("weights", "falling_slope", "falling_threshold", "polynomial", "offset")
     typical = (
         *((0.0, 0.3, 0.8, 1.5), (2.0, 1.5, 1.0, 0.5), 1.1, 0.8),
         *((1.0, 0.2, -0.02), 2.0, (0.0, 5.0)),
     )
     n_states = one_per("thresholds")  # one an operator
-    notation = Notation(
+    formulas = (
         r"y = y_0 + \sum_{k} a_k x^k + \sum_i w_i F_i[x],\quad x = u - u_{\min}",
         r"F_{i,t} = \begin{cases} \max(x_t - r_i,\, F_{i,t-1}) & x \text{ rises} \\ "
         r"\min(\alpha x_t + \beta r_i,\, F_{i,t-1}) & x \text{ falls} \end{cases}",
-        thresholds="r_i [{u}]",
-        weights="w_i [{y}/{u}]",
-        falling_slope=r"\alpha",
-        falling_threshold=r"\beta",
-        polynomial="a_k [{y}/{u}|{y}/{u}^2|{y}/{u}^3]",
-        offset="y_0 [{y}]",
     )
 
-    thresholds: fields.Vector
-    weights: fields.Vector
-    falling_slope: fields.Positive
-    falling_threshold: fields.NotNegative
-    polynomial: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-    offset: FiniteFloat
+    thresholds: Annotated[fields.Thresholds, "r_i [{u}]"]
+    weights: Annotated[fields.Vector, "w_i [{y}/{u}]"]
+    falling_slope: Annotated[fields.Positive, r"\alpha"]
+    falling_threshold: Annotated[fields.NotNegative, r"\beta"]
+    polynomial: Annotated[
+        tuple[FiniteFloat, FiniteFloat, FiniteFloat], "a_k [{y}/{u}|{y}/{u}^2|{y}/{u}^3]"
+    ]
+    offset: Annotated[FiniteFloat, "y_0 [{y}]"]
     input_range: fields.InputRange
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_thresholds(self.kind, self.thresholds, self.weights)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [u_0, alpha, beta, offset, a_1, a_2, a_3, thresholds, weights]."""
@@ -154,7 +144,6 @@ class EUPI(Invertible):
         return self.input_range[0] + (1 + self.falling_threshold) * np.array(self.thresholds)
 
     def check_invertible(self) -> None:
-        """Require non-negative weights, and an increasing memoryless part."""
         if min(self.weights) < 0 or self.least_slope() <= 0:
             raise ModelError(
                 "'eupi' has no inverse: a weight is negative, or its part without memory "
@@ -163,7 +152,6 @@ class EUPI(Invertible):
             )
 
     def least_slope(self) -> float:
-        """Return a lower bound of the slope of the memoryless part by the input."""
         low, high = self.input_range
         a1, a2, a3 = self.polynomial
         turn = -a2 / (3 * a3) if a3 else 0.0

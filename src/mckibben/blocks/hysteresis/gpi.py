@@ -33,7 +33,6 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.hysteresis.envelopes import Envelope, Tanh, nested_envelope
 from mckibben.blocks.hysteresis.play_operators import (
     check_invertible_sum,
-    check_thresholds,
     follow,
     start_operators,
     start_sum,
@@ -42,7 +41,6 @@ from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import inlined, kernel, step, summing_step
 from mckibben.blocks.learning import Learnable, learnable_operators, learning_kernels
 from mckibben.blocks.memoryless import Affine
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import one_per
 from mckibben.errors import ModelError
 
@@ -159,7 +157,7 @@ def smallest_gap(
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class GPI(Invertible):
+class GPI(fields.WithMemory, Invertible):
     """Generalized Prandtl-Ishlinskii model.
 
     Parameters
@@ -173,8 +171,6 @@ class GPI(Invertible):
         gamma_R and gamma_L. The inverse requires gamma_L >= gamma_R over the input range.
     input_range : (float, float)
         Lowest and highest input, over which the conditions hold and to which the inverse clips.
-    initial, input, output
-        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "gpi"
@@ -182,28 +178,21 @@ class GPI(Invertible):
     adaptive_step, adaptive_start = map(of_envelopes, (4, 5))
     inverse_memory = "output"
     increasing = ("thresholds",)
+    same_length = ("thresholds", "weights")
     parameters = ("weights", "rising", "falling")
     n_states = one_per("thresholds", 1)  # and the previous input
     typical = ((0.0, 0.1, 0.3, 0.5), (9.0, 4.0, 2.0, 1.0), *Tanh.examples(), (0.0, 5.0))
-    notation = Notation(
+    formulas = (
         r"y = \sum_i x_i w_i",
         r"w_{i,t} = \begin{cases} \max(\gamma_R(u_t) - r_i,\, w_{i,t-1}) & u \text{ "
         r"rises} \\ \min(\gamma_L(u_t) + r_i,\, w_{i,t-1}) & u \text{ falls} \end{cases}",
-        thresholds="r_i",
-        weights="x_i [{y}]",
     )
 
-    thresholds: fields.Vector
-    weights: fields.Vector
+    thresholds: Annotated[fields.Thresholds, "r_i"]
+    weights: Annotated[fields.Vector, "x_i [{y}]"]
     rising: EnvelopeField
     falling: EnvelopeField
     input_range: fields.InputRange
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_thresholds(self.kind, self.thresholds, self.weights)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [size of the rising envelope, thresholds, weights, rising, falling]."""
@@ -223,7 +212,6 @@ class GPI(Invertible):
         return np.asarray(self.rising.solve(edges[edges < self.rising(high)]))
 
     def check_invertible(self) -> None:
-        """Require a first threshold of 0, an increasing sum, and ordered envelopes within the limits."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
         gap, where = smallest_gap(self.rising, self.falling, self.input_range)
         if gap < 0:

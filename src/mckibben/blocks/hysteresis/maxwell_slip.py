@@ -12,17 +12,18 @@ et al. 2016 (the modified model, here with one ratio of each for all elements).
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
+from annotated_types import MinLen
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
-from mckibben.blocks.hysteresis.play_operators import check_thresholds
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.memoryless import least_slope, polynomial_at
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.solving import solve_input, solved_start
 
@@ -122,7 +123,7 @@ def maxwell_slip_start(coefficients: Array, state: Array, inputs: Array, virgin:
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class MaxwellSlip(Invertible):
+class MaxwellSlip(fields.WithMemory, Invertible):
     """Slipping springs in parallel with a reversible polynomial.
 
     Parameters
@@ -144,8 +145,6 @@ class MaxwellSlip(Invertible):
         Lowest and highest input; the inverse needs it and clips there.
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: all springs slipping upwards, or none deflected.
-    input, output : Channel
-        Channel driven and channel given.
     """
 
     kind = "maxwell-slip"
@@ -161,45 +160,32 @@ class MaxwellSlip(Invertible):
         *("breakaways", "weights", "polynomial"),
     )
     increasing = ("breakaways",)
+    same_length = ("breakaways", "weights")
     typical = (
         *((0.3, 0.8, 1.6), (-1.0, -0.8, -0.5), (14.0, 17.0, -1.0)),
         *(1.1, 0.8, 2.5, 2.5, (0.0, 5.0)),
     )
     n_states = one_per("breakaways", 1)  # deflections and the previous input
     n_scratch = one_per("breakaways")  # what single precision loses of the deflections
-    notation = Notation(
+    formulas = (
         r"y = \sum_k c_k x^k + \sum_i w_i s_i,\quad x = \frac{u - m}{s}",
         r"s_{i,t} = \begin{cases} \min(s_{i,t-1} + \Delta u,\, r_i) & u \text{ rises} \\ "
         r"\max(s_{i,t-1} + \kappa \Delta u,\, -\lambda r_i) & u \text{ falls} \end{cases}",
-        breakaways="r_i [{u}]",
-        weights="w_i [{y}/{u}]",
-        polynomial="c_k from 0 [{y}]",
-        stiffness_ratio=r"\kappa",
-        limit_ratio=r"\lambda",
-        centre="m [{u}]",
-        scale="s [{u}]",
     )
 
-    breakaways: fields.PositiveVector
-    weights: fields.Vector
-    polynomial: fields.PolynomialField
-    stiffness_ratio: fields.Positive = 1.0
-    limit_ratio: fields.Positive = 1.0
-    centre: FiniteFloat = 0.0
-    scale: fields.Positive = 1.0
+    breakaways: Annotated[fields.PositiveVector, MinLen(1), "r_i [{u}]"]
+    weights: Annotated[fields.Vector, "w_i [{y}/{u}]"]
+    polynomial: Annotated[fields.PolynomialField, "c_k from 0 [{y}]"]
+    stiffness_ratio: Annotated[fields.Positive, r"\kappa"] = 1.0
+    limit_ratio: Annotated[fields.Positive, r"\lambda"] = 1.0
+    centre: Annotated[FiniteFloat, "m [{u}]"] = 0.0
+    scale: Annotated[fields.Positive, "s [{u}]"] = 1.0
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_thresholds(self.kind, self.breakaways, self.weights)
 
     def least_slope(self) -> float:
         softening = float(np.minimum(self.weights, 0.0).sum()) * max(1.0, self.stiffness_ratio)
         return least_slope(self.polynomial, self.centre, self.scale, self.input_limits) + softening
 
     def peaks(self) -> Array:
-        """Return the peaks at which one more spring slips."""
         low, _ = self.input_limits
         return low + 2.0 * np.array(self.breakaways)

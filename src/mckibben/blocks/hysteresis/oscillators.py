@@ -26,21 +26,18 @@ No estimator makes these models: they are for systems whose equations are known,
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import FiniteFloat
+from pydantic import Field, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Start
-from mckibben.blocks.dynamics.repeating import Hold, Substeps
 from mckibben.blocks.kernels import Step, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import gathered
 from mckibben.blocks.sample_times import needs_sample_time
-from mckibben.errors import ModelError
 
 HEAD = 7
 SUBSTEP, SUBSTEPS, HOLDS, MASS, DAMPING, STIFFNESS, OFFSET = range(HEAD)
@@ -114,20 +111,41 @@ def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[S
     return step(oscillator_step), kernel(oscillator_start)
 
 
-class Oscillator(Block):
-    """Mass, damper and spring with a hysteretic element of a subclass, from force to displacement."""
+@dataclass(frozen=True, config=fields.STRICT)
+class Oscillator(fields.WithMemory, Block):
+    """Mass, damper and spring with a hysteretic element of a subclass, from force to displacement.
+
+    Parameters
+    ----------
+    mass : float
+        m, the moving mass [kg]; positive.
+    damping : float
+        c, force by velocity [N s/mm]; not negative.
+    stiffness : float
+        k, force by displacement [N/mm]; positive.
+    output_offset : float or None
+        Added to the displacement [mm]; None for none.
+    substeps : int
+        Runge-Kutta steps from sample to sample.
+    hold : {"first", "zero"}
+        Input between samples: linear, or constant.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: at rest where the first input leads slowly, or at rest
+        without any force, from which the input then goes to the first sample within one sample time.
+    """
 
     rate_dependent = True
     n_states = 4  # displacement, velocity, force of the element, last input
     elements: ClassVar[tuple[str, ...]]
     """Fields of the hysteretic element."""
 
-    mass: float
-    damping: float
-    stiffness: float
-    output_offset: float | None
-    substeps: int
-    hold: Hold
+    mass: Annotated[fields.Positive, "m [kg]"]
+    damping: Annotated[fields.NotNegative, "c [N s/mm]"]
+    stiffness: Annotated[fields.Positive, "k [N/mm]"]
+    output_offset: Annotated[FiniteFloat | None, "y_0 [{y}]"] = Field(default=None, kw_only=True)
+    substeps: fields.Substeps = Field(default=10, kw_only=True)
+    hold: fields.Hold = Field(default="first", kw_only=True)
+    input: fields.ChannelField = Field(default=fields.FORCE, kw_only=True)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return the coefficients from `SUBSTEP` on; the mass in N s^2/mm."""
@@ -150,27 +168,10 @@ class BoucWenOscillator(Oscillator):
 
     Parameters
     ----------
-    mass : float
-        m, the moving mass [kg]; positive.
-    damping : float
-        c, force by velocity [N s/mm]; not negative.
-    stiffness : float
-        k, force by displacement [N/mm]; positive.
     slope : float
         Stiffness of the element about z = 0 [N/mm]; positive.
     gamma, delta : float
         Shape of the element: how fast it loses its stiffness, on the whole and by direction [1/mm].
-    output_offset : float or None
-        Added to the displacement [mm]; None for none.
-    substeps : int
-        Runge-Kutta steps from sample to sample.
-    hold : {"first", "zero"}
-        Input between samples: linear, or constant.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample: at rest where the first input leads slowly, or at rest
-        without any force, from which the input then goes to the first sample within one sample time.
-    input, output : Channel
-        Force and displacement.
     """
 
     kind = "bouc-wen-oscillator"
@@ -178,30 +179,14 @@ class BoucWenOscillator(Oscillator):
     elements = ("slope", "gamma", "delta")
     parameters = ("mass", "damping", "stiffness", "slope", "gamma", "delta", "output_offset")
     typical = (2.0, 0.004, 0.3, 0.2, 0.12, -0.15)
-    notation = Notation(
+    formulas = (
         r"m \ddot{q} + c \dot{q} + k q + z = u,\quad y = q + y_0",
         r"\dot{z} = a \dot{q} - \gamma |\dot{q}| z - \delta \dot{q} |z|",
-        mass="m [kg]",
-        damping="c [N s/mm]",
-        stiffness="k [N/mm]",
-        slope="a [N/mm]",
-        gamma=r"\gamma [1/mm]",
-        delta=r"\delta [1/mm]",
-        output_offset="y_0 [{y}]",
     )
 
-    mass: fields.Positive
-    damping: fields.NotNegative
-    stiffness: fields.Positive
-    slope: fields.Positive
-    gamma: FiniteFloat
-    delta: FiniteFloat
-    output_offset: FiniteFloat | None = None
-    substeps: Substeps = 10
-    hold: Hold = "first"
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.FORCE
-    output: fields.ChannelField = fields.DISPLACEMENT
+    slope: Annotated[fields.Positive, "a [N/mm]"]
+    gamma: Annotated[FiniteFloat, r"\gamma [1/mm]"]
+    delta: Annotated[FiniteFloat, r"\delta [1/mm]"]
 
 
 @kernel
@@ -222,61 +207,28 @@ class DuhemOscillator(Oscillator):
 
     Parameters
     ----------
-    mass, damping, stiffness : float
-        As of `BoucWenOscillator` [kg, N s/mm, N/mm].
     rising, falling : sequence of float
         Slopes of the element's force by the displacement while that rises, or falls, at every knot
         [N/mm].
     knots : sequence of float
         Forces of the element [N], increasing, at least two.
-    **others
-        As of `BoucWenOscillator`.
     """
 
     kind = "duhem-oscillator"
     kernel, start_kernel = oscillator_kernels(duhem_slope)
     increasing = ("knots",)
+    same_length = ("knots", "rising", "falling")
     elements = ("knots", "rising", "falling")
     typical = (2.0, 0.004, 0.3, (0.5, 0.2, 0.25), (0.25, 0.2, 0.5), (-2.0, 0.0, 2.0))
     parameters = ("mass", "damping", "stiffness", "rising", "falling", "output_offset")
-    notation = Notation(
+    formulas = (
         r"m \ddot{q} + c \dot{q} + k q + z = u,\quad y = q + y_0",
         r"\dot{z} = \begin{cases} r(z)\, \dot{q} & q \text{ rises} \\ s(z)\, \dot{q} & q "
         r"\text{ falls} \end{cases}",
         r"r, s \text{ straight between the knots } \zeta_k,\; r(\zeta_k) = r_k,\; "
         r"s(\zeta_k) = s_k",
-        mass="m [kg]",
-        damping="c [N s/mm]",
-        stiffness="k [N/mm]",
-        knots=r"\zeta_k [N]",
-        rising="r_k [N/mm]",
-        falling="s_k [N/mm]",
-        output_offset="y_0 [{y}]",
     )
 
-    mass: fields.Positive
-    damping: fields.NotNegative
-    stiffness: fields.Positive
-    rising: fields.Vector
-    falling: fields.Vector
-    knots: fields.Vector
-    output_offset: FiniteFloat | None = None
-    substeps: Substeps = 10
-    hold: Hold = "first"
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.FORCE
-    output: fields.ChannelField = fields.DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        n = len(self.knots)
-        if (
-            n < 2
-            or not len(self.rising) == len(self.falling) == n
-            or np.diff(self.knots).min() <= 0
-        ):
-            raise ModelError(
-                f"{self.kind!r} has {n} knots, {len(self.rising)} slopes rising and "
-                f"{len(self.falling)} falling",
-                remedy="give two knots or more, in increasing order, and a slope of either "
-                "kind for each",
-            )
+    rising: Annotated[fields.Vector, "r_k [N/mm]"]
+    falling: Annotated[fields.Vector, "s_k [N/mm]"]
+    knots: Annotated[fields.Knots, r"\zeta_k [N]"]

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -27,21 +27,13 @@ from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.hysteresis.play_operators import (
     check_invertible_sum,
-    check_thresholds,
     follow,
     start_operators,
     start_sum,
 )
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import kernel, step, summing_step
-from mckibben.blocks.learning import (
-    Learnable,
-    follow_learning,
-    inverse_at,
-    learnable_operators,
-    start_learning,
-)
-from mckibben.blocks.notation import Notation
+from mckibben.blocks.kernels import inlined, kernel, step, summing_step
+from mckibben.blocks.learning import Learnable, learnable_operators, learning_kernels
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.sample_times import needs_sample_time, rate_filter
 from mckibben.blocks.solving import solved_kernels
@@ -94,29 +86,14 @@ def pi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: b
     state[n], state[n + 1] = inputs[0], 0.0
 
 
-@step
-def pi_adaptive_step(
-    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
-) -> None:
-    """Advance the inverse of a PI model, and adapt its weights and offset to measurements."""
-    n = int(coefficients[0]) - 1
-    r = coefficients[inverse_at(coefficients) + 3 : inverse_at(coefficients) + n + 3]
-    s, last, adapted = state[:n], state[n : n + 3], state[n + 3 :]
-    follow_learning(coefficients, r, s, last, adapted, scratch, inputs[0], inputs[1])
-    outputs[0] = s[0]
-
-
-@kernel
-def pi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start as the inverse does, with the fitted weights."""
-    n = int(coefficients[0]) - 1
-    pi_inverse_start(coefficients[inverse_at(coefficients) :], state[: n + 2], inputs, virgin)
-    state[n + 2] = 0.0
-    start_learning(coefficients, state[n + 3 :])
+@inlined
+def take_edge(way: float, c: Array, state: Array, n: int) -> float:
+    """Return the input, which is the operators' edge: that of the first, without threshold."""
+    return state[0]
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class PI(Invertible):
+class PI(fields.WithMemory, Invertible):
     """Classical Prandtl-Ishlinskii model.
 
     Parameters
@@ -129,8 +106,6 @@ class PI(Invertible):
         Constant of the output.
     input_range : (float, float), optional
         Lowest and highest input that may be asked for; the inverse clips there. Default none.
-    initial, input, output
-        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "pi"
@@ -138,41 +113,32 @@ class PI(Invertible):
     start_kernel = pi_start
     inverse_kernel = pi_inverse_step
     inverse_start_kernel = pi_inverse_start
+    adaptive_step, adaptive_start = learning_kernels(pi_inverse_start, take_edge, 0)
     inverse_memory = "output"
     increasing = ("thresholds",)
+    same_length = ("thresholds", "weights")
     parameters = ("weights", "offset")
     n_states = one_per("thresholds")  # one a play operator
     layout = ("offset", "thresholds", "weights")
     typical = ((0.0, 0.3, 0.8, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0))
-    notation = Notation(
+    formulas = (
         r"y = y_0 + \sum_i w_i F_{r_i}[u]",
         r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
-        thresholds="r_i [{u}]",
-        weights="w_i [{y}/{u}]",
-        offset="y_0 [{y}]",
     )
 
-    thresholds: fields.Vector
-    weights: fields.Vector
-    offset: FiniteFloat = 0.0
+    thresholds: Annotated[fields.Thresholds, "r_i [{u}]"]
+    weights: Annotated[fields.Vector, "w_i [{y}/{u}]"]
+    offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_thresholds(self.kind, self.thresholds, self.weights)
 
     def peaks(self) -> Array:
         """Return the peaks from which each operator just returns to the lowest input."""
         return self.input_limits[0] + 2 * np.array(self.thresholds)
 
     def check_invertible(self) -> None:
-        """Require a first threshold of 0, and positive partial sums of the weights."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
 
     def inverse_numbers(self, own: Array) -> Array:
-        """Return [lowest, highest input, offset, thresholds, weights]."""
         return np.array([*self.input_limits, *own])
 
     def stored_for_inverse(self, state: Array) -> tuple[float, ...]:
@@ -180,15 +146,14 @@ class PI(Invertible):
 
     @property
     def learnable(self) -> Learnable:
-        """Adaptive parameters: weights and offset."""
         return learnable_operators(
             self,
             self.thresholds,
             self.weights,
             self.input_limits,
             self.offset,
-            pi_adaptive_step,
-            pi_adaptive_start,
+            self.adaptive_step,
+            self.adaptive_start,
             lambda theta: replace(self, weights=fields.vector(theta[:-1]), offset=float(theta[-1])),
         )
 
@@ -233,7 +198,7 @@ def rate_pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class RateDependentPI(Invertible):
+class RateDependentPI(fields.WithMemory, Invertible):
     """Prandtl-Ishlinskii model whose weights are linear in the input's rate.
 
     Parameters
@@ -250,8 +215,6 @@ class RateDependentPI(Invertible):
         Time constant of the filter of the rate [s]; 0, as in the paper, for none.
     input_range : (float, float), optional
         Lowest and highest input; the inverse needs it and clips there.
-    initial, input, output
-        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "rate-dependent-pi"
@@ -264,35 +227,24 @@ class RateDependentPI(Invertible):
     inverse_memory = "input"
     rate_dependent = True
     increasing = ("thresholds",)
+    same_length = ("thresholds", "rate_weights", "weights")
     parameters = ("rate_weights", "weights", "offset")
     typical = (
         *((0.0, 0.3, 0.8, 1.5), (-0.05, 0.02, 0.04, 0.01), (3.0, 1.5, 1.0, 0.5)),
         *(2.0, 0.1, (0.0, 5.0)),
     )
     n_states = one_per("thresholds", 2)  # operators, previous input and filtered rate
-    notation = Notation(
+    formulas = (
         r"y = y_0 + \sum_i (d_i + k_i v) F_{r_i}[u],\quad T \dot{v} = \dot{u} - v",
         r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
-        thresholds="r_i [{u}]",
-        rate_weights="k_i [{y} s/{u}^2]",
-        weights="d_i [{y}/{u}]",
-        offset="y_0 [{y}]",
-        rate_time_constant="T [s]",
     )
 
-    thresholds: fields.Vector
-    rate_weights: fields.Vector
-    weights: fields.Vector
-    offset: FiniteFloat = 0.0
-    rate_time_constant: fields.NotNegative = 0.0
+    thresholds: Annotated[fields.Thresholds, "r_i [{u}]"]
+    rate_weights: Annotated[fields.Vector, "k_i [{y} s/{u}^2]"]
+    weights: Annotated[fields.Vector, "d_i [{y}/{u}]"]
+    offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
+    rate_time_constant: Annotated[fields.NotNegative, "T [s]"] = 0.0
     input_range: fields.InputRange | None = None
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_thresholds(self.kind, self.thresholds, self.weights)
-        check_thresholds(self.kind, self.thresholds, self.rate_weights)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [smoothing, gain of the rate, offset, thresholds, k, d]."""
@@ -301,7 +253,6 @@ class RateDependentPI(Invertible):
         return np.array([*rate, self.offset, *sums])
 
     def check_invertible(self) -> None:
-        """Require an input range, a first threshold of 0, and an output that increases at rest."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
         super().check_invertible()
 

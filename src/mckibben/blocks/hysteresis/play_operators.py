@@ -10,36 +10,16 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator", Eq. (3) with both envelope
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
-from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import VIRGIN, Block
-from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, StoredInitial
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
-
-
-def check_thresholds(kind: str, thresholds: Sequence[float], weights: Sequence[float]) -> None:
-    """Raise an error for thresholds that are negative, not increasing, or not one per weight."""
-    if not thresholds or len(thresholds) != len(weights):
-        raise ModelError(
-            f"{kind!r} has {len(thresholds)} thresholds and {len(weights)} weights",
-            remedy="give one weight to every threshold, and at least one",
-        )
-    check_order(kind, thresholds)
-
-
-def check_order(kind: str, thresholds: Sequence[float]) -> None:
-    """Raise an error for thresholds that are negative or not increasing."""
-    if any(r < 0 for r in thresholds[:1]) or np.any(np.diff(thresholds) <= 0):
-        raise ModelError(
-            f"the thresholds of {kind!r} are not 0 <= r_0 < r_1 < ..",
-            remedy="sort them and drop repeated ones",
-        )
 
 
 def check_invertible_sum(kind: str, thresholds: Sequence[float], weights: Sequence[float]) -> None:
@@ -192,16 +172,14 @@ def play_matrix(
             operators[t, i] = s[i]
 
 
-@dataclass(frozen=True, config=STRICT)
-class Play(Block):
+@dataclass(frozen=True, config=fields.STRICT)
+class Play(fields.WithMemory, Block):
     """One play operator.
 
     Parameters
     ----------
     threshold : float
         Half the dead zone, in the unit of the input; at least 0.
-    initial, input, output
-        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "play"
@@ -210,15 +188,6 @@ class Play(Block):
     parameters = ("threshold",)
     n_states = 1  # the operator's own output
     typical = (0.5,)
-    notation = Notation(
-        r"y = F_r[u],\quad F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
-        threshold="r [{u}]",
-    )
+    formulas = (r"y = F_r[u],\quad F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",)
 
-    threshold: FiniteFloat
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_thresholds(self.kind, (self.threshold,), (1.0,))
+    threshold: Annotated[fields.NotNegative, "r [{u}]"]

@@ -24,7 +24,7 @@ Preisach model by Banks, Kurdila and Webb, 1997.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -34,14 +34,13 @@ from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
-from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import Parametrised, one_per
 from mckibben.blocks.solving import solved_kernels, solved_start
 from mckibben.errors import ModelError
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class Triangle(Parametrised):
+class Triangle(fields.WithMemory, Parametrised):
     """Fields of a model with a cell for each pair of intervals of the input levels.
 
     Parameters
@@ -53,26 +52,17 @@ class Triangle(Parametrised):
         threshold to the diagonal: w_00, w_10, w_11, w_20, ...
     offset : float
         Output with all cells down.
-    initial, input, output
-        Default memory before the first sample, and the channels driven and given.
     """
 
-    increasing: ClassVar[tuple[str, ...]] = ("levels",)
+    increasing = ("levels",)
     parameters = ("weights", "offset")
 
-    levels: fields.Vector
-    weights: fields.Vector
-    offset: FiniteFloat = 0.0
-    initial: fields.StoredInitial = "first_sample"
-    input: fields.ChannelField = fields.PRESSURE
-    output: fields.ChannelField = fields.DISPLACEMENT
+    levels: Annotated[fields.Knots, "a_i [{u}]"]
+    weights: Annotated[fields.Vector, "w_k [{y}]"]
+    offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
 
     def __post_init__(self) -> None:
         n = len(self.levels) - 1
-        if n < 1 or np.any(np.diff(self.levels) <= 0):
-            raise ModelError(
-                f"the levels of {self.kind!r} do not increase", remedy="give two or more, in order"
-            )
         fields.wide(self.input_range)
         if len(self.weights) != n * (n + 1) // 2:
             raise ModelError(
@@ -82,7 +72,6 @@ class Triangle(Parametrised):
 
     @property
     def input_range(self) -> tuple[float, float]:
-        """The first and last level."""
         return self.levels[0], self.levels[-1]
 
     def peaks(self) -> Array:
@@ -287,13 +276,10 @@ class Preisach(Triangle, Invertible):
     inverse_kernel = preisach_inverse_step
     inverse_start_kernel = solved_start(first_output, preisach_start, 1)
     n_states = CLIPPED
-    notation = Notation(
+    formulas = (
         r"y = y_0 + \sum_{j \le i} w_{ij} \left(1 + R_{ij}[u]\right)",
         r"R_{ij}[u] = +1 \text{ once } u \text{ rose through cell } i,\; -1 \text{ once "
         "it fell through cell } j",
-        levels="a_i [{u}]",
-        weights="w_k [{y}]",
-        offset="y_0 [{y}]",
     )
 
     def table(self) -> Array:
@@ -324,7 +310,6 @@ class Preisach(Triangle, Invertible):
         return np.array([len(self.levels), *self.levels, *self.table().ravel(), self.offset])
 
     def check_invertible(self) -> None:
-        """Require non-negative weights, positive on the diagonal."""
         if min(self.weights) < 0 or on_diagonal(self.weights).min() <= 0:
             raise ModelError(
                 "'preisach' has no inverse: its weights must not be negative, and "
@@ -412,15 +397,12 @@ class KrasnoselskiiPokrovskii(Triangle, Invertible):
         ridges_output, ridges_advance, ridges_start
     )
     n_states = one_per("weights", 1)  # operators and the previous input
-    notation = Notation(
+    formulas = (
         r"y = y_0 + \sum_{j \le i} w_{ij} s_{ij}",
         r"s_{ij,t} = \begin{cases} \max(s_{ij,t-1},\, \rho_i(u_t)) & u \text{ rises} \\ "
         r"\min(s_{ij,t-1},\, \rho_j(u_t)) & u \text{ falls} \end{cases}",
         r"\rho_i(u) = \min\left(\max\left(\frac{u - a_i}{a_{i+1} - a_i},\, 0\right),\, "
         r"1\right)",
-        levels="a_i [{u}]",
-        weights="w_k [{y}]",
-        offset="y_0 [{y}]",
     )
 
     def coefficients(self, sample_time: float | None) -> Array:

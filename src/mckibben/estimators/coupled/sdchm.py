@@ -204,7 +204,7 @@ class SDCHMEstimator(CoupledEstimator):
         sums, offset = solve_bounded(steps, wanted, least)
         weights = np.diff(sums, prepend=0.0)
         ends = low - BEYOND * span, high + BEYOND * span
-        return PI(vector(radii), vector(weights), offset, ends, "first_sample", channel, channel)
+        return PI(vector(radii), vector(weights), offset, ends, input=channel, output=channel)
 
 
 class CoupledPIEstimator(SDCHMEstimator):

@@ -218,10 +218,10 @@ class PredictionErrorEstimator(Estimator):
                 step,
                 float(centre[place]),
                 0.0 if place else middle + constant,
-                self.initial,
-                channel,
-                data.outputs[0],
                 *(() if place else noise),
+                initial=self.initial,
+                input=channel,
+                output=data.outputs[0],
             )
             ends = float(data.lowest[place]), float(data.highest[place])
             block = replace(block, input_range=ends)

@@ -83,7 +83,7 @@ class ProcessModelEstimator(SeparableEstimator):
             data.input_range[0],
             0.0,
             "first",
-            self.initial,
+            initial=self.initial,
             **self.channels(data),
         )
 

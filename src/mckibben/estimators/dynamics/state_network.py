@@ -17,8 +17,7 @@ from annotated_types import Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import ProcessModel
-from mckibben.blocks.dynamics.repeating import BETWEEN
-from mckibben.blocks.dynamics.state_network import SETTLING, SETTLING_STEP, StateNetwork
+from mckibben.blocks.dynamics.state_network import BETWEEN, SETTLING, SETTLING_STEP, StateNetwork
 from mckibben.blocks.fields import rows
 from mckibben.blocks.kernels import summing_kernel
 from mckibben.errors import DataError

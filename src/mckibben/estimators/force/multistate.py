@@ -197,7 +197,9 @@ class MultistateEstimator(SeparableEstimator):
                 values.append(value * (lengthening if position < 3 else shortening))
         pressure, rule = float(np.median(data.stacked("scheduled"))), self.starting_rule
         channels = self.channels(data)
-        return MultistateFriction(self.directions, tuple(values), 0.0, pressure, rule, **channels)
+        return MultistateFriction(
+            self.directions, tuple(values), 0.0, pressure, initial=rule, **channels
+        )
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the forces of the elements, then the regressors of the static law."""

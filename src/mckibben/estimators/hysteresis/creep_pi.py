@@ -171,7 +171,9 @@ class CreepPIEstimator(SeparableEstimator):
         added, radii, (low, high), (bottom, top) = self.memory(theta, data)
         weights, start = theta[: self.n_operators] / (top - bottom), float(-bottom / (top - bottom))
         rule, reach = self.starting_rule, (float(low), float(high))
-        memory = PI(vector(radii), vector(weights), start, reach, rule, given, result)
+        memory = PI(
+            vector(radii), vector(weights), start, reach, initial=rule, input=given, output=result
+        )
         taus, compliances = self.creep(theta)
         settled = offset / (1.0 + compliances.sum())
         increasing = PolynomialMap(self.map_size).build(linear, settled, 0.0, 1.0, result)

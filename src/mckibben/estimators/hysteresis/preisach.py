@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Interval
@@ -50,7 +50,8 @@ class PreisachEstimator(SeparableEstimator):
         block = Preisach if self.relays == "sudden" else KrasnoselskiiPokrovskii
         levels = vector(np.linspace(*data.input_range, self.n_levels + 1))
         n = self.n_levels * (self.n_levels + 1) // 2
-        return block(levels, (0.0,) * n, 0.0, self.starting_rule, **self.channels(data))
+        own: dict[str, Any] = {"initial": self.starting_rule} | self.channels(data)
+        return block(levels, (0.0,) * n, 0.0, **own)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the output of every cell separately, over the run."""

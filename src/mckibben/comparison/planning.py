@@ -107,7 +107,7 @@ def plan_of(
 ) -> Plan:
     """Return the set-up of a comparison; see `compare`."""
     chosen = given_options(CompareOptions, options, given)
-    data, empty = _data_of([listed(train), listed(validation), listed(test)], chosen, channels)
+    data, empty = _data_of(train, test, validation, chosen, channels)
     every = [*data.recordings, *data.checks]
     items, left_out = _chosen(chosen.models, every, data.channels, chosen.seed)
     made = {name: item.made for name, item in items.items()}
@@ -122,12 +122,14 @@ def plan_of(
 
 
 def _data_of(
-    sides: Sequence[list[Recording]], chosen: CompareOptions, channels: Channels | None
+    train: Recording | Sequence[Recording],
+    test: Recording | Sequence[Recording],
+    validation: Recording | Sequence[Recording],
+    chosen: CompareOptions,
+    channels: Channels | None,
 ) -> tuple[Data, Leaderboard]:
-    """Return the data of a comparison, and what a leaderboard states of them.
-
-    ``sides`` are the recordings to fit, to choose, and to test on.
-    """
+    """Return the data of a comparison, and what a leaderboard states of them."""
+    sides = [listed(train), listed(validation), listed(test)]
     every = [one for side in sides for one in side]
     notes = reading_notes(every)
     if not sides[0]:

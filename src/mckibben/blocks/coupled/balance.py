@@ -371,11 +371,6 @@ class Balance(Invertible):
         """Number of inputs that schedule springs: the first ones."""
         return len(self.scheduled) - self.n_loads
 
-    @property
-    def n_obstacles(self) -> int:
-        """Number of obstacles per coordinate."""
-        return self.sizes.obstacles
-
     @cached_property
     def sizes(self) -> Sizes:
         """The numbers of muscles, coordinates, and of all else that a balance has."""

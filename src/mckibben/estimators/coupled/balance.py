@@ -94,6 +94,17 @@ FINEST, LONGEST = 0.003, 0.5
 PLACES = (0.6, 0.8, 0.9, 0.97)
 """Candidate positions of obstacles, as shares of the range; for lowering, from its end."""
 
+FIRST_OFFSET, TOWARDS, REFINED = 0.1, 60, 3
+"""First friction offset of the prior, relative to the highest pressure; maximum number of steps
+from there; number of reweightings of the prior.
+"""
+
+OWN_HELPS = 0.1
+"""Smallest relative reduction of errors by loads of recordings."""
+
+FIXED = ("gain", "offset", "hysteresis", "dead_time")
+"""Parameters of the front and of sensors that are not found."""
+
 TERMS = (*dict.fromkeys(kind.option for kind in TABLE.values() if kind.option), "muscles")
 """Kinds of candidate terms."""
 
@@ -528,22 +539,9 @@ class BalanceEstimator(CoupledEstimator):
         return replace(runs, changed=partial(_loaded, self.loads_)) if self.loads_.any() else runs
 
 
-FIRST_OFFSET, TOWARDS, REFINED = 0.1, 60, 3
-"""First friction offset of the prior, relative to the highest pressure; maximum number of steps
-from there; number of reweightings of the prior.
-"""
-
-OWN_HELPS = 0.1
-"""Smallest relative reduction of errors by loads of recordings."""
-
-
 def _within(given_range: tuple[float, float] | None, block: Block) -> Block:
     """Return a front block whose inverse stays within a pressure range."""
     return replace(block, input_range=given_range) if isinstance(block, Air) else block
-
-
-FIXED = ("gain", "offset", "hysteresis", "dead_time")
-"""Parameters of the front and of sensors that are not found."""
 
 
 def fixed_in(block: Block) -> tuple[int, ...]:

@@ -3,7 +3,7 @@
 Two vectors describe a balance:
 
 values
-    All parameters: the linear coefficients, in the order of `mckibben.blocks.coupled.balance_law` from
+    All parameters: the linear coefficients, in the order of `mckibben.blocks.coupled.balance_terms` from
     those of the first coordinate on, then the nonlinear parameters.
 free parameters
     One for every `Term`. Linear coefficients are ``base + mix @ free``: the springs between two

@@ -35,7 +35,7 @@ BALANCE = example("balance")
 ARM = replace(BALANCE, pressure_range=(0.0, 6.0))
 
 NO_MODEL: list[tuple[str, dict[str, Any], str]] = [
-    ("play", {"threshold": -0.1}, "thresholds.*'play'"),
+    ("play", {"threshold": -0.1}, "threshold.*'play'"),
     ("pi", {"thresholds": (), "weights": ()}, "'pi'"),
     ("pi", {"weights": (1.0, 2.0)}, "weights"),
     ("pi", {"thresholds": (0.0, 0.0, 1.0, 2.0)}, "thresholds"),

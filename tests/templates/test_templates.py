@@ -111,7 +111,7 @@ def test_derivatives_are_exact_and_standard_errors_follow(
 def test_the_c_is_the_block(
     my_model: ModuleType, inverse: bool, initial: str, tmp_path: Path
 ) -> None:
-    block = my_model.ElasticPlastic(4.0, -1.5, 0.4, (0.0, 5.0), initial)
+    block = my_model.ElasticPlastic(4.0, -1.5, 0.4, (0.0, 5.0), initial=initial)
     given = U[:, np.newaxis]
     if inverse:
         block, given = block.inverse(), block.simulate(given)

@@ -176,7 +176,10 @@ def plain(part: Any) -> Any:
     """Return a block, or a value in one, as JSON-ready values."""
     if is_dataclass(part) and not isinstance(part, type):
         named = {"kind": part.kind} if hasattr(part, "kind") else {}
-        return named | {f.name: plain(getattr(part, f.name)) for f in fields(part)}
+        own = sorted(
+            fields(part), key=lambda field: bool(field.kw_only)
+        )  # those of a base come last
+        return named | {field.name: plain(getattr(part, field.name)) for field in own}
     if isinstance(part, tuple):
         return [plain(item) for item in part]
     return part

@@ -45,6 +45,12 @@ STARTS = 5
 """Number of initial guesses for the first sample, from the lowest to the highest inputs."""
 
 
+N_INPUTS, N_OUTPUTS, N_SETS, CONSTANT, MOST_SETS, SETS = range(6)
+"""Places of the coefficients: numbers of inputs, outputs and all sets, whether consequents have a
+constant, the most sets of an input, and the first number of sets.
+"""
+
+
 @kernel
 def fill_memberships(x: float, centres: Array, widths: Array, memberships: Array) -> None:
     """Fill an input's normalised memberships, computed in logarithms to avoid underflow."""
@@ -66,12 +72,12 @@ def fill_between(c: Array, first: int, last: int, x: Array, memberships: Array) 
 
     ``c`` is what `contract` reads; ``x`` begins at the first of these inputs.
     """
-    n, n_sets, most = int(c[0]), int(c[2]), int(c[4])
-    at, combinations = 5 + n, 1
+    n, n_sets, most = int(c[N_INPUTS]), int(c[N_SETS]), int(c[MOST_SETS])
+    at, combinations = SETS + n, 1
     for i in range(first):
-        at += int(c[5 + i])
+        at += int(c[SETS + i])
     for i in range(first, last):
-        sets = int(c[5 + i])
+        sets = int(c[SETS + i])
         fill_memberships(
             x[i - first],
             c[at : at + sets],
@@ -87,20 +93,25 @@ def fill_between(c: Array, first: int, last: int, x: Array, memberships: Array) 
 def contract(c: Array, m: int, known: Array, memberships: Array, left: Array) -> None:
     """Contract the rules over known inputs, for the remaining first m inputs.
 
-    ``c`` is [inputs, outputs, all sets, constants, most sets, sets of every input, centres, widths,
-    consequents]; a rule's consequents are one row an output: a coefficient for every input, and the
-    constant if there are constants. ``left`` has, rule after rule, one row an output: m coefficients and
-    a constant; of no inputs, the outputs themselves.
+    ``c`` from `SETS` on is the sets of every input, centres, widths and consequents. A rule's
+    consequents are one row an output: a coefficient for every input, and the constant if there are
+    constants. ``left`` has, rule after rule, one row an output: m coefficients and a constant; of no
+    inputs, the outputs themselves.
     """
-    n, n_out, constant, most = int(c[0]), int(c[1]), int(c[3]), int(c[4])
+    n, n_out, constant, most = (
+        int(c[N_INPUTS]),
+        int(c[N_OUTPUTS]),
+        int(c[CONSTANT]),
+        int(c[MOST_SETS]),
+    )
     n_known = fill_between(c, m, n, known, memberships)
-    rows, width = c[5 + n + 2 * int(c[2]) :], n + constant
+    rows, width = c[SETS + n + 2 * int(c[N_SETS]) :], n + constant
     for i in range(left.size):
         left[i] = 0.0
     for k in range(n_known):
         firing, rest = 1.0, k
         for i in range(n - 1, m - 1, -1):
-            sets = int(c[5 + i])
+            sets = int(c[SETS + i])
             firing *= memberships[i * most + rest % sets]
             rest //= sets
         if firing > NOTHING:
@@ -126,20 +137,20 @@ def sloped_answer(
     ``left`` is what `contract` fills; scratch are the memberships, and their relative
     slopes, with one more for each driven input.
     """
-    m, n, n_sets, most = x.size, int(c[0]), int(c[2]), int(c[4])
+    m, n, n_sets, most = x.size, int(c[N_INPUTS]), int(c[N_SETS]), int(c[MOST_SETS])
     n_out = y.size
     n_rules = fill_between(c, 0, m, x, memberships)
     tilt = tilts[m * most :]
-    at = 5 + n
+    at = SETS + n
     for i in range(m):
         mean = 0.0
-        for s in range(int(c[5 + i])):
+        for s in range(int(c[SETS + i])):
             width = c[at + n_sets + s]
             tilts[i * most + s] = (x[i] - c[at + s]) / (width * width)
             mean += memberships[i * most + s] * tilts[i * most + s]
-        for s in range(int(c[5 + i])):
+        for s in range(int(c[SETS + i])):
             tilts[i * most + s] = mean - tilts[i * most + s]
-        at += int(c[5 + i])
+        at += int(c[SETS + i])
     for j in range(n_out):
         y[j] = 0.0
         for i in range(m):
@@ -148,7 +159,7 @@ def sloped_answer(
     for rule in range(n_rules):
         firing, rest = 1.0, rule
         for i in range(m - 1, -1, -1):
-            sets = int(c[5 + i])
+            sets = int(c[SETS + i])
             place = i * most + rest % sets
             firing *= memberships[place]
             tilt[i] = tilts[place]
@@ -185,9 +196,9 @@ def solve_driven(
     """
     m = start.size
     low, high, c = coefficients[:m], coefficients[m : 2 * m], coefficients[2 * m :]
-    n, most, n_rules = int(c[0]), int(c[4]), 1
+    n, most, n_rules = int(c[N_INPUTS]), int(c[MOST_SETS]), 1
     for i in range(m):
-        n_rules *= int(c[5 + i])
+        n_rules *= int(c[SETS + i])
     n_left = n_rules * m * (m + 1)
     memberships, tilts = scratch[: n * most], scratch[n * most : n * most + m * most + m]
     left = scratch[n * most + m * most + m : n * most + m * most + m + n_left]

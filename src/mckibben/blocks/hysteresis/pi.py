@@ -32,8 +32,15 @@ from mckibben.blocks.hysteresis.play_operators import (
     start_sum,
 )
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import inlined, kernel, step, summing_step
-from mckibben.blocks.learning import Learnable, learnable_operators, learning_kernels
+from mckibben.blocks.kernels import kernel, step, summing_step
+from mckibben.blocks.learning import (
+    N_LEARNED,
+    Learnable,
+    follow_learning,
+    inverse_at,
+    learnable_operators,
+    start_learning,
+)
 from mckibben.blocks.parameters import one_per
 from mckibben.blocks.sample_times import needs_sample_time, rate_filter
 from mckibben.blocks.solving import solved_kernels
@@ -86,10 +93,25 @@ def pi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: b
     state[n], state[n + 1] = inputs[0], 0.0
 
 
-@inlined
-def take_edge(way: float, c: Array, state: Array, n: int) -> float:
-    """Return the input, which is the operators' edge: that of the first, without threshold."""
-    return state[0]
+@step
+def pi_adaptive_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
+    """Advance the inverse of a PI model, and adapt its weights and offset to measurements."""
+    n = int(coefficients[N_LEARNED]) - 1
+    r = coefficients[inverse_at(coefficients) + 3 : inverse_at(coefficients) + n + 3]
+    s, last, adapted = state[:n], state[n : n + 3], state[n + 3 :]
+    follow_learning(coefficients, r, s, last, adapted, scratch, inputs[0], inputs[1])
+    outputs[0] = s[0]
+
+
+@kernel
+def pi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start as the inverse does, with the fitted weights."""
+    n = int(coefficients[N_LEARNED]) - 1
+    pi_inverse_start(coefficients[inverse_at(coefficients) :], state[: n + 2], inputs, virgin)
+    state[n + 2] = 0.0
+    start_learning(coefficients, state[n + 3 :])
 
 
 @dataclass(frozen=True, config=fields.STRICT)
@@ -113,7 +135,6 @@ class PI(fields.WithMemory, Invertible):
     start_kernel = pi_start
     inverse_kernel = pi_inverse_step
     inverse_start_kernel = pi_inverse_start
-    adaptive_step, adaptive_start = learning_kernels(pi_inverse_start, take_edge, 0)
     inverse_memory = "output"
     increasing = ("thresholds",)
     same_length = ("thresholds", "weights")
@@ -152,8 +173,8 @@ class PI(fields.WithMemory, Invertible):
             self.weights,
             self.input_limits,
             self.offset,
-            self.adaptive_step,
-            self.adaptive_start,
+            pi_adaptive_step,
+            pi_adaptive_start,
             lambda theta: replace(self, weights=fields.vector(theta[:-1]), offset=float(theta[-1])),
         )
 

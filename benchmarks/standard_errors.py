@@ -19,8 +19,9 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from tests.diagnosis.runs import noise
 from tests.diagnosis.test_parameters import MODELS, STEP, fitted
 
-from mckibben import Recording, statistics
+from mckibben import Recording
 from mckibben.diagnosis.description import describe
+from mckibben.numerics import statistics
 
 
 def measure(name: str, memory: float, seeds: int) -> tuple[float, float]:

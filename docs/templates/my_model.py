@@ -16,8 +16,9 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Block
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import kernel
+from mckibben.blocks.runs import Run
 from mckibben.blocks.solving import solved_kernels
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator
 
 

@@ -6,7 +6,7 @@ from scipy.stats import t as student
 from mckibben.numerics.blocks import (
     BlockBootstrap,
     blocks_of,
-    differences,
+    difference_intervals,
     interval,
     squared_errors,
     sums_of_others,
@@ -84,7 +84,7 @@ def test_intervals_of_all_differences_hold_at_once() -> None:
         bootstrap = BlockBootstrap([900], seed)
         samples = np.array([bootstrap.rmse(one) for one in errors])
         values = np.sqrt((errors**2).mean(axis=1))
-        ends = np.array(differences(samples, values, 0))[1:]
+        ends = np.array(difference_intervals(samples, values, 0))[1:]
         at_once.append(((ends[:, 0] <= 0) & (ends[:, 1] >= 0)).all())
         pairs = np.array([interval(one - samples[0]) for one in samples[1:]])
         one_by_one.append(((pairs[:, 0] <= 0) & (pairs[:, 1] >= 0)).all())

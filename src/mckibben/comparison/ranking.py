@@ -28,7 +28,13 @@ from mckibben.errors import MckibbenError, unforeseen
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.metrics import Scores, mean_scores, score
 from mckibben.numerals import duration
-from mckibben.numerics.blocks import RESAMPLES, BlockBootstrap, block_length, differences, interval
+from mckibben.numerics.blocks import (
+    RESAMPLES,
+    BlockBootstrap,
+    block_length,
+    difference_intervals,
+    interval,
+)
 from mckibben.numerics.statistics import correlation_length
 from mckibben.options import CompareOptions, given_options
 from mckibben.recording import Recording
@@ -415,7 +421,7 @@ class _Table:
         samples = np.array(self._resampled([row.model for row in every]))
         best = self.board(rows).best or rows[0]
         by_test = sorted(errors[:-1])
-        ends = differences(samples, errors, rows.index(best))
+        ends = difference_intervals(samples, errors, rows.index(best))
         placed = [
             replace(
                 row,

@@ -119,7 +119,7 @@ def interval(samples: Array) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def differences(samples: Array, values: Array, chosen: int) -> list[tuple[float, float]]:
+def difference_intervals(samples: Array, values: Array, chosen: int) -> list[tuple[float, float]]:
     """Return simultaneous 95 % intervals of the differences of values to a chosen one.
 
     Half widths are one multiple of each difference's standard deviation (single-step max-t).

@@ -12,8 +12,7 @@ import numpy as np
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block, run_many
 from mckibben.blocks.fields import Channel
-from mckibben.blocks.runs import Run as Run
-from mckibben.blocks.runs import run_of
+from mckibben.blocks.runs import Run, run_of
 from mckibben.errors import DataError
 from mckibben.recording import FEWEST_SAMPLES, Recording, check_sample_times, listed, sample_time_of
 

@@ -18,7 +18,8 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.memoryless import Negative
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.blocks.runs import Run
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Estimator, Start
 from mckibben.numerics.descent import Errors, differences
 from mckibben.numerics.least_squares import solve_bounded

@@ -24,9 +24,10 @@ from mckibben.blocks.coupled.balance_terms import TABLE
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import rows, vector
 from mckibben.blocks.free_runs import FreeRuns
+from mckibben.blocks.runs import Run
 from mckibben.channels import Channels, Names, by_name
 from mckibben.errors import ModelError
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.coupled.balance_bench import (
     bench_of,

@@ -22,7 +22,8 @@ from mckibben.blocks.coupled.balance_terms import Indices
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Contact, PiecewiseLinear
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.blocks.runs import Run
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.numerics.descent import differences

@@ -12,9 +12,10 @@ from mckibben import registry
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
+from mckibben.blocks.runs import Run
 from mckibben.channels import PRESSURE, Channels
 from mckibben.errors import DataError
-from mckibben.estimators.core.data import Run, TrainingData, training_data
+from mckibben.estimators.core.data import TrainingData, training_data
 from mckibben.estimators.core.estimator import Estimator, resting
 from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording, listed

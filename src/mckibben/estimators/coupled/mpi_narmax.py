@@ -26,8 +26,9 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
 from mckibben.blocks.fields import rows, vector
 from mckibben.blocks.kernels import kernel
+from mckibben.blocks.runs import Run
 from mckibben.errors import DataError, MckibbenError, ModelError
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator, memory_of
 from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors
 from mckibben.numerics.statistics import rms

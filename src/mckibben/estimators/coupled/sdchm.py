@@ -25,9 +25,10 @@ from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.blocks.hysteresis.pi import PI
+from mckibben.blocks.runs import Run
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.catalogue import settings_of
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import InverseKind
 from mckibben.estimators.coupled.base import CoupledEstimator, alone, memory_of
 from mckibben.estimators.coupled.fuzzy import (

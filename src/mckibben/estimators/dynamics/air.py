@@ -13,9 +13,10 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import LONGEST_DELAY
+from mckibben.blocks.runs import Run
 from mckibben.channels import Channels
 from mckibben.errors import DataError
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.separable import DIFFERENCE, SEARCH_SAMPLES, SeparableEstimator
 from mckibben.numerics.descent import by_differences
 from mckibben.numerics.multi_start import multi_start

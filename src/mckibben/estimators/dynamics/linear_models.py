@@ -15,9 +15,10 @@ from mckibben.blocks.compose import Parallel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import vector
 from mckibben.blocks.parameters import Parametrised
+from mckibben.blocks.runs import Run
 from mckibben.channels import Channels
 from mckibben.errors import DataError, ModelError
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Estimator, Grid, Start, resting
 from mckibben.estimators.dynamics.prediction_error import (
     Beginning,

@@ -30,8 +30,9 @@ from mckibben.blocks.derivatives import relative_sizes
 from mckibben.blocks.dynamics.narx import Narx, NarxNetwork, NarxPolynomial, products
 from mckibben.blocks.fields import vector
 from mckibben.blocks.kernels import kernel
+from mckibben.blocks.runs import Run
 from mckibben.errors import DataError, ModelError, ModelWarning
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Grid, SearchEstimator
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.numerics.descent import trust_region

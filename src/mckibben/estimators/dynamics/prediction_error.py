@@ -24,7 +24,7 @@ from typing import Literal
 import numpy as np
 
 from mckibben.arrays import Array, Mask
-from mckibben.estimators.core.data import Run
+from mckibben.blocks.runs import Run
 from mckibben.numerics.descent import trust_region
 from mckibben.numerics.multi_start import follow_best
 from mckibben.numerics.statistics import rms

@@ -10,7 +10,8 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import ProcessModel
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.blocks.runs import Run
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 
 LEAST_DAMPING, MOST_DAMPING = 0.02, 100.0

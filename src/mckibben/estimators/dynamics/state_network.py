@@ -20,8 +20,9 @@ from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.state_network import BETWEEN, SETTLING, SETTLING_STEP, StateNetwork
 from mckibben.blocks.fields import rows
 from mckibben.blocks.kernels import summing_kernel
+from mckibben.blocks.runs import Run
 from mckibben.errors import DataError
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.dynamics.process_model import ProcessModelEstimator
 from mckibben.numerics.descent import trust_region

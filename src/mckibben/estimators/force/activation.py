@@ -18,8 +18,9 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
 from mckibben.blocks.force.activation import ActivationMemory, ActivationPressure
+from mckibben.blocks.runs import Run
 from mckibben.errors import DataError
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Operators, SearchEstimator
 from mckibben.estimators.core.separable import DIFFERENCE, SeparableEstimator
 from mckibben.numerics.descent import Errors, by_differences, trust_region

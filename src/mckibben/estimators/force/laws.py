@@ -17,7 +17,8 @@ from mckibben.blocks.force.laws import (
     PolynomialForce,
     TonduLopez,
 )
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.blocks.runs import Run
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 
 Law = Literal["bilinear", "petrovic", "minh", "schindele"]

@@ -20,7 +20,8 @@ from mckibben.blocks.force.multistate_friction import (
     Direction,
     MultistateFriction,
 )
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.blocks.runs import Run
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.force.laws import Law, force_columns, force_law
 from mckibben.numerics.multi_start import Choice

@@ -19,7 +19,8 @@ from mckibben.blocks.dynamics.creep import Creep, creep_matrix
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.memoryless import Logarithm
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.blocks.runs import Run
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Grid, Operators
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import LEAST_PIECE, PolynomialMap

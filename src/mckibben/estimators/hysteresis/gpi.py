@@ -14,7 +14,8 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.envelopes import Envelope, PiecewiseLinear, Tanh
 from mckibben.blocks.hysteresis.gpi import GPI, smallest_gap
 from mckibben.blocks.hysteresis.play_operators import play_matrix, started
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.blocks.runs import Run
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.pi import spread

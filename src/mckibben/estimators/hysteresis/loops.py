@@ -19,7 +19,8 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.differential import BoucWen, Duhem, GeneralizedBoucWen
 from mckibben.blocks.hysteresis.maxwell_slip import MaxwellSlip, slip_matrix
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.blocks.runs import Run
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap, centred

@@ -12,7 +12,8 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.blocks.runs import Run
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import InverseKind, Operators, Purpose
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import LEAST_PIECE, MAPS, PolynomialMap

@@ -14,8 +14,9 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.eupi import EUPI, eupi_matrix
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.hysteresis.play_operators import play_matrix, started
+from mckibben.blocks.runs import Run
 from mckibben.errors import ModelError
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Grid, Operators
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap

@@ -11,7 +11,8 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.preisach import KrasnoselskiiPokrovskii, Preisach
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.blocks.runs import Run
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Grid, InverseKind
 from mckibben.estimators.core.separable import SeparableEstimator
 

@@ -236,21 +236,13 @@ def _complex(real: Array, slopes: Array) -> Complex:
     return found
 
 
-def _by_differences(
-    block: Block, inputs: Array, sample_time: float | None, initial: Begun, places: Sequence[int]
+def by_moving(
+    block: Block, run: Callable[[Block], Array], places: Sequence[int] | None = None
 ) -> Array:
-    """Return differences of free runs, shape (n, m, k)."""
-    inputs = np.ascontiguousarray(inputs)
-
-    def run(values: Array) -> Array:
-        other, outputs = block.unpack(values), np.empty((len(inputs), len(block.outputs)))
-        start = initial(other).tolist() if callable(initial) else initial
-        state = other.initial_state(inputs[0], start, sample_time)
-        other.bind(sample_time, state, inputs, outputs)()
-        return outputs
-
+    """Return the differences of a block's runs, (n, m), by k of its parameters, shape (n, m, k)."""
     values = block.pack()
-    return differences(run, values, DIFFERENCE * relative_sizes(values), places)
+    steps = DIFFERENCE * relative_sizes(values)
+    return differences(lambda moved: run(block.unpack(moved)), values, steps, places)
 
 
 def derivatives(
@@ -281,10 +273,14 @@ def derivatives(
     places = range(block.n_parameters) if places is None else places
     workers, exact = max(min(cores(), len(places)), 1), differentiable(block)
 
+    def outputs_of(other: Block) -> Array:
+        start = initial(other).tolist() if callable(initial) else initial
+        return other.run(table, sample_time, start)[0]
+
     def run(share: Sequence[int]) -> Array:
         if exact:
             return Tangents(block, sample_time, initial, share).over(table)[1]
-        return _by_differences(block, table, sample_time, initial, share)
+        return by_moving(block, outputs_of, share)
 
     with ThreadPoolExecutor(workers) as pool:
         shares = [places[first::workers] for first in range(workers)]

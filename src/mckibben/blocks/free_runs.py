@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
-from mckibben.blocks.derivatives import DIFFERENCE, derivatives, relative_sizes
+from mckibben.blocks.derivatives import by_moving, derivatives, relative_sizes
 from mckibben.blocks.fields import check_units
 from mckibben.blocks.runs import FreeRun, Run
 from mckibben.errors import ModelError
-from mckibben.numerics.descent import differences
 from mckibben.recording import Recording
 
 AT_ONCE = 2_000_000
@@ -149,8 +148,8 @@ class FreeRuns:
     def apart(self, other: FreeRuns) -> float:
         """Return the root mean square by which outputs differ from those of other runs."""
         with np.errstate(over="ignore", invalid="ignore"):
-            differences = self.scored(self.modelled) - self.scored(other.modelled)
-            return float(np.sqrt(np.mean(differences**2)))
+            apart = self.scored(self.modelled) - self.scored(other.modelled)
+            return float(np.sqrt(np.mean(apart**2)))
 
     def scored(self, outputs: Sequence[NDArray[Kind]]) -> NDArray[Kind]:
         """Return the outputs of all runs, (n, m) each, at the samples that count, (N,)."""
@@ -191,12 +190,8 @@ class FreeRuns:
         """Return the derivatives of the outputs over a run, shape (n, m, k)."""
         block = self.changed(self.block, run.index)
         if run.source.periodic:
-            values = block.pack()
-
-            def simulated(moved: Array) -> Array:
-                return block.unpack(moved).simulate(run.source).matrix(self.names)
-
-            return differences(simulated, values, DIFFERENCE * relative_sizes(values), places)
+            source, names = run.source, self.names
+            return by_moving(block, lambda other: other.simulate(source).matrix(names), places)
 
         def start(other: Block) -> Array:
             state = other.known_state(run)

@@ -125,6 +125,11 @@ class Block(DrawsItself, Parametrised):
     filters: ClassVar[bool] = False
     """Whether the block is a linear filter, whose poles may be too slow for single precision."""
 
+    complex_step: ClassVar[bool] = True
+    """Whether its free runs are differentiated by complex step: a kernel for complex numbers is compiled
+    with it, which of some takes minutes.
+    """
+
     settable: ClassVar[Mapping[str, str | None]] = {}
     """Fields that are not identified and can be set on a saved model: each with the field of the
     lowest and highest value in its identification, or None; see `mckibben.blocks.setting`.
@@ -419,11 +424,6 @@ class Block(DrawsItself, Parametrised):
         numbers, kernel = self.coefficients(sample_time), self.kernel
         scratch = scratch_of(kernel, self.n_scratch)
         return bound(kernel.batch, numbers, state, *scratch, inputs, outputs)
-
-    complex_step: ClassVar[bool] = True
-    """Whether its free runs are differentiated by complex step: a kernel for complex numbers is compiled
-    with it, which of some takes minutes.
-    """
 
     @property
     def c_kernels(self) -> tuple[Callable[..., Any], ...]:

@@ -18,7 +18,7 @@ from mckibben.blocks.saving import from_dict
 from mckibben.errors import DataError, ModelError
 from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import GROUPS, PLACES, traits
-from mckibben.system.ordinary import DESCRIPTION, read_text
+from mckibben.system.ordinary import DESCRIPTION, named_toml, read_text
 from mckibben.system.validation import invalid
 
 FORMAT, VERSION = "mckibben-muscle", 1
@@ -141,16 +141,8 @@ def load(name: str | Path) -> Muscle:
     DataError
         On an unknown name, or a file that is no identified muscle.
     """
-    path = Path(name)
-    if path.suffix != ".toml":
-        if str(name) not in names():
-            raise DataError(
-                f"there is no muscle {str(name)!r} in the library",
-                remedy=f"use one of {', '.join(names())}, or a file that ends in .toml",
-            )
-        path = FOLDER / f"{name}.toml"
-        return _own(path)
-    return _load(path)
+    path = named_toml(name, FOLDER, "muscle")
+    return _own(path) if path.parent == FOLDER else _load(path)
 
 
 @cache

@@ -26,6 +26,7 @@ from mckibben.rigs.parameters import AGEING, Air, Muscle, Range, Section, Sensor
 from mckibben.rigs.system import Demands, State, System, Traces
 from mckibben.signals.checking import generator
 from mckibben.system.atomic import write_text
+from mckibben.system.ordinary import named_toml
 from mckibben.system.showing import DrawsItself
 from mckibben.system.validation import invalid
 
@@ -431,14 +432,7 @@ def load_rig(rig: str | Path) -> Rig:
     DataError
         On an unknown name, or a file that is not a rig: the text names the parameter and its range.
     """
-    path = Path(rig)
-    if path.suffix != ".toml":
-        if str(rig) not in rig_names():
-            raise DataError(
-                f"there is no rig {str(rig)!r}",
-                remedy=f"use one of {', '.join(rig_names())}, or a file that ends in .toml",
-            )
-        path = PUBLISHED / f"{rig}.toml"
+    path = named_toml(rig, PUBLISHED, "rig")
     return _from_fields(fields_of(path), path)
 
 

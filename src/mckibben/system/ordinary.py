@@ -65,3 +65,23 @@ def read_text(path: str | Path, *, most: int) -> str:
         return read_bytes(path, most=most).decode("utf-8-sig")  # which Windows' editors write
     except UnicodeDecodeError:
         raise DataError("it is not text in UTF-8", file=path, remedy="give a text file") from None
+
+
+def named_toml(name: str | Path, folder: Path, kind: str) -> Path:
+    """Return the path of a kind's TOML file: as given, or of the package's folder by its name.
+
+    Raises
+    ------
+    DataError
+        On a name that is in neither.
+    """
+    path = Path(name)
+    if path.suffix == ".toml":
+        return path
+    known = sorted(one.stem for one in folder.glob("*.toml"))
+    if str(name) not in known:
+        raise DataError(
+            f"there is no {kind} {str(name)!r}",
+            remedy=f"use one of {', '.join(known)}, or a file that ends in .toml",
+        )
+    return folder / f"{name}.toml"

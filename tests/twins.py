@@ -832,15 +832,13 @@ class _Parallel:
             return [0.0] * len(self.stops[k])
         block, dz = self.block, y + self.block.walls[k] * p - self.z[k]
         scheduling = self.scheduling(x)
-        pressed = (
-            p
-            + block.friction_offset
-            + _sum(block.friction_slopes or (0.0,) * len(scheduling), scheduling)
-        )
+        share = block.friction_growth
+        grown = 1.0 - share + share * p / block.highest_pressure
+        grown += _sum(block.friction_slopes or (0.0,) * len(scheduling), scheduling)
         return [
             min(max(s + dz, -(block.asymmetry or 1.0) * width), width)
             for s, width in zip(
-                self.stops[k], (limit * max(pressed, 0.0) for limit in block.limits), strict=True
+                self.stops[k], (limit * max(grown, 0.0) for limit in block.limits), strict=True
             )
         ]
 
@@ -871,7 +869,8 @@ class _Parallel:
             flow = self.area(k, min(max(self.u[k], low), high)) / block.areas[k][0]
             line = block.lines[k] if block.lines else 0.0
             moved, (last, before) = u - self.u[k], self.moves[k]
-            force += (block.damping[k] + line * flow**2) * moved / self.step
+            speed = (1.5 * moved - 0.5 * last) / self.step
+            force += (block.damping[k] + line * flow**2) * speed
             heavy = block.mass[k] if block.mass else 0.0
             force += heavy * (2.0 * moved - 3.0 * last + before) / self.step**2
         return force - p * self.area(k, u)

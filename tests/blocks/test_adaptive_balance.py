@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben.blocks.adaptive import Adaptive, adaptive
-from mckibben.blocks.coupled.balance import FRICTION, STIFFNESS, Balance, adaptable_of, ratios
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance_adaptive import FRICTION, STIFFNESS, adaptable_in
+from mckibben.blocks.coupled.balance_bounds import ratios
 from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.laws import wander
-from tests.blocks.balances import ALONE, CROWDED, HIGHEST, STEP, balances, in_series
+from tests.blocks.balances import ALONE, CROWDED, STEP, balances, in_series
 
 Array = NDArray[np.float64]
 
@@ -77,14 +79,14 @@ def test_slopes_are_those_of_the_model(balance: Balance, seed: int) -> None:
 @given(balances() | balances(crowded=True), st.integers(0, 1000))
 def test_what_garbage_teaches_is_a_balance_still(balance: Balance, seed: int) -> None:
     """A balance that makes energy is refused; areas outweigh friction, as the fitted ones do."""
-    balance = replace(balance, pressure_range=(0.0, HIGHEST))  # whose top lets areas lose stiffness
+    c, levels = balance.coefficients(STEP), np.zeros((balance.n_schedules, 2))
     block, n = Adaptive(Inverse(balance), 1.0, 0.05), len(balance.driven)
     stream, rng = block.stream(STEP), np.random.default_rng(seed)
     for sample in path(balance, seed, 150):
         stream.step([*sample, *rng.uniform(-100.0, 100.0, n)])
     changed: Balance = block.present(stream.state).inverse()  # type: ignore[assignment]
     for k in range(len(balance.given)):
-        most, softest = ratios(balance, k)
+        most, softest = ratios(c, k, levels)
         area = changed.areas[k][0] / balance.areas[k][0]
         assert changed.elasticity[k][0] >= balance.elasticity[k][0] * area / softest * (1 - 1e-12)
         for new, old in zip(changed.friction[k], balance.friction[k], strict=True):
@@ -119,7 +121,7 @@ def followed(block: Adaptive, plant: Any) -> tuple[Array, Array]:
 @pytest.mark.parametrize(("kind", "factor"), [(STIFFNESS, 0.85), (FRICTION, 1.3)])
 def test_what_changed_is_compensated_and_found(kind: int, factor: float) -> None:
     block = Adaptive(Inverse(SINGLE), 20.0, 0.02)
-    kinds = np.array([one for _, one in adaptable_of(SINGLE)])
+    kinds = np.array([one for _, one in adaptable_in(SINGLE.coefficients(STEP))])
     plant = SINGLE.learnable.with_parameters(
         np.where(kinds == kind, factor, SINGLE.learnable.fitted)
     )
@@ -132,7 +134,7 @@ def test_what_changed_is_compensated_and_found(kind: int, factor: float) -> None
 def test_whatever_a_balance_is_in_series_with_it_learns() -> None:
     """Three muscles under a load, on two coordinates: late measurements teach nothing false."""
     balance = CROWDED
-    kinds = np.array([kind for _, kind in adaptable_of(balance)])
+    kinds = np.array([kind for _, kind in adaptable_in(balance.coefficients(STEP))])
     changes = np.where(kinds == STIFFNESS, 1.2, balance.learnable.fitted)
     aged = balance.learnable.with_parameters(changes).inverse()
     assert isinstance(aged, Balance)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from mckibben import GPI, PI, DataError, ModelError, load
@@ -120,6 +121,59 @@ def test_inverses_that_had_kinds_of_their_own_still_load() -> None:
     for kind in ("nothing-inverse", "pi-inverse-inverse", "-inverse"):
         with pytest.raises(ModelError):
             saving.from_dict({**content, "kind": kind})
+
+
+OLDER = {
+    "format": "mckibben-model",
+    "version": 1,
+    "kind": "balance",
+    "degree": 1,
+    "scale": 50.0,
+    "springs": [[2.0, 14.0, 0.5, 0.2]],
+    "elasticity": [[6.0]],
+    "areas": [[60.0, -25.0]],
+    "friction": [[3.0, 1.5]],
+    "relaxation": [[]],
+    "loads": [[1.0]],
+    "damping": [0.0],
+    "walls": [0.05],
+    "limits": [0.2, 0.8],
+    "friction_offset": 0.5,
+    "friction_slopes": [0.3],
+    "lags": [],
+    "hull": [[-20.0, 50.0]],
+    "asymmetry": 0.7,
+    "pressure_range": [0.0, 6.0],
+    "driven": [{"name": "displacement", "unit": "mm"}],
+    "scheduled": [{"name": "extensor", "unit": "bar"}, {"name": "force", "unit": "N"}],
+    "given": [{"name": "pressure", "unit": "bar"}],
+}
+"""A balance whose stops break away at ``limits (p + friction_offset + friction_slopes x)``."""
+
+MOVED = ((0, 0, 0), (5, 1, 10), (9, 0.5, 20), (7, 0.5, 20), (3, 1.5, 0), (4, 1.5, 0), (8, 0.2, -5))
+PRESSURES = (
+    *(0.04238164285471853, 1.526032315978456, 2.8028752327746735, 2.1413991492105113),
+    *(0.7442202141900939, 1.0567717139819637, 2.040250922509225),
+)
+"""Coordinates, extensor's pressure and load; the pressures that it gave for them."""
+
+
+@pytest.mark.parametrize("named", [{}, {"friction_offset": "grip", "friction_slopes": "grips"}])
+@pytest.mark.parametrize("ranged", [True, False])
+def test_older_balances_give_the_same_numbers(named: dict[str, str], *, ranged: bool) -> None:
+    content = {named.get(name, name): value for name, value in OLDER.items()}
+    if not ranged:
+        content.pop("pressure_range")
+    block = saving.from_dict(content)
+    np.testing.assert_allclose(block.simulate(MOVED)[:, 0], PRESSURES, rtol=0, atol=1e-12)
+    assert saving.from_dict(block.to_dict()) == block
+
+
+@pytest.mark.parametrize("wrong", ["0.5", [[0.5]], {}, 10**400])
+def test_older_balances_that_are_damaged_are_refused(wrong: object) -> None:
+    for name in ("friction_offset", "limits", "friction_slopes", "pressure_range"):
+        with pytest.raises(ModelError):
+            saving.from_dict(OLDER | {name: wrong})
 
 
 def test_nothing_is_imported_on_the_word_of_a_file(

@@ -86,7 +86,7 @@ NO_MODEL: list[tuple[str, dict[str, Any], str]] = [
     ("balance", {"pushes": (-4.0, 5.0)}, "pushes"),
     ("balance", {"mass": (-4.0, 5.0)}, "mass"),
     ("balance", {"mass": (0.1, 0.1)}, "mass and pushes"),
-    ("balance", {"friction_offset": -0.5}, "friction_offset"),
+    ("balance", {"friction_growth": -0.5}, "friction_growth"),
     ("balance", {"lags": (0.8, -1.0)}, "lags"),
     ("balance", {"areas": ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0))}, "areas"),
     ("balance", {"springs": ((1.0,), (1.0,))}, "springs.*2 rows of 6"),

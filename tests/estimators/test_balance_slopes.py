@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.complex_step import STEP, twin
 from mckibben.blocks.coupled import balance_law as law
+from mckibben.blocks.coupled import balance_solving as solving
 from mckibben.blocks.coupled import balance_terms as at
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_terms import LINEAR
@@ -47,7 +48,7 @@ SINGLE = replace(
     hull=((-20.0, 50.0),),
     bladders=(8.0,),
     degree=3,
-    friction_slopes=(0.2, 0.1),
+    friction_slopes=(0.02, 0.01),
     driven=channels("displacement", "mm", 1),
     scheduled=(*channels("extensor", "bar", 2), *channels("force", "N", 2)),
     given=channels("pressure", "bar", 1),
@@ -93,9 +94,10 @@ CASES: dict[str, Balance] = {
         pushes=(3.0, 0.0),
     ),
     "mass": replace(BOTH, mass=(0.01, 0.02)),
-    "friction by way and schedule": replace(BOTH, asymmetry=0.4, friction_slopes=(0.3,)),
-    "friction without offset": replace(BOTH, friction_offset=0.0, asymmetry=1.7),
-    "friction that never breaks away": replace(BOTH, limits=(50.0, 80.0)),
+    "friction by way and schedule": replace(BOTH, asymmetry=0.4, friction_slopes=(0.03,)),
+    "friction proportional to pressure": replace(BOTH, friction_growth=1.0, asymmetry=1.7),
+    "constant friction": replace(BOTH, friction_growth=0.0, limits=(1.0, 4.0)),
+    "friction that never breaks away": replace(BOTH, limits=(500.0, 800.0)),
     "obstacles": replace(BOTH, obstacles=OBSTACLES),
     "tare": replace(BOTH, tare=True, **TIGHT),
     "settled": replace(BOTH, settled=True),
@@ -140,7 +142,7 @@ def columns(block: Balance, c: Array) -> Iterator[tuple[int, Array]]:
     linear = [*(places[name] for name in names), met[:, at.STIFFNESS :]]
     for place in sorted(np.concatenate([each.ravel() for each in linear]).tolist()):
         yield place - first, unit(place)
-    yield next(column), unit(at.OFFSET)
+    yield next(column), unit(at.GROWTH)
     for place in places["friction_slopes"].ravel().tolist():
         yield next(column), unit(place)
     yield next(column), c[at.RATIO] * unit(at.RATIO)
@@ -159,7 +161,7 @@ def stepped(c: Complex, p: Complex, q: Array, x: Array, *, held: bool) -> Comple
     """Return what `run` finds, by the kernels of the law for complex numbers."""
     m = int(c[at.N_COORDINATES].real)
     state = np.zeros(int(c[at.TARE].real) + m + 2, np.complex128)
-    x, work = x.astype(np.complex128), np.zeros(int(law.work_size(c.real)), np.complex128)
+    x, work = x.astype(np.complex128), np.zeros(int(c[at.WORK].real), np.complex128)
     here, none, tare = (np.zeros(size, np.complex128) for size in (m, p.shape[1], m))
     found = np.zeros((len(p), m), np.complex128)
     for t in range(-1, len(p)):
@@ -168,10 +170,10 @@ def stepped(c: Complex, p: Complex, q: Array, x: Array, *, held: bool) -> Comple
         pushed = p[now] if t >= 0 or (held and c[at.HELD] == 0.0) else none
         if held:
             here = q[now].astype(np.complex128)
-            twin(law.unbalanced)(c, state, way, here, x[now], pushed, work)
+            twin(solving.unbalanced)(c, state, way, here, x[now], pushed, work)
             found[now] = work[:m]
         else:
-            twin(law.solve_equilibrium)(c, state, way, here, x[now], pushed, work)
+            twin(solving.solve_equilibrium)(c, state, way, here, x[now], pushed, work)
             found[now] = here
         twin(law.update_state)(c, state, way, here, pushed, x[now])
         if not held and c[at.TARED] != 0.0:

@@ -3,8 +3,6 @@
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.fields import Channel
 
-OFFSET = 1e7  # of friction's pressure, which makes it constant
-
 MUSCLE = Balance(
     springs=((-12.0, 20.0),),
     elasticity=((6.0, 30.0),),
@@ -14,8 +12,9 @@ MUSCLE = Balance(
     loads=((1.0,),),
     damping=(0.05,),
     walls=(0.0,),
-    limits=tuple(travel / OFFSET for travel in (0.2, 0.5, 1.0, 4.0)),
-    friction_offset=OFFSET,
+    limits=(0.2, 0.5, 1.0, 4.0),
+    friction_growth=0.0,
+    highest_pressure=6.0,
     lags=(),
     hull=((-5.0, 40.0),),
     scale=40.0,

@@ -75,12 +75,15 @@ def random_motion(time: Array) -> Array:
 @pytest.mark.parametrize("step", [0.001, 0.002])
 @pytest.mark.parametrize("motion", [triangles, minor_loops, random_motion])
 def test_forces_are_those_of_python(step: float, motion: Callable[[Array], Array]) -> None:
-    """All motions leave the shortenings known, on both sides."""
+    """All motions leave the shortenings known. MuJoCo damps by the velocity of one step."""
     muscle = replace(MUSCLE, hull=((2.0, 15.0),))
+    (damping,) = muscle.damping
+    undamped = replace(muscle, damping=(0.0,))
     time = np.arange(0.0, 8.0, step)
     pressure = 3.0 + 2.5 * np.sin(2.0 * time)
     found = pulled(compiled(mjcf(muscle, rest_length=REST), step, HEAVY), motion(time), pressure)
-    expected = LoadEstimate(muscle).simulate(found[:, :2], sample_time=step)[:, 0]
+    expected = LoadEstimate(undamped).simulate(found[:, :2], sample_time=step)[:, 0]
+    expected -= damping * np.diff(found[:, 0], prepend=found[0, 0]) / step
     later = time > 2.0  # once what the start remembers is wiped out
     assert np.ptp(found[later, 0]) > 10.0
     np.testing.assert_allclose(found[later, 2], expected[later], atol=1e-6 * np.ptp(expected))
@@ -190,7 +193,7 @@ def test_the_regulator_lags() -> None:
 @pytest.mark.parametrize(
     "changed",
     [
-        {"friction_offset": 0.5, "limits": (0.1, 0.2, 0.3, 0.4)},
+        {"friction_growth": 0.5},
         {"asymmetry": 1.5},
         {"lags": (1.0,), "relaxation": ((2.0,),)},
         {"areas": ((100.0, -60.0, 5.0),)},

@@ -156,8 +156,11 @@ def _crowded(**changes: Any) -> Any:
         pushes=(60.0, 50.0, 40.0),
         given=tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2, 3)),
         pressure_range=(0.0, 6.0),
+        highest_pressure=6.0,
+        limits=(3.25, 13.0),
+        friction_growth=6.0 / 6.5,
+        friction_slopes=(0.2 / 6.5,),
         asymmetry=0.7,
-        friction_slopes=(0.2,),
         obstacles=(
             (1.0, 5.0, 4.0, 1.0, -1.0, 1.0, 3.0, 0.0),
             (1.0, 4.0, 6.0, 0.0, -1.0, -2.0, 5.0, 1.0),

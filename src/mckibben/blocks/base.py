@@ -136,10 +136,9 @@ class Block(DrawsItself, Parametrised):
     """
 
     retired: ClassVar[Mapping[str, Any]] = {}
-    """Fields of older files, with the value of each that had no effect."""
-
-    renamed: ClassVar[Mapping[str, str]] = {}
-    """Names of fields in older files, with those of today."""
+    """Fields of older files, with the value of each that had no effect. A class that has other fields
+    than older files of it makes them of those in ``converted``.
+    """
 
     sample_time: float | None = None
     """Sample time of a discrete block [s]; None if it has no fixed one."""

@@ -55,9 +55,10 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
         kind = older.get(kind, "inverse" if undone else kind)
     cls = load_plugin(group, kind)
     values = {key: _tuples(value) for key, value in content.items() if key != "kind"}
-    for older, name in getattr(cls, "renamed", {}).items():
-        if older in values:
-            values[name] = values.pop(older)
+    try:  # what an older file has
+        values = getattr(cls, "converted", dict)(values)
+    except (ArithmeticError, KeyError, TypeError, ValueError):
+        raise ModelError(f"older fields of {kind!r} are invalid", remedy="save it again") from None
     for name, unused in getattr(cls, "retired", {}).items():
         if values.get(name) == unused:
             values.pop(name, None)

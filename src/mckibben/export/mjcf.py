@@ -32,8 +32,8 @@ from mckibben.system.atomic import replacing
 MM = 1000.0
 """In a metre."""
 
-CONSTANT = 1e3
-"""Friction's pressure offset over the highest pressure, from which friction is constant."""
+CONSTANT = 1e-3
+"""Share of friction that grows with pressure, below which friction is constant."""
 
 GRAVITY = 9.81
 """Of the examples [m/s^2]."""
@@ -143,7 +143,6 @@ def carried(model: Block) -> Balance:
     if placed is None:
         raise ModelError(f"{model.title!r} is no balance of forces", remedy=again)
     balance = placed.balance
-    highest = (balance.pressure_range or (0.0, 10.0))[1]
     lacking = {
         "several muscles": len(balance.given) > 1 or len(balance.driven) > 1,
         "parts before or behind the balance": bool(placed.before or placed.behind),
@@ -151,9 +150,8 @@ def carried(model: Block) -> Balance:
         "displacements from rest at the start": balance.tare,
         "elasticity above the third degree": len(balance.elasticity[0]) > 2,
         "an area that is not linear in length": len(balance.areas[0]) > 2,
-        "friction that depends on pressure": bool(balance.limits)
-        and any(balance.friction[0])
-        and balance.friction_offset < CONSTANT * highest,
+        "friction that depends on pressure": any(balance.friction[0])
+        and balance.friction_growth > CONSTANT,
         "friction that differs by direction": balance.asymmetry not in (None, 1.0),
     } | {
         TABLE[name].label: bool(np.any(getattr(balance, name) or 0.0))
@@ -172,7 +170,7 @@ def stroke(muscle: Balance) -> float:
 
 def pull(muscle: Balance) -> float:
     """Return the pull at rest under the highest pressure [N]."""
-    return muscle.areas[0][0] * (muscle.pressure_range or (0.0, 5.0))[1]
+    return muscle.areas[0][0] * muscle.highest_pressure
 
 
 # -- the muscle ------------------------------------------------------------------------------------
@@ -181,7 +179,7 @@ def pull(muscle: Balance) -> float:
 def _defaults(default: ET.Element, muscle: Balance, rest: float, lag: float) -> None:
     """Fill the class that the muscle's tendon and actuator have."""
     slope = MM * (muscle.areas[0][1] if len(muscle.areas[0]) > 1 else 0.0) / muscle.scale
-    low, high = muscle.pressure_range or (0.0, 10.0)
+    low, high = muscle.pressure_range or (0.0, muscle.highest_pressure)
     # an actuator pushes a tendon's ends apart: a muscle's forces are negative
     settings = {
         "ctrlrange": _row(low, high),
@@ -227,8 +225,7 @@ def _tendons(
     stops = zip(muscle.friction[0], muscle.limits, strict=True)
     for number, (stiffness, limit) in enumerate(stops, start=1):
         if stiffness > 0:
-            travel = limit * muscle.friction_offset / MM
-            add(f"_stop_{number}", MM * stiffness, springyield=_row(travel))
+            add(f"_stop_{number}", MM * stiffness, springyield=_row(limit / MM))
     # beyond the shortenings known elasticity goes on straight: what bends there is taken away again
     ends = [(f"_{end}", side, muscle.hull[0][side > 0]) for end, side in (("low", -1), ("high", 1))]
     for suffix, side, place in ends:

@@ -51,7 +51,8 @@ def resized(
         "obstacles": [1.0, length, *(1 + balance.n_schedules) * [stiffness]],
     }
     units = {name: TABLE[name].unit for name in Balance.parameters if name != "loads"}
-    units |= {"limits": "mm/bar", "hull": "mm", "scale": "mm", "preload": "bar", "drive": "bar"}
+    units |= dict.fromkeys(("limits", "hull", "scale"), "mm")
+    units |= dict.fromkeys(("highest_pressure", "preload", "drive"), "bar")
     changed: dict[str, Any] = {}
     for name, unit in units.items():
         value = np.array(getattr(balance, name) or (), dtype=np.float64)

@@ -101,7 +101,8 @@ def traits(balance: Balance, sheet: Sheet, zero: float = 0.0) -> Array:
     h, limits = np.array(balance.friction[0]), np.array(balance.limits)
 
     def rubbed(p: float, travels: Array) -> Array:
-        return np.minimum(travels[:, np.newaxis], limits * (p + balance.friction_offset)) @ h
+        grown = 1.0 + balance.friction_growth * (p / balance.highest_pressure - 1.0)
+        return np.minimum(travels[:, np.newaxis], limits * grown) @ h
 
     own = balance.springs[0][1] + sum(balance.bladders)
     powers = np.array([balance.springs[0][0], own * balance.scale, *balance.elasticity[0]])

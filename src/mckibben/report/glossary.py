@@ -19,7 +19,8 @@ MUSCLES = {
     "relaxation": "decay of the force at constant length; at constant load it appears as creep",
     "slack": "state of a muscle that is longer than the distance between its ends",
     "coupling": "motion of a muscle caused by the pressures of its neighbours",
-    "friction pressure offset": "friction is proportional to pressure plus this offset [bar]",
+    "friction growth": "share of the friction at the highest pressure that grows with pressure: 0 for "
+    "constant friction, 1 for friction proportional to pressure",
     "line damping": "damping at rest by air flow between pressure sensor and muscle [N s/mm]",
     "tare": "whether displacement is zero at the start of each recording",
 }

@@ -23,7 +23,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -35,31 +35,14 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Block, Ports, Start
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled import balance_terms as at
-from mckibben.blocks.coupled.balance_adaptive import (
-    AREA_HIGH,
-    AREA_LOW,
-    BEHIND,
-    BY_AREA,
-    FACTOR_OF,
-    FIRST,
-    FORCE,
-    HIGH,
-    LOW,
-    ROW,
-    balance_adaptive_start,
-    balance_adaptive_step,
-    retune,
-)
-from mckibben.blocks.coupled.balance_law import (
-    AT_REST,
-    FROM_REST,
-    IN_TIME,
+from mckibben.blocks.coupled.balance_adaptive import learnable_balance
+from mckibben.blocks.coupled.balance_law import AT_REST, FROM_REST, IN_TIME, update_state
+from mckibben.blocks.coupled.balance_solving import (
     NEARLY,
     give_pressures,
     solve_equilibrium,
     start_at_rest,
     start_balance,
-    update_state,
 )
 from mckibben.blocks.coupled.balance_terms import NEVER, TABLE, Layout, Sizes, layout
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector, rows, vector
@@ -116,6 +99,9 @@ def balance_inverse_start(
         update_state(c, state, AT_REST, q, p, x)
 
 
+USUAL_TOP = 10.0
+"""Highest pressure of an older file without a range of pressures [bar]."""
+
 NEEDED = ("springs", "elasticity", "areas", "friction", "relaxation", "loads", "damping", "walls")
 """Fields that are not optional."""
 
@@ -148,10 +134,13 @@ class Balance(Invertible):
     walls : sequence of n float
         Stretch of the wall by pressure, which acts on friction at constant length too [mm/bar].
     limits : sequence of float
-        Travel at which every stop breaks away, of the pressure that friction is proportional to
-        [mm/bar], increasing.
-    friction_offset : float
-        p_0: friction vanishes at the pressure -p_0 [bar]; stops break away at ``limits (p + p_0)``.
+        Travel at which every stop breaks away at the highest pressure [mm], increasing.
+    friction_growth : float
+        Share of that travel which grows with pressure: 0 for constant friction, 1 for friction
+        proportional to pressure; not negative. Stops break away at ``limits (1 - friction_growth +
+        friction_growth p / highest_pressure)``, which is never below 0.
+    highest_pressure : float
+        Highest of the recorded pressures [bar], positive.
     lags : sequence of float
         Time constants of what relaxes [s].
     hull : sequence of n pairs of float
@@ -184,7 +173,7 @@ class Balance(Invertible):
         Ratio of the travel at which stops break away while muscles lengthen to that while they shorten;
         positive. Default 1.
     friction_slopes : sequence of float
-        Friction offset per scheduling input, in addition to pressure; not negative [bar by its unit].
+        Share of that travel which scheduling inputs add, by their units; not negative.
         Default none.
     obstacles : sequence of m sequences of float
         What every coordinate meets, one after another: 1 on the way up or -1 on the way down, where
@@ -213,10 +202,9 @@ class Balance(Invertible):
     inverse_path_dependent: ClassVar[bool] = True
     complex_step: ClassVar[bool] = False
     increasing = ("limits",)
-    renamed: ClassVar[Mapping[str, str]] = {"grip": "friction_offset", "grips": "friction_slopes"}
     parameters: ClassVar[tuple[str, ...]] = (
         *("springs", "elasticity", "areas", "friction", "relaxation", "loads"),
-        *("damping", "lines", "walls", "friction_offset", "bladders", "pushes", "mass"),
+        *("damping", "lines", "walls", "friction_growth", "bladders", "pushes", "mass"),
         *("asymmetry", "friction_slopes", "obstacles"),
     )
     formulas = (
@@ -232,8 +220,9 @@ class Balance(Invertible):
     loads: Annotated[Rows, TABLE["loads"].notation]
     damping: Annotated[Vector, TABLE["damping"].notation]
     walls: Annotated[Vector, TABLE["walls"].notation]
-    limits: Annotated[Vector, "r_m [mm/bar]"]
-    friction_offset: Annotated[FiniteFloat, TABLE["friction_offset"].notation]
+    limits: Annotated[Vector, "r_m [mm]"]
+    friction_growth: Annotated[FiniteFloat, TABLE["friction_growth"].notation]
+    highest_pressure: Annotated[FiniteFloat, Gt(0), "P [bar]"]
     lags: Annotated[Vector, r"\tau_l [s]"]
     hull: Rows
     scale: Annotated[FiniteFloat, Gt(0), "L [mm]"]
@@ -256,6 +245,30 @@ class Balance(Invertible):
     preload: Annotated[FiniteFloat, "p_s [bar]"] = 0.0
     drive: Annotated[Rows, "D_{ki} [bar]"] = ()
     held: bool = False
+
+    @staticmethod
+    def converted(fields: dict[str, Any]) -> dict[str, Any]:
+        """Return fields as of today: stops of older files break away at ``limits (p + p_0 + g x)``."""
+        older = {"grip": "friction_offset", "grips": "friction_slopes"}
+        fields = {older.get(name, name): value for name, value in fields.items()}
+        if "friction_offset" not in fields or "friction_growth" in fields:
+            return fields
+        offset = fields.pop("friction_offset")
+        top = max(map(abs, fields.get("pressure_range") or (USUAL_TOP,)))
+        whole = top + offset
+        return fields | {
+            "limits": vector(whole * np.array(fields["limits"])),
+            "friction_growth": top / whole,
+            "highest_pressure": top,
+            "friction_slopes": vector(np.array(fields.get("friction_slopes", ())) / whole),
+        }
+
+    @classmethod
+    def unchecked(cls, **fields: Any) -> Self:
+        """Return a balance without its checks: identification makes thousands that are only run."""
+        made = object.__new__(cls)
+        vars(made).update(fields)
+        return made
 
     def __post_init__(self) -> None:
         self.check_channels()
@@ -351,7 +364,8 @@ class Balance(Invertible):
             outer = outer.replace("y_", "q_").replace("_k", "_j")
             pulls = rf"\sum_k W_{{kj}} \left(p_k A_k(y_k) - R_k\right) = {outer}"
             balance = (pulls, rf"R_k = {inner},\quad y_k = \sum_j W_{{kj}} q_j")
-        limit = "r_m (p_k + p_0" + (r" + \sum_i g_i x_i)" if any(self.friction_slopes) else ")")
+        growth = r" + \lambda p_k / P" + r" + \sum_i g_i x_i" * any(self.friction_slopes)
+        limit = rf"r_m (1 - \lambda{growth})"
         down = rf", \text{{down to }} -\rho {limit}"
         ends = rf"\pm {limit}" if self.asymmetry is None else limit + down
         memory = {
@@ -387,7 +401,7 @@ class Balance(Invertible):
             area=max(len(self.areas[0]) if self.areas else 0, 1),
             obstacles=len(self.obstacles[0]) // width if self.obstacles else 0,
             driven=len(self.drive[0]) - 1 if self.drive else 0,
-            moves=2 if self.mass else 0,
+            moves=2 if any((*self.damping, *self.lines, *self.mass)) else 0,
         )
 
     @property
@@ -420,7 +434,7 @@ class Balance(Invertible):
     def n_scratch(self) -> int:
         """Scratch: coordinates, three numbers a muscle, what equilibrium needs, and a drive."""
         n, m = len(self.given), len(self.driven)
-        return 3 * n + m + self.places.n_work + (n * n + n * m + m if self.drive else 0)
+        return 3 * n + m + self.places.head[at.WORK] + (n * n + n * m + m if self.drive else 0)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return the coefficients, in the places of `mckibben.blocks.coupled.balance_terms`.
@@ -444,8 +458,9 @@ class Balance(Invertible):
         c = np.zeros(self.places.size)
         c[: at.SCALE] = self.places.head
         c[at.SCALE : at.LIMITS] = (
-            *(self.scale, self.friction_offset, self.asymmetry or 1.0, low, high, 1.0 / step),
-            *(self.tare, not self.settled, self.preload, bool(self.directions), self.held),
+            *(self.scale, self.friction_growth, self.highest_pressure, self.asymmetry or 1.0),
+            *(low, high, 1.0 / step, self.tare, not self.settled),
+            *(self.preload, bool(self.directions), self.held),
         )
         for name, places in self.places.at.items():
             value = np.asarray(values[name] if name in values else getattr(self, name))
@@ -498,7 +513,19 @@ class Balance(Invertible):
     @property
     def learnable(self) -> Learnable:
         """Forces and factors of every muscle."""
-        return learnable_balance(self)
+        scheduled = self.known[: self.n_schedules] or self.n_schedules * ((0.0, 0.0),)
+        return learnable_balance(
+            self.coefficients,
+            lambda c: Inverse(self._with_coefficients(c)),
+            known=self.known_coordinates,
+            scheduled=np.reshape(scheduled, (-1, 2)),
+        )
+
+    def _with_coefficients(self, c: Array) -> Self:
+        """Return the balance with other springs and force terms."""
+        names = ("springs", "elasticity", "areas", "friction", "relaxation", "bladders")
+        numbers = {name: c[self.places.at[name]] for name in names if getattr(self, name)}
+        return replace(self, **fields_of(numbers))
 
     @property
     def n_inverse_states(self) -> int:
@@ -519,7 +546,7 @@ class Balance(Invertible):
         force = driving if self.areas[0][0] == 1.0 else "N"
         own = {"N": force, "mm": self.driven[0].unit, "bar": driving}
         unit = re.sub(r"\b(N|mm|bar)\b", lambda one: own[one[0]], unit).rstrip("/")
-        return f"{unit}{' ' if '/' in unit else '/'}{by}" if by else unit
+        return f"{unit or 1}{' ' if '/' in unit else '/'}{by}" if by else unit
 
     def is_convention(self, field: str, index: tuple[int, ...]) -> bool:
         """Return whether a parameter is a side, or sets the unit of force."""
@@ -579,8 +606,9 @@ class Balance(Invertible):
             damping=(0.1, 0.05),
             lines=(0.06, 0.04),
             walls=(0.05, 0.1),
-            limits=(0.5, 2.0),
-            friction_offset=0.5,
+            limits=(5.0, 20.0),
+            friction_growth=0.95,
+            highest_pressure=9.5,
             lags=(0.8, 12.0),
             hull=((-20.0, 50.0), (-20.0, 50.0)),
             bladders=(4.0, 5.0),
@@ -591,6 +619,14 @@ class Balance(Invertible):
             scheduled=(Channel("pressure_extensor", "bar"), Channel("force", "N")),
             given=tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2)),
         )
+
+
+def fields_of(numbers: Mapping[str, Array]) -> dict[str, Any]:
+    """Return fields of a balance from their coefficients, a row a coordinate or muscle."""
+    return {
+        name: vector(table[:, 0]) if TABLE[name].width == "one" else rows(table)
+        for name, table in numbers.items()
+    }
 
 
 class Placed(NamedTuple):
@@ -623,170 +659,3 @@ def drive_of(model: Block) -> tuple[Array, Array] | None:
         return None
     drive = np.array(placed.balance.drive)
     return drive[:, 0], drive[:, 1:]
-
-
-# -- what of a balance adapts ----------------------------------------------------------------------
-
-KINDS = range(5)
-OFFSET, STIFFNESS, AREA, FRICTION, RELAXATION = KINDS
-"""Adaptive parameters of a muscle; an added force reduces its pull."""
-
-FACTORS = 0.5, 2.0
-"""Smallest and largest factor on fitted values."""
-
-MOST_FORCE = 0.3
-"""Largest constant force, relative to its scale."""
-
-USUAL_TOP = 10.0
-"""Highest pressure if the model has no limit [bar]."""
-
-LEAST_LEFT = 0.05
-"""Smallest area left after friction, relative to the area at rest, as in identification."""
-
-GRID = 21
-"""Grid points over the known range of a displacement at which constraints are checked."""
-
-
-def learnable_balance(balance: Balance) -> Learnable:
-    """Return the adaptive parameters of a balance: factors of 1, and forces of 0.
-
-    Factors are expected to change by 30 %, forces by 10 % of that of the highest pressure at rest.
-    """
-    m, adapted, known = len(balance.driven), adaptable_of(balance), balance.known_coordinates
-    muscles, kinds = np.array(adapted).T
-    offsets, at_rest = kinds == OFFSET, np.array(balance.areas)[muscles, 0] * top_of(balance)
-    fitted, scales = np.where(offsets, 0.0, 1.0), np.where(offsets, at_rest, 1.0)
-
-    table = family_of(balance, adapted, scales)
-
-    def numbers(sample_time: float | None) -> Array:
-        return np.concatenate([[m], table.ravel(), balance.coefficients(sample_time)])
-
-    return Learnable(
-        balance_adaptive_step,
-        balance_adaptive_start,
-        fitted=fitted,
-        scales=scales,
-        spread=np.diag(np.where(offsets, 0.1, 0.3) ** 2),
-        with_parameters=lambda theta: Inverse(changed(balance, table, theta - fitted)),
-        numbers=numbers,
-        known=known,
-        compensates=True,
-        n_more_states=m + m * fitted.size,
-        n_more_scratch=m * fitted.size + 2 * m * m + 2 * m + balance.coefficients(1.0).size,
-    )
-
-
-def adaptable_of(balance: Balance) -> list[tuple[int, int]]:
-    """Return muscle and kind of every adaptive parameter."""
-    found = []
-    for k in range(len(balance.given)):
-        lasting = any(balance.friction[k]), any(balance.relaxation[k])
-        there = (True, True, k > 0 or balance.n_loads > 0, *lasting)
-        found += [(k, kind) for kind in KINDS if there[kind]]
-    return found
-
-
-def top_of(balance: Balance) -> float:
-    """Return the highest pressure."""
-    reach = balance.pressure_range
-    return USUAL_TOP if reach is None else max(abs(reach[0]), abs(reach[1]))
-
-
-def family_of(balance: Balance, adapted: list[tuple[int, int]], scales: Array) -> Array:
-    """Return a row per parameter, shape (k, `ROW` + m)."""
-    ends = at.ELASTIC, *balance.places.head[at.AREA : at.N_TERMS + 1]
-    table = np.zeros((len(adapted), ROW + len(balance.driven)))
-    for row, (k, kind), scale in zip(table, adapted, scales, strict=True):
-        friction, stiffness = ratios(balance, k)
-        row[FACTOR_OF], row[LOW:ROW] = k, (*FACTORS, -NEVER, NEVER, -1)
-        if kind == OFFSET:
-            row[FORCE], row[LOW : HIGH + 1] = 1.0, (-MOST_FORCE * scale, MOST_FORCE * scale)
-            continue
-        row[FIRST : BEHIND + 1] = ends[kind - 1 : kind + 1]
-        if kind == STIFFNESS:  # with the muscle's own spring
-            row[FIRST], row[AREA_LOW] = at.BLADDER, 1.0 / stiffness
-            row[ROW:] = shares_of(balance)[k]
-        elif kind == FRICTION:
-            row[AREA_HIGH] = friction
-        if kind in (STIFFNESS, FRICTION) and (k, AREA) in adapted:
-            row[BY_AREA] = adapted.index((k, AREA))
-    return table
-
-
-def shares_of(balance: Balance) -> Array:
-    """Return each muscle's share in the springs of the coordinates, shape (n, m)."""
-    squares = balance.moves**2
-    return np.asarray(squares / squares.sum(axis=0))
-
-
-def changed(balance: Balance, table: Array, changes: Array) -> Balance:
-    """Return the balance with changed forces and factors, as rows of `family_of` say."""
-    fitted = balance.coefficients(1.0)
-    c, factors = np.empty_like(fitted), np.empty(len(balance.driven))
-    retune(fitted, table, changes, c, factors)
-    names = ("springs", "elasticity", "areas", "friction", "relaxation", "bladders")
-    numbers = {name: c[balance.places.at[name]] for name in names if getattr(balance, name)}
-    return replace(balance, **fields_of(numbers))
-
-
-def fields_of(numbers: Mapping[str, Array]) -> dict[str, Any]:
-    """Return fields of a balance from their coefficients, a row a coordinate or muscle."""
-    return {
-        name: vector(table[:, 0]) if TABLE[name].width == "one" else rows(table)
-        for name, table in numbers.items()
-    }
-
-
-def ratios(balance: Balance, k: int) -> tuple[float, float]:
-    """Return the bounds on friction over area, and on area over stiffness, as factors.
-
-    At least 1: what was fitted may be. Springs of coordinates add what they have for all muscles
-    whatever their factors: f w w' is at most f diag(w w'), times how many coordinates one moves.
-    """
-    u = np.linspace(balance.hull[k][0], balance.hull[k][1], GRID) / balance.scale
-    area = np.polynomial.Polynomial(balance.areas[k])
-    elasticity = np.polynomial.Polynomial([0.0, 0.0, *balance.elasticity[k]])
-    rubbed = float(np.dot(balance.friction[k], np.array(balance.limits) + balance.walls[k]))
-    left = float(area(u).min()) - LEAST_LEFT * balance.areas[k][0]
-    moved, most = np.count_nonzero(balance.moves[k]), (balance.moves**2).sum(axis=0).max()
-    own = softest_of(balance) / (moved * most) + (balance.bladders[k] if balance.bladders else 0.0)
-    stiff = elasticity.deriv()(u) / balance.scale + own
-    lost = top_of(balance) * area.deriv()(u) / balance.scale
-    loses = lost > 0.0
-    least = float(np.min(stiff[loses] / lost[loses], initial=NEVER))
-    return max(left / rubbed, 1.0) if rubbed > 0.0 else NEVER, max(least, 1.0)
-
-
-def softest_of(balance: Balance) -> float:
-    """Return the smallest stiffness of the coordinates' springs over all scheduling inputs."""
-    n_x = balance.n_schedules
-    ends = balance.known[:n_x] or n_x * ((0.0, 0.0),)
-    springs = np.array(balance.springs).reshape(len(balance.driven), -1, 1 + len(balance.driven))
-    return max(softest(springs, np.reshape(ends, (-1, 2)), balance.degree)[0], 0.0)
-
-
-def softest(springs: Array, ends: Array, degree: int) -> tuple[float, Array, Array]:
-    """Return the smallest stiffness of springs, shape (m, powers, 1 + m), and where it is.
-
-    Over all combinations of the ``ends`` and middles of what schedules, which are returned with the
-    direction.
-    """
-    found = []
-    for x in corners(ends):
-        matrix = np.tensordot(powers_of(x, degree), springs[:, :, 1:], (0, 1))
-        stiffnesses, directions = np.linalg.eigh(0.5 * (matrix + matrix.T))
-        found.append((float(stiffnesses[0]), x, directions[:, 0]))
-    return min(found, key=lambda candidate: candidate[0])
-
-
-def corners(ends: Array) -> list[Array]:
-    """Return all combinations of ends, shape (s, 2), and of the middles between them."""
-    low, high = ends.T
-    return [low + np.array(s) * (high - low) for s in product((0.0, 0.5, 1.0), repeat=len(low))]
-
-
-def powers_of(x: Array, degree: int) -> Array:
-    """Return the powers of what schedules, shape (1 + powers, ...), that multiply springs."""
-    powers = [v**d for v in x for d in range(1, degree + 1)]
-    return np.array([np.ones(x.shape[1:]), *powers])

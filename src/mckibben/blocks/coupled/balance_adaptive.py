@@ -21,24 +21,30 @@ of area appears as stiffer springs and more friction.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+
+import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.coupled import balance_terms as at
+from mckibben.blocks.coupled.balance_bounds import places_of, ratios
 from mckibben.blocks.coupled.balance_law import (
     coordinate_at,
     coupling_force,
-    give_pressures,
     muscle_at,
     muscle_force,
     shortening,
     spring_row,
-    start_balance,
     terms_at,
     update_state,
 )
+from mckibben.blocks.coupled.balance_solving import give_pressures, start_balance
+from mckibben.blocks.coupled.balance_terms import NEVER
+from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.kernels import fill, kernel, step
 from mckibben.blocks.learning import (
     SENSES,
+    Learnable,
     covariant,
     family_at,
     learn,
@@ -223,3 +229,98 @@ def keep_balanced(c: Array, family: Array, adapted: Array, along: Array, work: A
                 covariant(adapted, work, along)
                 for j in range(p):
                     adapted[j] += lacks * c[3 + j] / c[3 + i] * along[j] / along[i]
+
+
+# -- the parameters of a balance -------------------------------------------------------------------
+
+KINDS = range(5)
+OFFSET, STIFFNESS, AREA, FRICTION, RELAXATION = KINDS
+"""Adaptive parameters of a muscle; an added force reduces its pull."""
+
+FACTORS = 0.5, 2.0
+"""Smallest and largest factor on fitted values."""
+
+MOST_FORCE = 0.3
+"""Largest constant force, relative to its scale."""
+
+
+def learnable_balance(
+    coefficients: Callable[[float | None], Array],
+    inverse_with: Callable[[Array], Inverse],
+    *,
+    known: Array,
+    scheduled: Array,
+) -> Learnable:
+    """Return the adaptive parameters of a balance: factors of 1, and forces of 0.
+
+    Factors are expected to change by 30 %, forces by 10 % of that of the highest pressure at rest.
+
+    Parameters
+    ----------
+    coefficients : callable
+        Returns the coefficients of the balance, given the sample time.
+    inverse_with : callable
+        Returns the inverse of the balance with other coefficients.
+    known, scheduled : array, shapes (m, 2), (s, 2)
+        Lowest and highest of the coordinates, and of what schedules.
+    """
+    c = coefficients(1.0)
+    m, adapted, places = int(c[at.N_COORDINATES]), adaptable_in(c), places_of(c)
+    muscles, kinds = np.array(adapted).T
+    offsets, at_rest = kinds == OFFSET, c[places["areas"]][muscles, 0] * c[at.TOP]
+    fitted, scales = np.where(offsets, 0.0, 1.0), np.where(offsets, at_rest, 1.0)
+    table = family_of(c, adapted, scales, scheduled)
+
+    def with_parameters(theta: Array) -> Inverse:
+        changed = np.empty_like(c)
+        retune(c, table, theta - fitted, changed, np.empty(m))
+        return inverse_with(changed)
+
+    def numbers(sample_time: float | None) -> Array:
+        return np.concatenate([[m], table.ravel(), coefficients(sample_time)])
+
+    return Learnable(
+        balance_adaptive_step,
+        balance_adaptive_start,
+        fitted=fitted,
+        scales=scales,
+        spread=np.diag(np.where(offsets, 0.1, 0.3) ** 2),
+        with_parameters=with_parameters,
+        numbers=numbers,
+        known=known,
+        compensates=True,
+        n_more_states=m + m * fitted.size,
+        n_more_scratch=m * fitted.size + 2 * m * m + 2 * m + c.size,
+    )
+
+
+def adaptable_in(c: Array) -> list[tuple[int, int]]:
+    """Return muscle and kind of every adaptive parameter, of a balance's coefficients."""
+    places, found = places_of(c), list[tuple[int, int]]()
+    for k in range(int(c[at.N_MUSCLES])):
+        lasting = (bool(c[places[name][k]].any()) for name in ("friction", "relaxation"))
+        there = (True, True, k > 0 or c[at.N_LOADS] > 0, *lasting)
+        found += [(k, kind) for kind in KINDS if there[kind]]
+    return found
+
+
+def family_of(c: Array, adapted: list[tuple[int, int]], scales: Array, scheduled: Array) -> Array:
+    """Return a row per parameter, shape (k, `ROW` + m)."""
+    ends = at.ELASTIC, *c[at.AREA : at.N_TERMS + 1]
+    ways = c[places_of(c)["directions"]] ** 2
+    table = np.zeros((len(adapted), ROW + int(c[at.N_COORDINATES])))
+    for row, (k, kind), scale in zip(table, adapted, scales, strict=True):
+        friction, stiffness = ratios(c, k, scheduled)
+        row[FACTOR_OF], row[LOW:ROW] = k, (*FACTORS, -NEVER, NEVER, -1)
+        if kind == OFFSET:
+            row[FORCE], row[LOW : HIGH + 1] = 1.0, (-MOST_FORCE * scale, MOST_FORCE * scale)
+            continue
+        row[FIRST : BEHIND + 1] = ends[kind - 1 : kind + 1]
+        if kind == STIFFNESS:  # with the muscle's own spring, and its share in those of coordinates
+            row[FIRST], row[AREA_LOW] = at.BLADDER, 1.0 / stiffness
+            row[ROW:] = (ways / ways.sum(axis=0))[k]
+        elif kind == FRICTION:
+            row[AREA_HIGH] = friction
+        if kind in (STIFFNESS, FRICTION) and (k, AREA) in adapted:
+            row[BY_AREA] = adapted.index((k, AREA))
+    return table

@@ -48,6 +48,8 @@ class Kind(NamedTuple):
         Whether its logarithm is found.
     prior : bool
         Whether the prior of a muscle determines it.
+    doubtful : bool
+        Whether it is none, give or take its natural scale, unless data say otherwise.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Kind(NamedTuple):
     linear: bool = True
     log: bool = False
     prior: bool = False
+    doubtful: bool = True
 
     @property
     def notation(self) -> str:
@@ -80,7 +83,7 @@ _LINE = r"l_k \left(\frac{A_k}{a_{k0}}\right)^2 \dot{y}_k"
 # fmt: off
 TABLE = {kind.name: kind for kind in (
     Kind("loads", "coordinate", "loads", "N", "C_{kl}", "share", "",
-         r"\sum_l C_{kl} F_l"),
+         r"\sum_l C_{kl} F_l", doubtful=False),
     Kind("springs", "coordinate", "springs", "N/mm", "S_{ki}", "spring", "springs"),
     Kind("obstacles", "coordinate", "met", "N/mm", "o_{ki}", "obstacle", "obstacle", _OBSTACLE, 0.0),
     Kind("elasticity", "muscle", "elastic", "N", "e_{ki} from 2", "elasticity", "elasticity",
@@ -94,9 +97,9 @@ TABLE = {kind.name: kind for kind in (
     Kind("lines", "muscle", "one", "N s/mm", "l_k", "resistance of the line", "line", _LINE, 0.0),
     Kind("mass", "muscle", "one", "N s^2/mm", "m_k", "mass", "mass", r"m_k \ddot{y}_k", 0.0),
     Kind("bladders", "muscle", "one", "N/mm", "b_k", "spring of the bladder", "", "", 0.0),
-    Kind("friction_offset", "all", "one", "bar", "p_0", "friction offset", "", "", 0.0, 4.0,
+    Kind("friction_growth", "all", "one", "", r"\lambda", "friction growth", "", "", 0.0, 1.0,
          linear=False),
-    Kind("friction_slopes", "all", "schedules", "bar", "g_i", "friction offset",
+    Kind("friction_slopes", "all", "schedules", "", "g_i", "friction growth",
          "friction_slopes", "", 0.0, 4.0, linear=False),
     Kind("asymmetry", "all", "one", "", r"\rho", "asymmetry", "asymmetry", "", -TWICE, TWICE,
          linear=False, log=True),
@@ -104,7 +107,7 @@ TABLE = {kind.name: kind for kind in (
     Kind("walls", "muscle", "one", "mm/bar", "w_k", "stretch of the wall", "walls", "", 0.0, 1.0,
          0.2, linear=False),
     Kind("pushes", "muscle", "one", "N", "P_k", "force of slackening", "slack", "", 0.0,
-         linear=False),
+         linear=False, doubtful=False),
     Kind("places", "coordinate", "obstacles", "mm", "", "place", "obstacle", "", scale=0.2,
          linear=False),
     Kind("filling", "front", "one", "s", "", "filling", "filling", "", 0.0, 2.0, linear=False),
@@ -148,23 +151,25 @@ NONLINEAR = tuple(name for name, kind in TABLE.items() if not kind.linear)
  N_OBSTACLES, N_DRIVEN, N_MOVES) = range(12)  # fmt: skip
 """Sizes, in the order of `Sizes`."""
 
-COORDINATES, COORDINATE_SIZE, MUSCLES, MUSCLE_SIZE, DECAYS, GAINS, GROWTHS, DRIVE = range(12, 20)
+COORDINATES, COORDINATE_SIZE, MUSCLES, MUSCLE_SIZE, DECAYS, GAINS, SLOPES, DRIVE = range(12, 20)
 """Where the numbers of the first coordinate and muscle are, and how many each has; where those of all
-are: decays and gains of lags, growths of friction by what schedules, the middle of the recorded
+are: decays and gains of lags, slopes of friction by what schedules, the middle of the recorded
 pressures and behind it their covariance.
 """
 
-AREA, STOP, LAG, N_TERMS = range(20, 24)
-"""Which of a muscle's force terms are the first of its area, its stops and its lags; their number."""
+AREA, STOP, LAG, N_TERMS, WORK = range(20, 25)
+"""Which of a muscle's force terms are the first of its area, its stops and its lags; their number;
+how much `solve_equilibrium` needs to compute in.
+"""
 
-STOPS, LAGGING, MOVED, TARE = range(24, 28)
+STOPS, LAGGING, MOVED, TARE = range(25, 29)
 """Where in the state the stops are, what lags, the last two moves, and the tare."""
 
-(SCALE, OFFSET, RATIO, LOWEST, HIGHEST, RATE, TARED, UNSETTLED, PRELOAD, DIRECTED, HELD,
- LIMITS) = range(28, 40)  # fmt: skip
-"""Scale of polynomials, p_0, ratio of lower to upper limits, lowest and highest pressure, samples a
-second, whether there is a tare, what is left at the start to relax (1, or 0 if settled), pressure shared
-by muscles that are more than coordinates, whether they are, whether they start held; limits of stops.
+(SCALE, GROWTH, TOP, RATIO, LOWEST, HIGHEST, RATE, TARED, UNSETTLED, PRELOAD, DIRECTED, HELD,
+ LIMITS) = range(29, 42)  # fmt: skip
+"""Scale of polynomials, lambda, P, ratio of lower to upper limits, ends of pressures, samples a second,
+whether there is a tare, what is left at the start to relax (1, or 0 if settled), pressure shared by
+muscles that are more than coordinates, whether they are, whether they start held; limits of stops.
 """
 
 SIDE, PLACE, STIFFNESS = range(3)
@@ -186,7 +191,7 @@ class Sizes(NamedTuple):
     """Numbers of what a balance has.
 
     Coefficients of elasticity and area, obstacles of a coordinate, directions in which more muscles
-    than coordinates were driven, and 2 past moves if there is mass.
+    than coordinates were driven, and 2 past moves if there is damping or mass.
     """
 
     muscles: int
@@ -240,15 +245,14 @@ class Layout(NamedTuple):
         Places of the coefficients.
     head : tuple of int
         Sizes and places, the first coefficients.
-    size, n_states, n_work : int
-        Number of coefficients and states, and of what `solve_equilibrium` computes in.
+    size, n_states : int
+        Number of coefficients and states.
     """
 
     at: dict[str, Indices]
     head: tuple[int, ...]
     size: int
     n_states: int
-    n_work: int
 
 
 @cache
@@ -268,8 +272,11 @@ def layout(sizes: Sizes) -> Layout:
     shared = [first[part] for part in ("decays", "gains", "friction_slopes", "drive")]
     terms = [first[part] - first["damping"] for part in ("areas", "friction", "relaxation")]
     n_terms = terms[-1] + sizes.lags
+    # of every coordinate the residual, the step, the start of a search, and the size of forces; the
+    # slopes of the residual; values and slopes of a muscle's terms
+    work = 4 * m + m * m + 2 * n_terms
     stops, lagging = n + m, n + m + n * sizes.stops
     moved = lagging + n * sizes.lags
     tare = moved + n * sizes.moves
-    head = *sizes, *begun, *shared, *terms, n_terms, stops, lagging, moved, tare
-    return Layout(at, head, end, n_states=tare + m + 2, n_work=4 * m + m * m + 2 * n_terms)
+    head = *sizes, *begun, *shared, *terms, n_terms, work, stops, lagging, moved, tare
+    return Layout(at, head, end, n_states=tare + m + 2)

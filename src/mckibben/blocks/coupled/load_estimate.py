@@ -27,15 +27,8 @@ from mckibben.blocks.base import Block, Board
 from mckibben.blocks.compose import Composition, PerChannel, Series
 from mckibben.blocks.coupled import balance_terms as at
 from mckibben.blocks.coupled.balance import Balance, balance_in
-from mckibben.blocks.coupled.balance_law import (
-    AT_REST,
-    FROM_REST,
-    IN_TIME,
-    start_at_rest,
-    start_held,
-    unbalanced,
-    update_state,
-)
+from mckibben.blocks.coupled.balance_law import AT_REST, FROM_REST, IN_TIME, update_state
+from mckibben.blocks.coupled.balance_solving import start_at_rest, start_held, unbalanced
 from mckibben.blocks.fields import STRICT, Channel
 from mckibben.blocks.kernels import fill, kernel, step
 from mckibben.blocks.memoryless import Affine
@@ -272,8 +265,9 @@ class ForceCompensator(Composition):
             loads=((1.0,),),
             damping=(0.1,),
             walls=(0.3,),
-            limits=(0.05, 0.2),
-            friction_offset=0.5,
+            limits=(0.5, 2.0),
+            friction_growth=0.95,
+            highest_pressure=9.5,
             lags=(2.0,),
             hull=((-5.0, 40.0),),
             scale=40.0,

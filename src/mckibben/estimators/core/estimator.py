@@ -360,6 +360,10 @@ class Estimator(ABC):
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the identified block."""
 
+    def find_again(self, data: TrainingData, tracker: Tracker) -> Block:
+        """Return the block identified once more, from data that begin after the pasts it shows."""
+        return self.find(data, tracker)
+
     def fit(
         self,
         recordings: Recording | Sequence[Recording] | ArrayLike,
@@ -441,7 +445,8 @@ class Estimator(ABC):
         for _ in range(MOST_PASTS):
             again = copy(self)
             try:
-                again.model_ = again.find(again.data(*preceded(recordings, runs)), tracker)
+                data = again.data(*preceded(recordings, runs))
+                again.model_ = again.find_again(data, tracker)
                 found = again.free_runs(again.model_, recordings, rows)
             except MckibbenError:  # the fit from rest remains
                 break

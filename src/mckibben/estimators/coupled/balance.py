@@ -1,8 +1,8 @@
 """Identification of a force balance.
 
 Forces are made to balance where the muscles were measured, by least squares within what physics asks;
-from there the free run is followed by Gauss-Newton steps. In between terms are chosen that lessen errors
-of what was left out (`mckibben.estimators.coupled.balance_search`).
+from there the free run is followed by Gauss-Newton steps (`mckibben.estimators.coupled.balance_search`).
+In between are chosen the terms that data demand (`mckibben.estimators.coupled.balance_choice`).
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ from mckibben.estimators.coupled.balance_bench import (
     without_held,
     without_load,
 )
+from mckibben.estimators.coupled.balance_choice import PHENOMENA, chosen, demanded, pruned
 from mckibben.estimators.coupled.balance_prior import (
     PriorErrors,
     PriorLike,
@@ -65,43 +66,38 @@ PRESSURES = ("bar", "V", "")
 LIMITED = ("bar", "V")
 """Units of channels with hardware limits."""
 
-FEW, MOST, MOST_SAMPLES = 6_000, 12_000, 60_000
+FEW, MOST, MOST_SAMPLES = 4_000, 12_000, 60_000
 """Number of errors used to select terms, and for the final fit; number of samples simulated there.
 """
 
-FRICTION_OFFSETS = (0.05, 0.3, 1.0, 4.0)
-"""Initial friction offsets: pressures below zero, relative to the highest, at which friction
-vanishes.
-"""
+GROWTHS = {"pressure": (0.95, 0.77, 0.5, 0.2), "constant": (0.0,)}
+"""Initial shares of friction that grow with pressure."""
+
+FILLED = 2.0
+"""Time constant of filling to begin with, in samples."""
 
 STRETCHES = (0.0, 1.0)
 """Initial stretch of the wall, relative to the largest, of models of force."""
 
-CONSTANT = 1e6
-"""Friction offset so large that friction does not depend on pressure."""
+STEPS_BETWEEN, LAST_STEPS = 12, 8
+"""Steps before and between choices, and final steps on all samples."""
 
-ROUNDS, STEPS_BETWEEN, LAST_STEPS = 6, 8, 8
-"""Number of rounds of term selection, steps before each, and final steps on all samples."""
+RUBBING = ("asymmetry", "walls")
+"""Terms that resemble friction."""
 
-LAST = ("asymmetry",)
-"""Terms that are tried last: friction by direction resembles other effects."""
-
-FIRM = 0.7
-"""Initial force of slackening, relative to the largest resistance of the muscles."""
+DIFFER = ("areas", "elasticity", "bladders", "friction", "relaxation", "damping")
+"""Terms in which muscles may differ."""
 
 FINEST, LONGEST = 0.003, 0.5
 """Shortest and longest break-away distances of stops, relative to the stroke."""
 
-PLACES = (0.6, 0.8, 0.9, 0.97)
-"""Candidate positions of obstacles, as shares of the range; for lowering, from its end."""
+PLACES = (0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95)
+"""Places where obstacles begin, as shares of the range; for lowering, from its end."""
 
-FIRST_OFFSET, TOWARDS, REFINED = 0.1, 60, 3
-"""First friction offset of the prior, relative to the highest pressure; maximum number of steps
-from there; number of reweightings of the prior.
+FIRST_GROWTH, TOWARDS, REFINED = 0.9, 60, 3
+"""First share of friction that grows with pressure, of the prior; maximum number of steps from there;
+number of reweightings of the prior.
 """
-
-OWN_HELPS = 0.1
-"""Smallest relative reduction of errors by loads of recordings."""
 
 FIXED = ("gain", "offset", "hysteresis", "dead_time")
 """Parameters of the front and of sensors that are not found."""
@@ -121,14 +117,17 @@ class BalanceEstimator(CoupledEstimator):
         ``obstacle`` either way, springs by squares of what schedules (``springs``), friction that grows
         with scheduling inputs (``friction_slopes``) or differs by direction (``asymmetry``), stretch of
         the wall (``walls``), air's lag in front (``filling``, ``venting``), a ``dead`` zone, or one that
-        fades (``contact``), ``muscles`` that differ, and that go ``slack``. Each is added if the error
-        of what is left out falls by more than its standard error. Default all.
+        fades (``contact``), ``muscles`` that differ, and that go ``slack``. Those that act smoothly are
+        free from the start, and left out where they lessen the squared errors by less than 0.05 %; an
+        obstacle, dead zone, mass, slackening and asymmetry are there only if they take away a fifth of
+        them, beyond their noise (`mckibben.estimators.coupled.balance_choice`). Default all.
     friction : {"pressure", "constant"}
         Whether the forces at which stops break away grow with pressure.
     n_stops : int
         Stops, which break away after travels from 0.3 to 50 % of the stroke at the highest pressure.
     n_lags : int
-        Time constants that may be, from which it begins with two; 0 for muscles without time.
+        Time constants that may be, each within its part of what the recordings can tell; 0 for muscles
+        without time.
     lags : sequence of float, optional
         Time constants to begin with instead [s]: in order, each twice the last or more.
     elasticity, area : int
@@ -161,13 +160,13 @@ class BalanceEstimator(CoupledEstimator):
         Constant loads that were found, on every coordinate in every recording: beyond that of the first
         or, where others have a force, beyond their average. In the unit of the model's forces.
     terms_ : tuple of str
-        What was added.
+        What there is of `terms`.
     """
 
     title = "Balance of forces"
     can = (
         "Springs, areas, friction and relaxation of one muscle or several, on separate coordinates "
-        "or a joint, under loads and torques; terms chosen by cross-validation."
+        "or a joint, under loads and torques, with what else the data demand."
     )
     cannot = "All muscles share one set of lags; areas and springs depend on shortening only."
     inverse_kind = "exact"
@@ -266,7 +265,15 @@ class BalanceEstimator(CoupledEstimator):
         ]
         return self.identify(data, tracker)
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
+    def find_again(self, data: TrainingData, tracker: Tracker) -> Block:
+        """Return the block with the same terms, from where they were."""
+        return self.identify(without_held(data)[0], tracker, again=True)
+
+    def _fit(self, *given: Any) -> None:
+        super()._fit(*given)
+        del self._last  # a fitted estimator keeps no recordings
+
+    def identify(self, data: TrainingData, tracker: Tracker, *, again: bool = False) -> Block:
         """Return the balance, solved for coordinates, after the air and dead zone."""
         if unknown := {*(self.terms or ())} - {*TERMS}:
             raise ModelError(
@@ -297,8 +304,11 @@ class BalanceEstimator(CoupledEstimator):
                 "all motion is at about one speed: relaxation and friction cannot be distinguished, and "
                 "relaxation is left out: record at other speeds too, or give lags"
             )
-        structure = self.widest(bench, timed=not still or self.lags is not None)
-        search, z = self._found(data, structure, prior_errors, tracker)
+        if again:
+            search, z = self._refined(*self._last, data, tracker)
+        else:
+            structure = self.widest(bench, timed=not still or self.lags is not None)
+            search, z = self._found(data, structure, prior_errors, tracker)
         structure = search.structure
         values = structure.expanded(z[: len(structure.terms)])
         balance = in_newtons(structure.block(values, final=True))
@@ -351,9 +361,6 @@ class BalanceEstimator(CoupledEstimator):
         """Return the structure with all candidate terms."""
         longest = LONGEST if self.prior is None else TRAVELS[-1]
         travels = np.geomspace(FINEST, longest, self.n_stops) * bench.stroke
-        limits = travels / bench.highest
-        if self.friction == "constant":
-            limits = limits / (1.0 + CONSTANT)
         shortest, longest = bench.lag_range
         lags = np.geomspace(shortest, longest, self.n_lags + 1)[1:] if bench.step and timed else ()
         if self.lags is not None:
@@ -370,7 +377,7 @@ class BalanceEstimator(CoupledEstimator):
             bench,
             n_elastic=self.elasticity - 1,
             n_area=self.area + 1,
-            limits=vector(limits),
+            limits=vector(travels),
             lags=vector(lags),
             obstacles=tuple(sides) if self.may("obstacle") else (),
             degree=self.degree if bench.curved else 1,
@@ -380,25 +387,37 @@ class BalanceEstimator(CoupledEstimator):
         """Return whether terms of a kind may be added."""
         return self.terms is None or kind in self.terms
 
-    def _first(self, structure: Structure, prior_errors: PriorErrors | None) -> Mask:
-        """Return which terms are free initially."""
+    def _always(self, structure: Structure, term: Term) -> bool:
+        """Return whether a balance has a term whatever may be added."""
+        kind, which, muscle = term
+        if muscle is not None:
+            return False
+        if kind == "springs":
+            return which == 0 or (which - 1) % structure.degree == 0
+        if kind in ("relaxation", "lags"):
+            count = len(structure.lags)
+            return count < 3 or self.lags is not None or which in (count // 3, 2 * count // 3)
+        if kind in ("elasticity", "areas"):
+            return which < 2
+        return not TABLE[kind].option
+
+    def _first(self, structure: Structure) -> Mask:
+        """Return which terms are free from the start: all that act smoothly."""
+        lacking = {"friction_slopes"} if self.friction == "constant" else set()
+        if self.friction == "constant" or not structure.limits:
+            lacking |= {"friction_growth"}
+        if not structure.bench.step:
+            lacking |= {"filling", "venting", "lines", "damping"}
 
         def there(term: Term) -> bool:
-            kind, which, _ = term
-            if prior_errors is not None and TABLE[kind].prior:
-                return True
-            if kind == "springs":
-                return which == 0 or (which - 1) % structure.degree == 0
-            if kind in ("relaxation", "lags"):
-                few = len(structure.lags) < 3 or self.lags is not None
-                return few or which in (len(structure.lags) // 3, 2 * len(structure.lags) // 3)
-            if kind in ("elasticity", "areas"):
-                return which < 2
-            if kind == "friction_offset":
-                return bool(structure.limits) and self.friction == "pressure"
-            return not TABLE[kind].option
+            kind, option = term.kind, TABLE[term.kind].option
+            if kind in lacking or kind == "places" or option in PHENOMENA:
+                return False
+            if term.muscle is not None:
+                return kind in DIFFER and self.may("muscles")
+            return self._always(structure, term) or self.may(option)
 
-        return np.array([term.muscle is None and there(term) for term in structure.terms])
+        return np.array([there(term) for term in structure.terms])
 
     def _found(
         self,
@@ -408,50 +427,72 @@ class BalanceEstimator(CoupledEstimator):
         tracker: Tracker,
     ) -> tuple[Search, Array]:
         """Return the search with the selected terms, and their values."""
-        of_force, first = structure.bench.of_force, self._first(structure, prior_errors)
+        of_force, first = structure.bench.of_force, self._first(structure)
         few = compared(coarser(data, FEW), FEW, of_force=of_force)
         search = Search(few, structure, first, prior_errors)
         z = self._balanced(search, tracker)
         if prior_errors is not None:
             starts = (search.descend(one, TOWARDS, Tracker()) for one in (z, self._likely(search)))
             z = min(starts, key=search.cost)
-        pushed = structure.n > 1 or any(held(data, run) for run in data.runs)
-        search, z = self._chosen(search, z, pushed, tracker)
-        names = (
-            TABLE[t.kind].option or t.kind if t.muscle is None else "muscles"
-            for t in compress(structure.terms, search.active & ~first)
-        )
-        self.terms_ = tuple(dict.fromkeys(names))
-        search, z = search.narrowed(z)
+        steps = min(self.steps, STEPS_BETWEEN)
+        rubbing = {kind for kind in RUBBING if self.may(kind) and structure.limits}
+        search, z = self._rubbing(search, z, rubbing, tracker.part(0.0, 0.1))
+        if not search.problem.all_at_rest:
+            search, z = self._long_held(search, z)
+        search = search.weighed(z)
+        z = search.descended(z, steps, tracker.part(0.1, 0.2))
+        search = search.weighed(z)
+        tried = {
+            kind for kind in PHENOMENA if self.may(kind)
+            and (kind != "slack" or structure.n > 1 or any(held(data, run) for run in data.runs))
+            and (kind != "mass" or structure.bench.step)
+            and (kind != "asymmetry" or structure.limits)
+        }  # fmt: skip
+        search, z = chosen(search, z, tried, tracker.part(0.2, 0.4))
         if structure.n == 1 and self.unknown_load is None:
             search, z = self._own_loads(search, z, data)
+        walls = np.array([term.kind == "walls" for term in structure.terms])
+        search = replace(search, active=search.active | (walls & first))
+        z = search.descended(z, steps, tracker.part(0.4, 0.5))
+        search, z = pruned(search, z)
+        there = compress(structure.terms, search.active)
+        more = [term for term in there if not self._always(structure, term)]
+        names = ("muscles" if term.muscle is not None else TABLE[term.kind].option for term in more)
+        self.terms_ = tuple(dict.fromkeys(names))
+        search, z = search.narrowed(z)
         z = search.descend(z, self.steps, tracker.part(0.5, 0.7))
-        whole = compared(coarser(data, MOST_SAMPLES), MOST, of_force=of_force)
+        return self._refined(search, z, data, tracker)
+
+    def _refined(
+        self, search: Search, z: Array, data: TrainingData, tracker: Tracker
+    ) -> tuple[Search, Array]:
+        """Return the search on all samples, and its values after a descent."""
+        whole = compared(
+            coarser(data, MOST_SAMPLES), MOST, of_force=search.structure.bench.of_force
+        )
         search = replace(search, problem=whole)
-        for _ in range(1 if prior_errors is None else REFINED):
+        for _ in range(1 if search.prior is None else REFINED):
             search = search.weighed(z)
             z = search.descend(z, min(self.steps, LAST_STEPS), tracker.part(0.7, 0.9))
+        self._last = search, z
         return search, z
 
-    def _chosen(
-        self, search: Search, z: Array, pushed: bool, tracker: Tracker
+    def _rubbing(
+        self, search: Search, z: Array, more: set[str], tracker: Tracker
     ) -> tuple[Search, Array]:
-        """Return the search with terms added by rounds, between descents, and their values."""
-        terms = search.structure.terms
-        tried = np.array([self._tried(search.structure, term) for term in terms])
-        last = np.array([term.kind in LAST for term in terms])
-        for number in range(ROUNDS):
-            part = tracker.part(0.08 * number, 0.08 * (number + 1))
-            z = search.descended(z, min(self.steps, STEPS_BETWEEN), part)
-            if number == 0 and not search.problem.all_at_rest:
-                search, z = self._long_held(search, z)
-            if number == 0 and self.may("slack") and pushed:
-                search, z = self._slack(search, z)
-            search = search.weighed(z)
-            active, z = search.chosen(z, tried & ~last, tried)
-            if (active == search.active).all() or number == ROUNDS - 1:
-                break
-            search = replace(search, active=active)
+        """Return the search after a descent, with those of ``more`` terms that data demand already.
+
+        Asymmetry and stretch resemble friction, and may take its place where that is not yet known.
+        """
+        kinds = np.array([term.kind for term in search.structure.terms])
+        steps, begun = min(self.steps, STEPS_BETWEEN), z
+        search = replace(search, active=search.active & ~np.isin(kinds, RUBBING))
+        z = search.descended(begun, steps, tracker)
+        for kind in RUBBING:
+            if kind in more:
+                other = replace(search, active=search.active | (kinds == kind))
+                after = other.descended(begun, steps, tracker)
+                search, z = (other, after) if demanded(search, z, other, after) else (search, z)
         return search, z
 
     def _long_held(self, search: Search, z: Array) -> tuple[Search, Array]:
@@ -467,12 +508,13 @@ class BalanceEstimator(CoupledEstimator):
         no different from a constant force, and no slope leads from there to a stretch.
         """
         structure, problem, starts = search.structure, search.problem, []
-        offsets = FRICTION_OFFSETS[: None if structure.limits else 1]
-        offsets = offsets if self.friction == "pressure" else (CONSTANT,)
+        growths = GROWTHS[self.friction if structure.limits else "constant"]
         stretches = STRETCHES if structure.bench.of_force and self.may("walls") else (0.0,)
-        for offset, stretch in product(offsets, stretches):
+        for growth, stretch in product(growths, stretches):
             z = np.zeros(problem.size(structure))
-            z[: len(structure.terms)] = structure.initial(offset * structure.bench.highest, stretch)
+            z[: len(structure.terms)] = structure.initial(growth, stretch)
+            filling = structure.free("filling")
+            z[filling] = np.where(search.active[filling], FILLED * structure.bench.step, 0.0)
             z = problem.balanced(structure, z, search.active)
             starts.append((search.cost(z), z))
             tracker.update(z, starts[-1][0])
@@ -480,10 +522,10 @@ class BalanceEstimator(CoupledEstimator):
 
     def _likely(self, search: Search) -> Array:
         """Return the most probable model of the prior."""
-        structure, prior_errors, problem = search.structure, search.prior_errors, search.problem
+        structure, prior_errors, problem = search.structure, search.prior, search.problem
         assert prior_errors is not None
         z = np.zeros(problem.size(structure))
-        z[: len(structure.terms)] = structure.initial(FIRST_OFFSET * structure.bench.highest)
+        z[: len(structure.terms)] = structure.initial(FIRST_GROWTH)
         for place, term in enumerate(structure.terms):
             if term.kind == "loads":
                 z[place] = 1.0 / prior_errors.prior.sheet.area
@@ -492,29 +534,8 @@ class BalanceEstimator(CoupledEstimator):
         alone = replace(search, problem=replace(problem, data=replace(problem.data, runs=())))
         return alone.descend(z, TOWARDS, Tracker())
 
-    def _tried(self, structure: Structure, term: Term) -> bool:
-        """Return whether a term is a candidate."""
-        if term.muscle is not None:
-            return self.may("muscles")
-        if term.kind in ("friction_offset", "friction_slopes") and self.friction == "constant":
-            return False
-        if term.kind in ("filling", "venting") and not structure.bench.step:
-            return False
-        return self.may(TABLE[term.kind].option or term.kind) and term.kind != "pushes"
-
-    def _slack(self, search: Search, z: Array) -> tuple[Search, Array]:
-        """Return the search with slackening muscles if that reduces errors; otherwise the same."""
-        structure = search.structure
-        place = [i for i, term in enumerate(structure.terms) if term.kind == "pushes"]
-        active = search.active.copy()
-        active[place] = True
-        slack, started = replace(search, active=active), z.copy()
-        started[place] = FIRM * search.problem.most_resisted(structure, z)
-        found = slack.descended(started, STEPS_BETWEEN, Tracker())
-        return (slack, found) if search.improved(z, slack, found) else (search, z)
-
     def _own_loads(self, search: Search, z: Array, data: TrainingData) -> tuple[Search, Array]:
-        """Return the search with constant loads per recording, if that helps considerably."""
+        """Return the search with constant loads per recording, if data demand them."""
         bench, every = search.structure.bench, without_load(data, every=True)
         if bench.loaded or bench.unmeasured or bench.tare or not every:
             return search, z
@@ -522,8 +543,8 @@ class BalanceEstimator(CoupledEstimator):
             search, structure=replace(search.structure, bench=replace(bench, unmeasured=every))
         )
         started = np.append(z, np.zeros(own.problem.size(own.structure) - z.size))
-        found = own.descend(started, STEPS_BETWEEN, Tracker())
-        return (own, found) if search.improved(z, own, found, by=OWN_HELPS) else (search, z)
+        found = own.descended(started, STEPS_BETWEEN, Tracker())
+        return (own, found) if demanded(search, z, own, found) else (search, z)
 
     def fixed(self, block: Block) -> tuple[int, ...]:
         return fixed_in(block)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import compress
 
 import numpy as np
 
@@ -70,15 +71,11 @@ def with_loads(recordings: Sequence[Recording], scheduling: Sequence[str]) -> li
 def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:
     """Return data without runs that have neither motion nor measured force, and their names."""
     loaded = any(channel.unit in LOADS for channel in data.scheduled)
-    informative = [(loaded and not run.unmeasured) or not held(data, run) for run in data.runs]
-    if all(informative) or not any(informative):
+    useful = [(loaded and not run.unmeasured) or not held(data, run) for run in data.runs]
+    if not any(useful):
         return data, []
-    runs = tuple(run for run, useful in zip(data.runs, informative, strict=True) if useful)
-    return replace(data, runs=runs), list(
-        dict.fromkeys(
-            run.name for run, useful in zip(data.runs, informative, strict=True) if not useful
-        )
-    )
+    names = dict.fromkeys(run.name for run in compress(data.runs, np.logical_not(useful)))
+    return replace(data, runs=tuple(compress(data.runs, useful))), list(names)
 
 
 def in_one_order(data: TrainingData) -> TrainingData:
@@ -103,9 +100,9 @@ def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
         columns = [run.scheduled[:, place] for run in data.runs]
         means = np.concatenate(
             [
-                np.add.reduceat(column, starts) / np.diff([*starts, column.size])
-                for column in columns
-                for starts in [np.arange(0, column.size, BLOCK)]
+                np.add.reduceat(v, starts := np.arange(0, v.size, BLOCK))
+                / np.diff([*starts, v.size])
+                for v in columns
             ]
         )
         whole = np.concatenate(columns)
@@ -160,14 +157,17 @@ def directions(data: TrainingData) -> Array:
     DataError
         If a pressure moves nothing, or the coordinates only move together.
     """
-    runs = [run for run in data.runs if not held(data, run)] or list(data.runs)
-    driven, scheduled, outputs = (
-        np.concatenate([getattr(run, what) for run in runs])
-        for what in ("driven", "scheduled", "outputs")
-    )
+    runs = tuple(run for run in data.runs if not held(data, run)) or data.runs
+    moving = replace(data, runs=runs)
+    driven, scheduled, outputs = map(moving.stacked, ("driven", "scheduled", "outputs"))
     span = data.highest - data.lowest
-    columns = np.column_stack([driven, scheduled, np.ones(len(driven))])
-    found = np.linalg.lstsq(columns, outputs, rcond=None)[0][: driven.shape[1]]
+    columns = np.column_stack(
+        [driven / span, scheduled / np.maximum(np.ptp(scheduled, axis=0), 1e-300)]
+    )
+    columns, outputs = columns - columns.mean(axis=0), outputs - outputs.mean(axis=0)
+    # along a direction in which pressures hardly went they share what they do
+    found = np.linalg.lstsq(columns, outputs, rcond=LEAST_DRIVEN)[0][: driven.shape[1]]
+    found /= span[:, np.newaxis]
     moved = found * span[:, np.newaxis] / data.travel
     n, m = moved.shape
     if n == m and (np.abs(moved).argmax(axis=1) == np.arange(n)).all():
@@ -215,13 +215,13 @@ def from_zero(data: TrainingData, ways: Array) -> tuple[TrainingData, list[Block
         away = column.min() > far or column.max() < 0.0
         offsets.append(float(gain) * float(column.min()) if away else 0.0)
     runs = tuple(replace(run, outputs=(run.outputs - offsets) / gains) for run in data.runs)
-    sensors: list[Block] = [
+    sensors = tuple(
         Affine(float(gain), offset, channel, channel)
         for gain, offset, channel in zip(gains, offsets, data.outputs, strict=True)
-    ]
-    if (gains == 1.0).all() and not any(offsets):
-        sensors = []
-    behind: list[Block] = sensors if len(sensors) < 2 else [PerChannel(tuple(sensors))]
+    )
+    behind: list[Block] = []
+    if any(offsets) or not (gains == 1.0).all():
+        behind.append(sensors[0] if len(sensors) == 1 else PerChannel(sensors))
     return replace(data, runs=runs), behind, np.eye(*ways.shape) if own else ways
 
 

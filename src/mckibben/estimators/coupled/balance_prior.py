@@ -24,9 +24,6 @@ from mckibben.numerics.descent import differences
 STEP = 1e-5
 """Step of finite differences, relative to the scale of the parameter."""
 
-LEAST_NOISE = 0.01
-"""Smallest standard deviation of the model error, relative to the range, for independent samples."""
-
 ORIGIN_STEPS = 6
 """Number of Gauss-Newton steps for the origin of displacements."""
 
@@ -39,18 +36,9 @@ PriorLike = str | Path | Sheet | InstanceOf[Prior] | None
 
 @dataclass(frozen=True)
 class PriorErrors:
-    """A prior as additional residuals.
-
-    Parameters
-    ----------
-    prior : Prior
-    noise : float
-        Standard deviation of the recordings' errors, relative to the range, as if they were
-        independent: a deviation of one standard deviation from the prior costs as much.
-    """
+    """A prior as additional residuals, in standard deviations."""
 
     prior: Prior
-    noise: float = LEAST_NOISE
 
     @cached_property
     def weights(self) -> Array:
@@ -65,13 +53,13 @@ class PriorErrors:
         The origin of displacements is solved for (variable projection). Traits are values at a few
         places, so coefficients of the area above the first are penalised to keep it smooth in between.
         """
-        sheet, weights, origin_std = self.prior.sheet, self.noise * self.weights, self.prior.zero
+        sheet, weights, origin_std = self.prior.sheet, self.weights, self.prior.zero
         terms, scales = z[: len(structure.terms)], structure.scales()
 
         def residuals(terms: Array, origin: float) -> Array:
             block = structure.block(structure.expanded(terms))
             deviations = np.nan_to_num(traits(block, sheet, origin) - self.prior.mean)
-            return np.append(weights @ deviations, self.noise * origin / origin_std)
+            return np.append(weights @ deviations, origin / origin_std)
 
         origin, by_origin = 0.0, np.zeros(1)
         for _ in range(ORIGIN_STEPS):
@@ -82,7 +70,7 @@ class PriorErrors:
 
         here = residuals(terms, origin)
         of_area = np.array([kind == "areas" and which > 0 for kind, which, _ in structure.terms])
-        smoothing = np.where(of_area, self.noise / scales, 0.0)
+        smoothing = np.where(of_area, 1.0 / scales, 0.0)
         errors = np.append(here, smoothing * terms)
         if wanted is None:
             return errors, np.zeros((0, terms.size))

@@ -6,17 +6,16 @@ under an unmeasured load, a constant force on every coordinate.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from numpy.polynomial import polynomial
-from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block, run_many
-from mckibben.blocks.coupled.balance import powers_of
+from mckibben.blocks.coupled.balance_bounds import springs_at
 from mckibben.blocks.coupled.balance_law import coordinate_at
 from mckibben.blocks.coupled.balance_terms import Indices
 from mckibben.blocks.dynamics.air import Air
@@ -29,11 +28,8 @@ from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.numerics.descent import differences
 from mckibben.numerics.least_squares import solve_constrained, solve_products
 
-OF_AIR = ("filling", "venting", "dead", "contact")
-"""Nonlinear parameters of the air, the last; derivatives by all others are exact."""
-
-STEP, FIRST_STEP = 1e-4, 0.5
-"""Relative step for finite differences of parameters of the air, and of new ones."""
+STEP = 1e-4
+"""Relative step for finite differences of parameters of the air."""
 
 RESTING = 0.1
 """Share of the pressure range up to which a run starts at rest."""
@@ -111,17 +107,15 @@ class Problem:
 
     def still(self, run: Run) -> bool:
         """Return whether a run's forces are compared, not its displacements."""
-        return self.of_force or not self._moves(run)
-
-    def _moves(self, run: Run) -> bool:
-        still = self.data.latest(("held", run.place), np.empty(0), lambda: held(self.data, run))
-        return not still
+        return self.of_force or self.data.latest(
+            ("held", run.place), np.empty(0), lambda: held(self.data, run)
+        )
 
     def counting(self, run: Run) -> Mask:
         """Return which of the compared samples are scored."""
         return run.counts[self.places(run)]
 
-    def places(self, run: Run) -> NDArray[np.intp]:
+    def places(self, run: Run) -> Indices:
         """Return the indices of the compared samples."""
         n = len(run.outputs)
         return np.minimum(np.arange(self.every - 1, n + self.every - 1, self.every), n - 1)
@@ -137,13 +131,9 @@ class Problem:
                 self._fronts.clear()
             driven = run.driven
             for block in front(structure, values, Channel("pressure", "bar")):
-                columns = [
-                    run_many(
-                        [block], np.ascontiguousarray(p[:, np.newaxis]), sample_time=run.sample_time
-                    )
-                    for p in driven.T
-                ]
-                driven = np.column_stack([column[0, :, 0] for column in columns])
+                columns = np.ascontiguousarray(driven.T)[..., np.newaxis]
+                acting = [run_many([block], p, sample_time=run.sample_time) for p in columns]
+                driven = np.column_stack([one[0] for one in acting])
             self._fronts[key] = driven
         return self._fronts[key]
 
@@ -167,92 +157,75 @@ class Problem:
         self,
         structure: Structure,
         z: Array,
-        run: Run,
         *,
-        held: bool,
+        held: Callable[[Run], bool],
         sloped: bool = True,
-        by_air: Array | None = None,
-    ) -> tuple[Array, Array]:
-        """Return coordinates of a run, or residual forces, and their derivatives.
+        air: Sequence[int] = (),
+    ) -> Iterator[tuple[Run, Array, Array]]:
+        """Yield every run, its coordinates, or residual forces where it is ``held``, and derivatives.
 
-        Slopes are by linear coefficients and shape as `balance_slopes` has it. ``by_air`` are those of
-        acting pressures, shape (t, muscles, f).
+        Slopes are by linear coefficients and shape as `balance_slopes` has it, the last by the terms of
+        the ``air``.
         """
-        values = structure.expanded(z[: len(structure.terms)])
-        driven = self.acting(run, structure, values)
-        c = structure.coefficients(values, run.sample_time)
-        for j, load in enumerate(z[self.loads_at(structure, run)].tolist()):
-            c[coordinate_at(c, j)] += load
-        return follow(
-            c, driven, run.outputs, run.scheduled, by_air,
-            held=held, every=self.every, sloped=sloped,
-        )  # fmt: skip
-
-    def errors_of(
-        self, structure: Structure, z: Array, run: Run, *, sloped: bool, by_air: Array | None = None
-    ) -> tuple[Array, Array]:
-        """Return the errors over a run relative to ranges, (k, m), and their derivatives.
-
-        Of a run in which nothing moves, they are the forces that are lacking, over that of the highest
-        pressure at rest.
-        """
-        still = self.still(run)
-        found, slopes = self.followed(structure, z, run, held=still, sloped=sloped, by_air=by_air)
-        counts, bench = self.counting(run)[:, np.newaxis], structure.bench
-        scale = counts / (bench.highest * bench.unit if still else bench.travel)
-        errors = (found if still else found - run.outputs[self.places(run)]) * scale
-        return errors, slopes * scale[..., np.newaxis]
+        values = structure.expanded(z)
+        coefficients = cache(structure.block(values).coefficients)
+        for run in self.runs:
+            c = coefficients(run.sample_time).copy()
+            for j, load in enumerate(z[self.loads_at(structure, run)].tolist()):
+                c[coordinate_at(c, j)] += load
+            driven = self.acting(run, structure, values)
+            by_air = self._by_air(structure, z, run, air) if air else None
+            found, slopes = follow(
+                c, driven, run.outputs, run.scheduled, by_air,
+                held=held(run), every=self.every, sloped=sloped,
+            )  # fmt: skip
+            yield run, found, slopes
 
     def errors(
-        self, structure: Structure, z: Array, wanted: Mask | None = None, new: Mask | None = None
+        self, structure: Structure, z: Array, wanted: Mask | None = None
     ) -> tuple[list[Array], Array]:
         """Return the errors of every run, and derivatives by all unknowns, shape (errors, unknowns).
 
-        Derivatives are computed only if some are ``wanted``. Those by parameters of the front are
-        finite differences of the acting pressures, with a large step for ``new`` ones.
+        Errors are relative to ranges; of a run in which nothing moves, they are the forces that are
+        lacking, over that of the highest pressure at rest. Derivatives are computed only if some are
+        ``wanted``. Those by parameters of the front are finite differences of the acting pressures.
         """
-        errors, slopes = list[Array](), [np.zeros((0, z.size))]
-        if wanted is None:
-            for run in self.runs:
-                errors.append(self.errors_of(structure, z, run, sloped=False)[0].ravel())
-            return errors, slopes[0]
-        n, last = structure.mix.shape[1], structure.free("filling").start
-        air = [kind for kind in OF_AIR if wanted[structure.free(kind)].any()]
-        for run in self.runs:
-            by_air = self._by_air(structure, z, run, air, new)
-            before, by = self.errors_of(structure, z, run, sloped=True, by_air=by_air)
-            by = by.reshape(before.size, -1)
-            whole = np.zeros((before.size, z.size))
-            whole[:, :n] = by[:, : structure.n_linear] @ structure.mix
-            whole[:, n:last] = by[:, structure.n_linear : structure.n_linear + last - n]
-            for number, kind in enumerate(air):
-                whole[:, structure.free(kind).start] = by[:, number - len(air)]
-            loads = self.loads_at(structure, run)
-            whole[:, loads] = by[:, structure.springs[: loads.stop - loads.start, 0, 0]]
-            errors.append(before.ravel())
-            slopes.append(whole)
+        errors, slopes, bench = list[Array](), [np.zeros((0, z.size))], structure.bench
+        sloped = wanted is not None
+        first, last = structure.free("filling").start, len(structure.terms)
+        air = [place for place in range(first, last) if wanted is not None and wanted[place]]
+        shape = [*range(structure.mix.shape[1], first), *air]
+        for run, found, by in self.followed(structure, z, held=self.still, sloped=sloped, air=air):
+            still, counts = self.still(run), self.counting(run)[:, np.newaxis]
+            scale = counts / (bench.highest * bench.unit if still else bench.travel)
+            target = 0.0 if still else run.outputs[self.places(run)]
+            errors.append(((found - target) * scale).ravel())
+            if sloped:
+                by = by * scale[..., np.newaxis]
+                slopes.append(self._by_unknowns(structure, run, by))
+                slopes[-1][:, shape] = by.reshape(-1, by.shape[2])[:, structure.n_linear :]
         return errors, np.concatenate(slopes)
 
-    def _by_air(
-        self, structure: Structure, z: Array, run: Run, kinds: list[str], new: Mask | None
-    ) -> Array:
-        """Return derivatives of acting pressures by front parameters, shape (t, muscles, kinds)."""
-        n, steps = len(structure.terms), np.zeros(z.size)
-        places = [structure.free(kind).start for kind in kinds]
-        for place in places:
-            far = FIRST_STEP if new is not None and new[place] else STEP
-            steps[place] = self._step(structure, z, place, far)
-        return differences(
-            lambda moved: self.acting(run, structure, structure.expanded(moved[:n])),
-            z, steps, places,
-        )  # fmt: skip
+    def _by_unknowns(self, structure: Structure, run: Run, slopes: Array) -> Array:
+        """Return derivatives by all unknowns, shape (k m, unknowns), from those by coefficients.
 
-    def _step(self, structure: Structure, z: Array, place: int, share: float) -> float:
-        """Return the finite-difference step of a parameter, away from its bounds."""
-        n = structure.mix.shape[1]
-        _, high, much = (end[place - n] for end in structure.nonlinear_bounds())
-        step = share * float(much)
-        return step if z[place] + step <= high else -step
+        Those by nonlinear parameters are 0.
+        """
+        loads, flat = self.loads_at(structure, run), slopes.reshape(-1, slopes.shape[-1])
+        found = np.zeros((len(flat), self.size(structure)))
+        found[:, : structure.mix.shape[1]] = flat[:, : structure.n_linear] @ structure.mix
+        found[:, loads] = flat[:, structure.springs[: loads.stop - loads.start, 0, 0]]
+        return found
+
+    def _by_air(self, structure: Structure, z: Array, run: Run, places: Sequence[int]) -> Array:
+        """Return derivatives of acting pressures by front parameters, shape (t, muscles, places)."""
+        n, last = structure.mix.shape[1], len(structure.terms)
+        _, high, scales = structure.nonlinear_bounds()
+        steps = np.zeros(z.size)
+        steps[n:last] = np.where(z[n:last] + STEP * scales <= high, STEP, -STEP) * scales
+        return differences(
+            lambda moved: self.acting(run, structure, structure.expanded(moved)), z, steps, places
+        )
 
     @property
     def all_at_rest(self) -> bool:
@@ -261,14 +234,13 @@ class Problem:
 
     def most_resisted(self, structure: Structure, z: Array) -> float:
         """Return the largest resistance of any muscle at measured positions."""
-        values, most = structure.expanded(z[: len(structure.terms)]), 0.0
-        balance = structure.block(values)
-        springs = np.array(balance.springs).reshape(structure.m, -1, 1 + structure.m)
+        values, most = structure.expanded(z), 0.0
+        springs, shares = values[structure.springs], values[structure.at["loads"]]
         for run in self.runs:
             x, loads = np.split(run.scheduled, [len(structure.bench.scheduled)], axis=1)
             around = np.column_stack([np.ones(len(x)), run.outputs])
-            pulled = np.einsum("qt,jqi,ti->tj", powers_of(x.T, structure.degree), springs, around)
-            most = max(most, -float((pulled + loads @ np.array(balance.loads).T).min()))
+            pulled = np.einsum("tji,ti->tj", springs_at(springs, x.T, structure.degree), around)
+            most = max(most, -float((pulled + loads @ shares.T).min()))
         return most
 
     # -- the linear stage ------------------------------------------------------------------------
@@ -287,8 +259,7 @@ class Problem:
         start = z.copy()
         start[:n] = 0.0
         whole, target = self._forces(structure, start, chosen)
-        bounded = np.zeros(whole.shape[2], dtype=bool)
-        bounded[: chosen.size] = structure.bounded[chosen]
+        bounded = np.append(structure.bounded[chosen], np.zeros(z.size - n_terms, dtype=bool))
         means = np.einsum("tjc,tj->c", whole[..., narrowing], target) / float((target**2).sum())
         whole[..., narrowing] -= means * target[..., np.newaxis]
         table = np.concatenate([whole, target[..., np.newaxis]], axis=2)
@@ -320,39 +291,30 @@ class Problem:
             return on, bounds - sides @ structure.base
 
         solve = partial(solve_constrained, triangle[:, :-1], triangle[:, -1], ridge=RIDGE)
-        physics = asked(*structure.constraints(structure.expanded(start[:n_terms])))
+        physics = asked(*structure.constraints(structure.expanded(start)))
         solve_stiff(structure, solve, physics, asked, put)
         return start
 
     def _forces(self, structure: Structure, start: Array, chosen: Indices) -> tuple[Array, Array]:
         """Return derivatives of forces by linear terms and recordings' loads, and their target."""
         rows, targets = [], []
-        n_terms = len(structure.terms)
-        for run in self.runs:
-            lacking, slopes = self.followed(structure, start, run, held=True)
-            slopes = slopes[..., : structure.n_linear]
-            loads = self.loads_at(structure, run)
-            own = np.zeros((*lacking.shape, self.size(structure) - n_terms))
-            for j in range(loads.stop - loads.start):
-                own[:, j, loads.start - n_terms + j] = 1.0
+        linear = np.append(chosen, np.arange(len(structure.terms), self.size(structure)))
+        for run, lacking, slopes in self.followed(structure, start, held=lambda _: True):
             counts = self.counting(run)[:, np.newaxis]
             targets.append(-lacking * counts)
-            found = np.concatenate([slopes @ structure.mix[:, chosen], own], axis=2)
-            rows.append(found * counts[..., np.newaxis])
+            found = self._by_unknowns(structure, run, slopes * counts[..., np.newaxis])[:, linear]
+            rows.append(found.reshape(*lacking.shape, -1))
         return np.concatenate(rows), np.concatenate(targets)
 
     def stiffness(self, structure: Structure, z: Array) -> Array:
         """Return the stiffness of every coordinate with stops mostly sliding, shape (k, m)."""
-        values, found = structure.expanded(z[: len(structure.terms)]), []
+        values, found = structure.expanded(z), []
         for run in self.runs:
             places = self.places(run)
-            q, x = run.outputs[places], run.scheduled[places]
-            p = self.acting(run, structure, values)[places]
-            powers = powers_of(x[:, : len(structure.bench.scheduled)].T, structure.degree)
-            own = np.empty_like(q)
-            for j in range(structure.m):
-                own[:, j] = values[structure.springs[j, :, 1 + j]] @ powers
-            scale = structure.bench.scale
+            q, p = run.outputs[places], self.acting(run, structure, values)[places]
+            x = run.scheduled[places, : len(structure.bench.scheduled)].T
+            springs = springs_at(values[structure.springs], x, structure.degree)
+            own, scale = springs[..., 1:].diagonal(axis1=1, axis2=2).copy(), structure.bench.scale
             for k, way in enumerate(structure.bench.directions):
                 u = q @ way / scale
                 elastic = polynomial.polyder([0.0, 0.0, *values[structure.at["elasticity"][k]]])
@@ -417,11 +379,10 @@ def coarser(data: TrainingData, most: int) -> TrainingData:
 
 
 def _straight(data: TrainingData, every: int) -> bool:
-    missed = []
-    whole = np.hstack([data.stacked("driven"), data.stacked("scheduled")])
-    spans = np.maximum(np.ptp(whole, axis=0), 1e-300)
-    for run in data.runs:
-        t = np.arange(len(run.driven))
-        inputs = np.hstack([run.driven, run.scheduled]) / spans
-        missed += [np.interp(t, t[::every], u[::every]) - u for u in inputs.T]
+    """Return whether inputs go straight between every n-th sample."""
+    tables, missed = [np.hstack([run.driven, run.scheduled]) for run in data.runs], list[Array]()
+    spans = np.maximum(np.ptp(np.concatenate(tables), axis=0), 1e-300)
+    for table in tables:
+        t = np.arange(len(table))
+        missed += [np.interp(t, t[::every], u[::every]) - u for u in (table / spans).T]
     return float(np.std(np.concatenate(missed))) <= STRAIGHT

@@ -1,56 +1,37 @@
-"""Search of a force balance: term selection and descent on free-running errors.
+"""Descent of a force balance: Gauss-Newton steps on free-running errors, within what physics asks.
 
-Terms are found by a forward search on the free run made straight: its slopes by everything that may be
-free, what is not yet included, give by least squares the errors that any choice of terms would leave. A
-choice is judged by blocks of time that are left out: terms are added while the error there falls by more
-than its standard error over blocks. Then Gauss-Newton steps bring the terms chosen to where errors are
-least, within what physics asks.
+Besides the errors of the runs there are those of what is likely: every term is none, give or take its
+natural scale, weighed by the noise of independent errors. So what data do not determine stays small, and
+nothing depends on the last bit of the data.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import compress, pairwise
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
-from mckibben.blocks.coupled.balance_terms import NONLINEAR, TABLE, Indices
-from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, PriorErrors
+from mckibben.blocks.coupled.balance_terms import Indices
+from mckibben.estimators.coupled.balance_prior import PriorErrors
 from mckibben.estimators.coupled.balance_problem import Problem, solve_stiff
-from mckibben.estimators.coupled.balance_structure import Structure, Term
-from mckibben.numerics.blocks import blocks_of, squared_errors, sums_of_others
-from mckibben.numerics.descent import LIGHTEST, levenberg_marquardt
-from mckibben.numerics.least_squares import solve_constrained, solve_products
+from mckibben.estimators.coupled.balance_structure import Structure
+from mckibben.numerics.descent import FIRST_DAMPING, LIGHTEST, levenberg_marquardt
+from mckibben.numerics.least_squares import solve_constrained
 from mckibben.numerics.statistics import autoregression, rms
 from mckibben.numerics.tracker import Tracker
-
-BLOCKS, FOLDS = 20, 5
-"""Approximate number of blocks of all runs, and of cross-validation folds."""
-
-DAMPED = 1e-2
-"""Damping of the least squares whose errors are compared, relative to own effects."""
-
-AHEAD = 4
-"""Number of term groups that may be added before they, together, must reduce errors."""
 
 UNKNOWN = 1e-10
 """Effect of a parameter, relative to the largest, that counts as none."""
 
-FAR, LEAST_SEPARATION = 0.5, 0.7
-"""Largest relative change per step; smallest difference of the logarithms of lags."""
+FAR = 0.5
+"""Largest change of a nonlinear parameter per step, relative to its scale."""
 
-NO_GAIN = 1e-6
-"""Gain of a term, relative to the squared errors, that is rounding."""
-
-DEVIATIONS = (("areas",), ("elasticity", "bladders"), ("friction",), ("relaxation", "damping"))
-"""Kinds in which muscles may differ together."""
-
-NEW_SHAPE = tuple(name for name in NONLINEAR if TABLE[name].option == name)
-"""Nonlinear parameters that are added alone."""
+FIRST_NOISE, LEAST_NOISE = 0.01, 1e-5
+"""Standard deviation of independent errors at first, and the smallest, relative to ranges."""
 
 
 @dataclass
@@ -63,35 +44,51 @@ class Search:
     structure : Structure
     active : array of bool
         Which terms are free; others are what they begin with.
-    prior_errors : PriorErrors, optional
+    prior : PriorErrors, optional
+        Of a data sheet.
+    noise : float
+        Standard deviation of the runs' errors, as if they were independent: what is one natural scale
+        from likely costs as much.
     """
 
     problem: Problem
     structure: Structure
     active: Mask
-    prior_errors: PriorErrors | None = None
+    prior: PriorErrors | None = None
+    noise: float = FIRST_NOISE
 
     def errors(self, z: Array, wanted: Mask | None = None) -> tuple[Array, Array]:
-        """Return all residuals, and the requested derivatives; those of the prior last."""
+        """Return all residuals, and the requested derivatives; last those of what is likely."""
         parts, slopes = self.problem.errors(self.structure, z, wanted)
-        errors = np.concatenate(parts) if parts else np.zeros(0)
-        if self.prior_errors is None:
-            return errors, slopes
-        far, by = self.prior_errors.errors(self.structure, z, wanted)
-        whole = np.zeros((len(by), slopes.shape[1]))
-        whole[:, : by.shape[1]] = by
-        return np.append(errors, far), np.concatenate([slopes, whole])
+        n = len(self.structure.terms)
+        doubts = self.noise * self.structure.doubts(known=self.prior is not None)
+        doubts = np.append(doubts, np.zeros(z.size - n))  # loads of recordings are any
+        far, by = [doubts * (z - self.none(z))], [np.diag(doubts)]
+        if self.prior is not None:
+            of_sheet = self.prior.errors(self.structure, z, wanted)
+            far.append(self.noise * of_sheet[0])
+            by.append(self.noise * np.pad(of_sheet[1], ((0, 0), (0, z.size - n))))
+        errors = np.concatenate([*parts, *far])
+        if wanted is None:
+            return errors, np.zeros((0, z.size))
+        return errors, np.concatenate([slopes, *by])
+
+    def none(self, z: Array) -> Array:
+        """Return the unknowns of a balance in which no term has an effect."""
+        return np.append(self.structure.none, np.zeros(z.size - self.active.size))
+
+    def without(self, z: Array) -> Array:
+        """Return the unknowns with all terms that are not free at none."""
+        free = np.append(self.active, np.ones(z.size - self.active.size, dtype=bool))
+        return np.where(free, z, self.none(z))
 
     def weighed(self, z: Array) -> Search:
-        """Return the search with the prior weighted by the noise of independent errors."""
-        if self.prior_errors is None:
-            return self
+        """Return the search with the noise of independent errors that the runs show."""
         parts = self.problem.errors(self.structure, z)[0]
-        model, count = autoregression(parts), sum(part.size for part in parts)
+        count = sum(part.size for part in parts)
+        model = autoregression(parts)
         noise = np.sqrt(model.variance * count / model.effective_sample_size(count))
-        return replace(
-            self, prior_errors=replace(self.prior_errors, noise=max(float(noise), LEAST_NOISE))
-        )
+        return replace(self, noise=max(float(noise), LEAST_NOISE))
 
     def cost(self, z: Array) -> float:
         """Return the root mean square error."""
@@ -127,9 +124,29 @@ class Search:
             found, slopes = self.errors(z, self.active if sloped else None)
             return found, slopes[:, self.free]
 
-        return levenberg_marquardt(errors, self._solved, z, steps, tracker.update)
+        return levenberg_marquardt(errors, self.solved, z, steps, tracker.update)
 
-    def _solved(self, triangle: Array, z: Array, damping: float) -> Array:
+    def triangle(self, z: Array) -> Array:
+        """Return the triangle of the derivatives by what is free, and of the errors."""
+        found, slopes = self.errors(z, self.active)
+        both = np.column_stack([slopes[:, self.free], found])
+        both[~np.isfinite(both).all(axis=1)] = 0.0
+        triangle: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
+        return triangle
+
+    def ahead(self, z: Array, options: list[Mask]) -> list[float]:
+        """Return the cost that a linear model expects of every choice of terms."""
+        every = replace(self, active=np.any(options, axis=0))
+        triangle, count, expected = every.triangle(z), self.errors(z)[0].size, []
+        for active in options:
+            one = replace(self, active=active)
+            places = np.searchsorted(every.free, one.free)
+            moved = one.solved(triangle[:, np.append(places, -1)], z, FIRST_DAMPING)
+            left = triangle[:, -1] + triangle[:, places] @ (moved - z)[one.free]
+            expected.append(float(np.sqrt(left @ left / count)))
+        return expected
+
+    def solved(self, triangle: Array, z: Array, damping: float) -> Array:
         """Return the least-squares solution of the linearised problem within physical bounds.
 
         ``triangle`` is that of slopes and errors. Damped towards what they are, by every number's own
@@ -173,182 +190,11 @@ class Search:
         low, high, much = structure.nonlinear_bounds()
         shape, far = z[n:n_terms], FAR * much
         bounds = np.append(np.maximum(low, shape - far), -np.minimum(high, shape + far))
-        lags = [i for i in np.flatnonzero(self.active) if structure.terms[i].kind == "lags"]
-        one = np.eye(z.size)
-        separations = np.array([one[j] - one[i] for i, j in pairwise(lags)])
-        every = [on_all, one[n:n_terms], -one[n:n_terms], separations.reshape(-1, z.size)]
-        asked = [least, bounds, np.full(len(separations), LEAST_SEPARATION)]
-        return np.concatenate(every), np.concatenate(asked)
+        one = np.eye(z.size)[n:n_terms]
+        return np.concatenate([on_all, one, -one]), np.concatenate([least, bounds])
 
     def _of_all(self, sides: Array, least: Array, size: int) -> tuple[Array, Array]:
         """Return constraints of linear coefficients as those of all unknowns."""
         on_all = np.zeros((len(sides), size))
         on_all[:, : self.structure.mix.shape[1]] = sides @ self.structure.mix
         return on_all, least - sides @ self.structure.base
-
-    # -- choice ----------------------------------------------------------------------------------
-
-    def chosen(self, z: Array, *groups: Mask) -> tuple[Mask, Array]:
-        """Return the selected terms after a forward search, and their unknowns.
-
-        Over the first of ``groups`` of terms from which any are added. New shape begins where least
-        squares have it.
-        """
-        structure, n = self.structure, len(self.structure.terms)
-        new = np.array([term.kind in NEW_SHAPE for term in structure.terms]) & ~self.active
-        wanted = (np.any(groups, axis=0) & new) | self.active
-        (grams, folds), likely = self._grams(z, wanted, new), self._likely(z, wanted)
-        others = sums_of_others(grams, folds) + likely
-        bounded = np.append(structure.bounded, np.zeros(z.size - n, dtype=bool))
-        known: dict[bytes, Array] = {}
-
-        def missed(active: Mask) -> Array:
-            """Return the squared errors of every block under the least squares of other folds."""
-            if (key := active.tobytes()) not in known:
-                free = np.append(active, np.ones(z.size - n, dtype=bool))
-                theta = np.tile(z, (len(others), 1))
-                theta[:, np.flatnonzero(free)] = _solved(others, free, bounded, z)
-                known[key] = squared_errors(grams, theta[folds, :, np.newaxis])[:, 0]
-            return known[key]
-
-        active = self.active
-        for tried in groups:
-            best, ahead, passed = missed(active), active, 0
-            while passed < AHEAD:
-                options = [
-                    ahead | more for more in self._candidates(ahead, z) if not (more & ~tried).any()
-                ]
-                if not options:
-                    break
-                errors = [missed(option) for option in options]
-                first = int(np.argmin([one.sum() for one in errors]))
-                ahead, gain = options[first], best - errors[first]
-                passed += 1
-                if gain.sum() > max(np.sqrt(gain.size) * gain.std(), NO_GAIN * best.sum()):
-                    active, best, passed = ahead, errors[first], 0
-            if (active != self.active).any():
-                break
-        free = np.append(active, np.ones(z.size - n, dtype=bool))
-        solution, found = z.copy(), z.copy()
-        solution[free] = _solved((grams.sum(axis=0) + likely)[np.newaxis], free, bounded, z)[0]
-        low, high, much = structure.nonlinear_bounds()
-        shape = slice(structure.mix.shape[1], n)
-        near = np.clip(
-            solution[shape], np.maximum(low, z[shape] - much), np.minimum(high, z[shape] + much)
-        )
-        found[shape] = np.where((active & new)[shape], near, z[shape])
-        return active, found
-
-    def improved(self, z: Array, other: Search, found: Array, by: float = 0.0) -> bool:
-        """Return whether another search has significantly smaller errors over blocks."""
-        before, after = self._by_block(z), other._by_block(found)
-        gain = before - after
-        least = max(np.sqrt(gain.size) * gain.std(), (1.0 - (1.0 - by) ** 2) * before.sum())
-        return bool(gain.sum() > least)
-
-    def _by_block(self, z: Array) -> Array:
-        """Return the squared errors per block of time."""
-        parts = self.problem.errors(self.structure, z)[0]
-        return np.array(
-            [float(block @ block) for part in blocks_of(parts, BLOCKS) for block in part]
-        )
-
-    def _grams(self, z: Array, wanted: Mask, new: Mask | None = None) -> tuple[Array, Indices]:
-        """Return the products of derivatives and target, per block of time, and the folds of blocks.
-
-        Each fold has a part of every run, so that it is not all that was measured under one condition;
-        runs of few blocks begin with different folds.
-        """
-        parts, slopes = self.problem.errors(self.structure, z, wanted, new)
-        table = np.column_stack([slopes, slopes @ z - np.concatenate(parts)])
-        table[~np.isfinite(table).all(axis=1)] = 0.0
-        size = np.sqrt((table[:, :-1] ** 2).sum(axis=0))
-        table[:, :-1] *= self._known(np.arange(z.size), size)
-        ends = np.cumsum([part.size for part in parts])[:-1]
-        runs = blocks_of(np.split(table, ends), BLOCKS)
-        folds = [
-            (np.arange(len(run)) * FOLDS // len(run) + place) % FOLDS
-            for place, run in enumerate(runs)
-        ]
-        grams = np.array([block.T @ block for run in runs for block in run])
-        return grams, np.concatenate(folds)
-
-    def _likely(self, z: Array, wanted: Mask) -> Array:
-        """Return the products of the prior's derivatives and target."""
-        table = np.zeros((1, z.size + 1))
-        if self.prior_errors is not None:
-            far, by = self.prior_errors.errors(self.structure, z, wanted)
-            table = np.zeros((far.size, z.size + 1))
-            table[:, : by.shape[1]] = by
-            table[:, -1] = by @ z[: by.shape[1]] - far
-        return np.asarray(table.T @ table)
-
-    def _candidates(self, active: Mask, z: Array) -> Iterator[Mask]:
-        """Yield candidate groups of terms beyond the active ones."""
-        terms, structure = self.structure.terms, self.structure
-        free = [term for term, there in zip(terms, active, strict=True) if there]
-        on = {term[:2] for term in free}
-        own = {term.kind for term in free if term.muscle}
-
-        def group(*wanted: Term) -> Mask:
-            return np.array([term in wanted for term in terms])
-
-        for kind in ("elasticity", "areas"):
-            following = max((which for name, which in on if name == kind), default=0) + 1
-            for more in (1, 2):
-                yield group(*self._with_own(kind, range(following, following + more), own))
-        for kind, which, muscle in terms:
-            if muscle is not None or (kind, which) in on:
-                continue
-            if kind in ("lines", "mass"):
-                yield group(*self._with_own(kind, (which,), own))
-            elif kind == "relaxation" and self._is_distinct(which, active, z):
-                yield group(Term("lags", which), *self._with_own(kind, (which,), own))
-        count = len(structure.obstacles)
-        met = {structure.obstacles[which][0] for kind, which in on if kind == "obstacles"}
-        for which, (side, _) in enumerate(structure.obstacles):
-            if side not in met:
-                places = (Term("places", which + j * count) for j in range(structure.m))
-                yield group(Term("obstacles", which), *places)
-        for kind in ("springs", "friction_slopes"):
-            for which in dict.fromkeys(term.which for term in terms if term.kind == kind):
-                if (kind, which) not in on:
-                    yield group(Term(kind, which))
-        ruled_out = {"friction_slopes", *(() if ("filling", 0) in on else ("venting",))}
-        if {("dead", 0), ("contact", 0)} & on:
-            ruled_out |= {"dead", "contact"}
-        for kind in NEW_SHAPE:
-            if (kind, 0) not in on and kind not in ruled_out:
-                yield group(Term(kind))
-        for kinds in DEVIATIONS if structure.n > 1 else ():
-            if not own & set(kinds):
-                whiches = [(kind, which) for kind, which in on if kind in kinds]
-                whiches += [("areas", 0)] if "areas" in kinds else []
-                yield group(*(Term(*one, k) for one in whiches for k in range(1, structure.n)))
-
-    def _is_distinct(self, which: int, active: Mask, z: Array) -> bool:
-        """Return whether a time constant is distinct from the free ones, and in order."""
-        terms = self.structure.terms
-        places = [place for place, term in enumerate(terms) if term.kind == "lags"]
-        separations = (
-            (z[i] - z[places[which]]) * np.sign(terms[i].which - which) for i in places if active[i]
-        )
-        return all(one > LEAST_SEPARATION for one in separations)
-
-    def _with_own(self, kind: str, whiches: range | tuple[int, ...], own: set[str]) -> list[Term]:
-        """Return terms of a kind, with differences between muscles if they are free."""
-        muscles = [None, *(range(1, self.structure.n) if kind in own else ())]
-        return [Term(kind, which, muscle) for which in whiches for muscle in muscles]
-
-
-def _solved(grams: Array, free: Mask, bounded: Mask, z: Array) -> Array:
-    """Return the least squares of free unknowns, others as they are, of every matrix in a stack.
-
-    ``grams`` are products of slopes and target.
-    """
-    moving = np.flatnonzero(free)
-    keep = np.append(moving, z.size)
-    parts = grams[:, keep][:, :, keep]
-    parts[:, :-1, -1] -= grams[:, moving] @ np.append(np.where(free, 0.0, z), 0.0)
-    solve = partial(solve_products, bounded=bounded[free], near=z[free])
-    return solve(parts, moving.size, DAMPED)[:, :, 0]

@@ -5,7 +5,7 @@ that it then lacks are: those are linear, and memory does not depend on coeffici
 are the terms of `mckibben.blocks.coupled.balance_law`; what moves them through the past is carried.
 
 Columns of slopes are the coefficients from those of the first coordinate on, then the shape: the
-friction offset, its slopes by scheduling inputs, the logarithms of the ratio of limits and of lags,
+growth of friction, its slopes by scheduling inputs, the logarithms of the ratio of limits and of lags,
 stretch of the walls, forces of slackening, places of obstacles, and what changes the pressures that act,
 whose slopes are given.
 """
@@ -25,18 +25,16 @@ from mckibben.blocks.coupled.balance_law import (
     LEAST_AREA,
     area,
     coordinate_at,
-    friction_pressure,
     lag_gain,
+    limit_growth,
     muscle_at,
     muscle_force,
     shortening,
-    solve_equilibrium,
     terms_at,
-    unbalanced,
     update_state,
     within_hull,
-    work_size,
 )
+from mckibben.blocks.coupled.balance_solving import solve_equilibrium, unbalanced
 from mckibben.blocks.kernels import fill, inlined, kernel
 from mckibben.blocks.solving import eliminate
 
@@ -48,6 +46,8 @@ FEW_STEPS, CLOSE = 6, 1e-7
 @kernel
 def mix(to: Array, kept: float, share: float, row: Array) -> None:
     """Form a weighted sum in place, over all coefficients."""
+    if kept == 1.0 and share == 0.0:
+        return
     for i in range(to.size):
         to[i] = kept * to[i] + share * row[i]
 
@@ -57,7 +57,7 @@ def mix(to: Array, kept: float, share: float, row: Array) -> None:
 
 @kernel
 def ratio_column(c: Array) -> int:
-    """Return the column of the ratio of limits; before are friction's offset and growths, then lags."""
+    """Return the column of the ratio of limits; before are friction's growth and slopes, then lags."""
     return 1 + int(c[at.N_SCHEDULES])
 
 
@@ -117,13 +117,13 @@ def by_limit(
     if s < 0.0:
         upper *= -c[at.RATIO]
         to[ratio_column(c)] += share * s
-    if not friction_pressure(c, p, x) > 0.0:
+    if not limit_growth(c, p, x) > 0.0:
         return
-    to[0] += share * upper
+    to[0] += share * upper * (p / c[at.TOP] - 1.0)
     for j in range(int(c[at.N_SCHEDULES])):
         to[1 + j] += share * upper * x[j]
     for f in range(dp.size):
-        to[to.size - dp.size + f] += share * upper * dp[f]
+        to[to.size - dp.size + f] += share * upper * c[at.GROWTH] / c[at.TOP] * dp[f]
 
 
 @inlined
@@ -145,12 +145,8 @@ def by_shape(
     ``terms`` and behind them slopes are its own; ``to`` begins with the shape; ``late`` has a number a
     lag.
     """
-    n_l, width, first, walls = (
-        int(c[at.N_LAGS]),
-        int(c[at.N_TERMS]),
-        int(c[at.STOP]),
-        wall_column(c),
-    )
+    n_l, width, first = int(c[at.N_LAGS]), int(c[at.N_TERMS]), int(c[at.STOP])
+    walls = wall_column(c)
     place, past = terms_at(c, k), int(c[at.LAGGING]) + k * n_l
     taut = terms[width + at.BLADDER] != 0.0
     moved = y - shortening(c, k, state)
@@ -197,17 +193,12 @@ def through_past(c: Array, k: int, terms: Array, past: Array, moved: Array, to: 
 
     ``terms`` and behind them slopes are its own, and ``moved`` those of its last shortening.
     """
-    n, n_s, n_l, width = (
-        int(c[at.N_MUSCLES]),
-        int(c[at.N_STOPS]),
-        int(c[at.N_LAGS]),
-        int(c[at.N_TERMS]),
-    )
-    place, slopes, stop, lag = terms_at(c, k), terms[width:], int(c[at.STOP]), int(c[at.LAG])
+    n, n_s, n_l = int(c[at.N_MUSCLES]), int(c[at.N_STOPS]), int(c[at.N_LAGS])
+    place, stop, lag = terms_at(c, k), int(c[at.STOP]), int(c[at.LAG])
+    slopes = terms[int(c[at.N_TERMS]) :]
     heavy = c[place + at.MASS] * slopes[at.MASS]
-    carried = (
-        c[place + at.DAMPING] * slopes[at.DAMPING] + c[place + at.LINE] * slopes[at.LINE] + heavy
-    )
+    damped = c[place + at.DAMPING] * slopes[at.DAMPING] + c[place + at.LINE] * slopes[at.LINE]
+    carried = heavy + damped
     for i in range(n_s):
         if slopes[stop + i] != 0.0:
             mix(to, 1.0, c[place + stop + i], past[int(c[at.STOPS]) - n + k * n_s + i])
@@ -216,10 +207,10 @@ def through_past(c: Array, k: int, terms: Array, past: Array, moved: Array, to: 
         carried += kappa * slopes[lag + i]
         if slopes[at.BLADDER] != 0.0:
             mix(to, 1.0, kappa * c[int(c[at.DECAYS]) + i], past[row])
-    if c[at.N_MOVES] != 0.0 and slopes[at.MASS] != 0.0:
+    if c[at.N_MOVES] != 0.0:
         row = int(c[at.MOVED]) - n + 2 * k
-        mix(to, 1.0, -1.5 * c[place + at.MASS] * slopes[at.MASS], past[row])
-        mix(to, 1.0, 0.5 * c[place + at.MASS] * slopes[at.MASS], past[row + 1])
+        mix(to, 1.0, -1.5 * heavy - damped / 3.0, past[row])
+        mix(to, 1.0, 0.5 * heavy, past[row + 1])
     mix(to, 1.0, -carried, moved)
 
 
@@ -258,14 +249,16 @@ def carry(
     moved: Array,
     now: Array,
 ) -> None:
-    """Update the derivatives of the past of muscle k to the current state."""
+    """Update the derivatives of the past of muscle k to the current state, of terms that are there."""
     n, n_s, n_l = int(c[at.N_MUSCLES]), int(c[at.N_STOPS]), int(c[at.N_LAGS])
-    grown = friction_pressure(c, p, x) if way != AT_REST else 0.0
+    own = terms_at(c, k)
+    grown = limit_growth(c, p, x) if way != AT_REST else 0.0
     shape = now.size - n_shape(c) - dp.size
     for i in range(n_s):
         place = int(c[at.STOPS]) + k * n_s + i
         s, upper, row = state[place], c[at.LIMITS + i] * grown, place - n
-        if not -c[at.RATIO] * upper < s < upper:
+        there = c[own + int(c[at.STOP]) + i] != 0.0
+        if there and not -c[at.RATIO] * upper < s < upper:
             mix(past[row], 0.0, -1.0, now)
             past[row, shape + wall_column(c)] -= p
             for f in range(dp.size):
@@ -275,8 +268,9 @@ def carry(
     mix(moved, -1.0, 1.0, now)
     for i in range(n_l if way != AT_REST else 0):
         row = int(c[at.LAGGING]) - n + k * n_l + i
-        mix(past[row], c[int(c[at.DECAYS]) + i], lag_gain(c, i, way), moved)
-        past[row, shape + ratio_column(c) + 1 + i] += late[i]
+        if c[own + int(c[at.LAG]) + i] != 0.0:
+            mix(past[row], c[int(c[at.DECAYS]) + i], lag_gain(c, i, way), moved)
+            past[row, shape + ratio_column(c) + 1 + i] += late[i]
     if c[at.N_MOVES] != 0.0 and way == IN_TIME:
         row = int(c[at.MOVED]) - n + 2 * k
         fill(past[row + 1], past[row])
@@ -501,7 +495,7 @@ def run(
     found, slopes = np.empty((kept, m)), np.zeros((kept, m, n_c))
     past = np.zeros((n_states + at.FRESH - n, n_c))
     rows = np.zeros((2 * n + 2 * m + 1, max(n_c, m, n * n_l)))
-    scratch = np.zeros(n_states + 3 * m + n + work_size(c))
+    scratch = np.zeros(n_states + 3 * m + n + int(c[at.WORK]))
     p, y, x, dp = (np.ascontiguousarray(one) for one in (driven, measured, x, dp))
     follow(c, p, y, x, dp, held, every, past, rows, scratch, found, slopes)
     return found, slopes

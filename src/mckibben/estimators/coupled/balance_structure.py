@@ -18,22 +18,14 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Mask
 from mckibben.blocks.coupled import balance_terms as at
-from mckibben.blocks.coupled.balance import (
-    GRID,
-    LEAST_LEFT,
-    Balance,
-    corners,
-    fields_of,
-    powers_of,
-    softest,
-)
+from mckibben.blocks.coupled.balance import Balance, fields_of
+from mckibben.blocks.coupled.balance_bounds import GRID, LEAST_LEFT, corners, powers_of, softest
 from mckibben.blocks.coupled.balance_terms import (
     LINEAR,
     NEVER,
@@ -52,6 +44,9 @@ LEAST_AREA = 1e-9
 
 LEAST_STIFF = 1e-3
 """Smallest stiffness, relative to the force at the highest pressure over the stroke."""
+
+ALIKE = 0.1
+"""How far muscles differ, relative to the scales of terms."""
 
 MOST_STRETCH = {False: 0.1, True: 1.0}
 """Largest stretch of the wall at the highest pressure, relative to the largest shortening, by whether
@@ -114,7 +109,7 @@ class Bench:
     curved: bool = True
     unmeasured: tuple[int, ...] = ()
 
-    @property
+    @cached_property
     def directed(self) -> bool:
         """Whether muscles act along directions, instead of each on a coordinate of its own."""
         n, m = self.directions.shape
@@ -130,17 +125,17 @@ class Bench:
         """Largest stretch of the wall by pressure [mm/bar]."""
         return MOST_STRETCH[self.of_force] * self.scale / self.highest
 
-    @property
+    @cached_property
     def scale(self) -> float:
         """Largest shortening [mm]."""
         return float(np.abs(self.hull).max())
 
-    @property
+    @cached_property
     def stroke(self) -> float:
         """Largest range of a shortening [mm]."""
         return float(np.ptp(self.hull, axis=1).max())
 
-    @property
+    @cached_property
     def largest(self) -> Array:
         """Largest magnitude of scheduling inputs, 1 if that is 0."""
         most = np.abs(self.levels).max(axis=1)
@@ -171,7 +166,7 @@ class Structure:
     n_elastic, n_area : int
         Number of elastic terms, from the square on; of area terms, with the constant.
     limits, lags : tuple of float
-        Break-away travels of the stops [mm/bar]; initial time constants [s].
+        Break-away travels of the stops at the highest pressure [mm]; initial time constants [s].
     obstacles : tuple of (int, float)
         Side, 1 or -1, and initial position in the range of every coordinate, 0 to 1.
     degree : int
@@ -201,18 +196,13 @@ class Structure:
         """Number of coordinates."""
         return len(self.bench.driven)
 
-    @property
-    def n_x(self) -> int:
-        """Number of scheduling inputs, without loads."""
-        return len(self.bench.scheduled)
-
     @cached_property
     def sizes(self) -> Sizes:
         """The numbers of all that the balance has."""
         return Sizes(
             muscles=self.n,
             coordinates=self.m,
-            schedules=self.n_x,
+            schedules=len(self.bench.scheduled),
             degree=self.degree,
             loads=len(self.bench.loaded),
             stops=len(self.limits),
@@ -242,6 +232,11 @@ class Structure:
         return self.at["springs"].reshape(self.m, -1, 1 + self.m)
 
     @cached_property
+    def met(self) -> Indices:
+        """Indices of obstacles, shape (m, obstacles, numbers)."""
+        return self.at["obstacles"].reshape(self.m, -1, self.sizes.obstacle)
+
+    @cached_property
     def n_linear(self) -> int:
         """Number of linear coefficients, including unused ones."""
         return int(self.at[NONLINEAR[0]][0])
@@ -249,7 +244,7 @@ class Structure:
     @property
     def size(self) -> int:
         """Number of values."""
-        return self.n_linear + sum(self.at[name].size for name in NONLINEAR)
+        return int(self.at[NONLINEAR[-1]][-1]) + 1
 
     def nonlinear_values(self, values: Array, name: str) -> Array:
         """Return the nonlinear parameters of a kind."""
@@ -271,19 +266,14 @@ class Structure:
         for j in range(self.m):
             if not self.bench.of_force:
                 columns += [(Term("loads", j), [index]) for index in self.at["loads"][j].tolist()]
-            for number, index in self._stiffnesses(j):
-                columns.append((Term("obstacles", number), [index]))
+            for number, indices in enumerate(self.met[j, :, at.STIFFNESS :].tolist()):
+                columns += [(Term("obstacles", number), [index]) for index in indices]
         for kind in LINEAR["muscle"]:
             for which, shared in enumerate(self.at[kind].T.tolist()):
                 if kind != "areas" or which or self.bench.of_force:
                     columns.append((Term(kind, which), shared))
                 columns += [(Term(kind, which, k), [shared[k]]) for k in range(1, self.n)]
         return columns
-
-    def _stiffnesses(self, j: int) -> list[tuple[int, int]]:
-        """Return number and index of every stiffness of the obstacles of a coordinate."""
-        table = self.at["obstacles"][j].reshape(-1, self.sizes.obstacle)[:, at.STIFFNESS :]
-        return [(number, index) for number, row in enumerate(table.tolist()) for index in row]
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
@@ -317,34 +307,24 @@ class Structure:
         return slice(first, first + size)
 
     @cached_property
-    def not_negative(self) -> NDArray[np.bool_]:
-        """Mask of the non-negative linear coefficients."""
-        mask = np.zeros(self.n_linear, dtype=bool)
-        for name in (*LINEAR["coordinate"], *LINEAR["muscle"]):
-            mask[self.at[name]] = TABLE[name].least == 0.0
-        return mask
-
-    @cached_property
-    def bounded(self) -> NDArray[np.bool_]:
-        """Mask of the non-negative free parameters; slackening starts from a model without."""
-        shape = [TABLE[name].least == 0.0 and name != "pushes" for name, _, _ in self.terms]
-        shape[: self.mix.shape[1]] = self.not_negative @ self.mix > 0
-        return np.array(shape) & np.array([muscle is None for _, _, muscle in self.terms])
+    def bounded(self) -> Mask:
+        """Which terms are not negative."""
+        return np.array([TABLE[kind].least == 0.0 and k is None for kind, _, k in self.terms])
 
     def expanded(self, free: Array) -> Array:
-        """Return all values from the free ones."""
+        """Return all values from the free ones, which loads of recordings may follow."""
         n = self.mix.shape[1]
-        return np.concatenate([self.base + self.mix @ free[:n], free[n:]])
+        return np.append(self.base + self.mix @ free[:n], free[n : len(self.terms)])
 
-    def initial(self, friction_offset: float, stretch: float = 0.0) -> Array:
-        """Return initial free parameters: all terms without effect, except the friction offset.
+    def initial(self, friction_growth: float, stretch: float = 0.0) -> Array:
+        """Return initial free parameters: all terms without effect, except the growth of friction.
 
         ``stretch`` of the wall is relative to the largest.
         """
         low = self.bench.lowest[:, np.newaxis]
         positions = low + np.outer(self.bench.travel, [position for _, position in self.obstacles])
         free = np.zeros(len(self.terms))
-        free[self.free("friction_offset")] = friction_offset
+        free[self.free("friction_growth")] = friction_growth
         free[self.free("walls")] = stretch * self.bench.most_stretch
         free[self.free("lags")] = np.log(self.lags)
         free[self.free("pushes")] = NEVER
@@ -372,34 +352,60 @@ class Structure:
             for kind, which, muscle in self.terms
         ]
 
-    def scales(self) -> Array:
-        """Return the scales of all free parameters, relative to an area at rest of 1."""
-        linear = np.zeros(self.n_linear)
-        for name in (*LINEAR["coordinate"], *LINEAR["muscle"]):
-            linear[self.at[name]] = self.bench.natural(TABLE[name].unit)
-        force = self.bench.natural("N")
-        linear[self.at["loads"]] = force / self.bench.heaviest
-        powers = 1.0 / powers_of(self.bench.largest, self.degree)
-        linear[self.springs] = np.outer(powers, [force, *self.m * [self.bench.natural("N/mm")]])
-        return np.append(self.mix.T @ linear / self.mix.sum(axis=0), self.nonlinear_bounds()[2])
+    @cached_property
+    def _ranges(self) -> Array:
+        """Lower and upper bounds of all values, and their scales, shape (3, values)."""
+        bench, force = self.bench, self.bench.natural("N")
+        powers = 1.0 / powers_of(bench.largest, self.degree)
+        own: dict[str, Any] = {
+            "loads": force / bench.heaviest,
+            "springs": np.outer(powers, [force, *self.m * [bench.natural("N/mm")]]).ravel(),
+            "friction_slopes": 1.0 / bench.largest,
+            "places": bench.travel.repeat(len(self.obstacles)),
+        }
+        found = np.zeros((3, self.size))
+        found[0] = -np.inf
+        for kind in TABLE.values():
+            for row, share in zip(found, (kind.least, kind.most, kind.scale), strict=True):
+                row[self.at[kind.name]] = share * own.get(kind.name, bench.natural(kind.unit))
+        if self.lags:  # each within its part of the range, so that none takes another's place
+            between = np.sqrt(np.multiply(self.lags[1:], self.lags[:-1]))
+            shortest, longest = bench.lag_range
+            found[0, self.at["lags"]] = np.log([shortest, *between])
+            found[1, self.at["lags"]] = np.log([*between, longest])
+        found[2, self.at["filling"]] = max(4.0 * bench.step, 1e-9)
+        return found
 
     def nonlinear_bounds(self) -> tuple[Array, Array, Array]:
         """Return lower and upper bounds of the nonlinear parameters, and their scales."""
-        bench, n = self.bench, self.n_linear
-        lower, upper, scales = np.zeros((3, self.size - n))
-        for name in NONLINEAR:
-            kind, here = TABLE[name], self.at[name] - n
-            natural = np.full(here.size, bench.natural(kind.unit))
-            if name == "friction_slopes":
-                natural = bench.highest / bench.largest
-            elif name == "places":
-                natural = bench.travel.repeat(len(self.obstacles))
-            lower[here], upper[here] = kind.least * natural, kind.most * natural
-            scales[here] = kind.scale * natural
-        lags = self.at["lags"] - n
-        lower[lags], upper[lags] = np.log(bench.lag_range)
-        scales[self.at["filling"] - n] = max(4.0 * bench.step, 1e-9)
+        lower, upper, scales = self._ranges[:, self.n_linear :]
         return lower, upper, scales
+
+    def scales(self) -> Array:
+        """Return the scales of all free parameters, relative to an area at rest of 1."""
+        linear, shape = np.split(self._ranges[2], [self.n_linear])
+        return np.append(self.mix.T @ linear / self.mix.sum(axis=0), shape)
+
+    @cached_property
+    def none(self) -> Array:
+        """Free parameters of a balance in which no term has an effect."""
+        return self.initial(0.0)
+
+    def doubts(self, *, known: bool) -> Array:
+        """Return how much less likely terms are, the further from none, relative to their scales.
+
+        Those that a balance always has, and, where a data sheet is ``known``, those that it determines,
+        may be anything.
+        """
+        doubts = 1.0 / self.scales()
+        for place, term in enumerate(self.terms):
+            kind = TABLE[term.kind]
+            always = term.which == 0 and kind.name in ("springs", "areas")
+            if term.muscle is not None:
+                doubts[place] /= ALIKE
+            elif always or (known and kind.prior) or not kind.doubtful:
+                doubts[place] = 0.0
+        return doubts
 
     # -- block -----------------------------------------------------------------------------------
 
@@ -407,13 +413,15 @@ class Structure:
         """Return the balance with these values, without the air and dead zone in front of it.
 
         The ``final`` one has no terms without effect, and the springs of muscles that cannot go slack
-        are added to those of their coordinates.
+        are added to those of their coordinates; others are not checked.
         """
         bench, n = self.bench, self.n
         given = {name: values[self.at[name]] for name in (*LINEAR["muscle"], "springs", "loads")}
         for name in LINEAR["muscle"]:
             if TABLE[name].least == 0.0:
                 given[name] = np.maximum(given[name], 0.0)
+        if bench.step and not final:  # so that what lines add is known where there are none
+            given["lines"] = np.maximum(given["lines"], 1e-12 * bench.natural("N s/mm"))
         given["areas"][:, 0] = np.maximum(given["areas"][:, 0], LEAST_AREA * bench.unit)
         shape = {name: self.nonlinear_values(values, name) for name in NONLINEAR}
         taut, ratio = bool((shape["pushes"] >= NEVER).all()), float(shape["asymmetry"][0])
@@ -428,14 +436,15 @@ class Structure:
         }
         fields = fields_of(given)
         fields |= {name: () for name, out in left_out.items() if out}
-        growths = shape["friction_slopes"]
-        return Balance(
+        slopes, made = shape["friction_slopes"], Balance if final else Balance.unchecked
+        return made(
             **fields,
             walls=vector(np.full(n, shape["walls"][0])),
             pushes=() if taut else vector(shape["pushes"]),
             limits=self.limits,
-            friction_offset=float(shape["friction_offset"][0]),
-            friction_slopes=vector(growths) if not final or growths.any() else (),
+            friction_growth=float(shape["friction_growth"][0]),
+            highest_pressure=bench.highest,
+            friction_slopes=vector(slopes) if not final or slopes.any() else (),
             asymmetry=None if final and ratio == 1.0 else ratio,
             obstacles=rows(self._obstacles(values)) if self.obstacles else (),
             lags=vector(shape["lags"]),
@@ -454,19 +463,11 @@ class Structure:
 
     def _obstacles(self, values: Array) -> Array:
         """Return side, position and stiffnesses of the obstacles, a row a coordinate."""
-        table = values[self.at["obstacles"]].reshape(self.m, -1, self.sizes.obstacle)
+        table = values[self.met]
         table[..., at.SIDE] = [side for side, _ in self.obstacles]
         table[..., at.PLACE] = self.nonlinear_values(values, "places").reshape(self.m, -1)
         table[..., at.STIFFNESS :] = np.maximum(table[..., at.STIFFNESS :], 0.0)
         return table.reshape(self.m, -1)
-
-    def coefficients(self, values: Array, sample_time: float | None) -> Array:
-        """Return the coefficients of the block, those of inactive terms included."""
-        c = self.block(values).coefficients(sample_time)
-        least = 1e-12 * self.bench.unit * self.bench.highest / self.bench.scale
-        lines = self.at["lines"]
-        c[lines + (c.size - self.n_linear)] = np.maximum(values[lines], least)
-        return c
 
     def reduced(self, active: Collection[Term]) -> Structure:
         """Return the structure without inactive stops, lags, obstacles and powers."""
@@ -502,41 +503,48 @@ class Structure:
         Shapes (c, linear) and (c,). They depend on the nonlinear parameters, which are fixed at their
         present values: friction reduces the effective area.
         """
-        matrix: list[Array] = []
-        lower: list[float] = []
+        ratio, wall, growth = (
+            float(self.nonlinear_values(values, name)[0])
+            for name in ("asymmetry", "walls", "friction_growth")
+        )
+        rise = growth / self.bench.highest
+        (matrix, lower), left = self._physics
+        matrix = matrix.copy()
+        friction = -(np.array(self.limits) * rise * max(1.0, ratio) + wall)
+        matrix[left[..., np.newaxis], self.at["friction"][:, np.newaxis]] = friction
+        return matrix, lower
 
-        def add(entries: dict[int, float], bound: float) -> None:
-            matrix.append(np.zeros(self.n_linear))
-            matrix[-1][list(entries)] = list(entries.values())
-            lower.append(bound)
-
-        for index in np.flatnonzero(self.not_negative).tolist():
-            add({index: 1.0}, 0.0)
-        ratio = float(self.nonlinear_values(values, "asymmetry")[0])
-        wall = float(self.nonlinear_values(values, "walls")[0])
-        reduction = -(np.array(self.limits) * max(1.0, ratio) + wall)
-        for k in range(self.n):
-            areas, friction, elastic = (
-                self.at[kind][k].tolist() for kind in ("areas", "friction", "elasticity")
-            )
-            bladder = int(self.at["bladders"][k, 0])
-            add({areas[0]: 1.0}, 0.1 * self.bench.unit)
-            order, power = np.arange(1, self.n_area), np.arange(2, 2 + self.n_elastic)
-            low, high = self.bench.hull[k].tolist()
-            for u in np.linspace(low, high, GRID) / self.bench.scale:
-                effective = dict(zip(areas, (u ** np.arange(self.n_area)).tolist(), strict=True))
-                effective[areas[0]] -= LEAST_LEFT
-                add(effective | dict(zip(friction, reduction.tolist(), strict=True)), 0.0)
-                stiff = power * u ** (power - 1) / self.bench.scale
-                narrowing = order * u ** (order - 1) / self.bench.scale
-                for p in (0.0, self.bench.highest):
-                    entries = dict(zip(elastic, stiff.tolist(), strict=True)) | {bladder: 1.0}
-                    entries |= dict(zip(areas[1:], (-p * narrowing).tolist(), strict=True))
-                    add(entries, self.least_stiffness)
-        for x, direction in product(corners(self.bench.levels), np.eye(self.m)):
-            matrix.append(self.stiffness_row(x, direction))
-            lower.append(self.least_stiffness)
-        return np.array(matrix), np.array(lower)
+    @cached_property
+    def _physics(self) -> tuple[tuple[Array, Array], Indices]:
+        """Constraints without friction, and their rows of the areas it reduces, shape (n, GRID)."""
+        bench, stiff = self.bench, self.least_stiffness
+        sides = [np.eye(self.n_linear)[self._ranges[0, : self.n_linear] == 0.0]]
+        bounds = [np.zeros(len(sides[0]))]
+        order, power = np.arange(self.n_area), np.arange(2, 2 + self.n_elastic)
+        for areas, elastic, bladder, hull in zip(
+            *(self.at[kind] for kind in ("areas", "elasticity", "bladders")),
+            bench.hull,
+            strict=True,
+        ):
+            low, high = hull.tolist()
+            u = np.linspace(low, high, GRID)[:, np.newaxis] / bench.scale
+            at_rest = np.eye(self.n_linear)[areas[:1]]
+            # the area that is left; stiffness without pressure, and at the highest
+            along = np.zeros((GRID, 3, self.n_linear))
+            along[:, 0, areas] = u**order
+            along[:, 0, areas[0]] -= LEAST_LEFT
+            along[:, 1:, elastic] = (power * u ** (power - 1) / bench.scale)[:, np.newaxis]
+            along[:, 1:, bladder] = 1.0
+            narrowing = order[1:] * u ** (order[1:] - 1) / bench.scale
+            along[:, 2, areas[1:]] = -bench.highest * narrowing
+            sides += [at_rest, along.reshape(-1, self.n_linear)]
+            bounds += [np.array([0.1 * bench.unit]), np.tile([0.0, stiff, stiff], GRID)]
+        first = len(sides[0]) + 1 + (1 + 3 * GRID) * np.arange(self.n)
+        for x, direction in product(corners(bench.levels), np.eye(self.m)):
+            sides.append(self.stiffness_row(x, direction)[np.newaxis])
+            bounds.append(np.array([stiff]))
+        whole = np.concatenate(sides), np.concatenate(bounds)
+        return whole, first[:, np.newaxis] + 3 * np.arange(GRID)
 
     def stiffness_row(self, x: Array, direction: Array) -> Array:
         """Return the constraint row of the stiffness of springs along a direction."""

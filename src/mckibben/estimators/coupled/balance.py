@@ -14,7 +14,7 @@ from itertools import compress, product
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from annotated_types import Gt, Interval
+from annotated_types import Gt, Interval, MinLen
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
@@ -149,7 +149,7 @@ class BalanceEstimator(CoupledEstimator):
         directions in which they were recorded, so that a differential drive stays on its line, or any
         in their range.
     steps : int
-        Most Gauss-Newton steps.
+        Most Gauss-Newton steps of a descent; the trials of phenomena take their own.
     prior : str, Path, Sheet or Prior, optional
         What is likely before, weighed against the recordings by their noise: a muscle of the library, or
         a data sheet or its file (`mckibben.muscles.prior_of`). Of one muscle.
@@ -199,7 +199,7 @@ class BalanceEstimator(CoupledEstimator):
     friction: Literal["pressure", "constant"] = "pressure"
     n_stops: Annotated[int, Interval(ge=0, le=30)] = 8
     n_lags: Annotated[int, Interval(ge=0, le=10)] = 6
-    lags: tuple[Annotated[float, Gt(0)], ...] | None = None
+    lags: Annotated[tuple[Annotated[float, Gt(0)], ...], MinLen(1)] | None = None
     elasticity: Annotated[int, Interval(ge=1, le=9)] = 9
     area: Annotated[int, Interval(ge=0, le=6)] = 4
     degree: Annotated[int, Interval(ge=1, le=2)] = 2
@@ -271,7 +271,7 @@ class BalanceEstimator(CoupledEstimator):
 
     def _fit(self, *given: Any) -> None:
         super()._fit(*given)
-        del self._last  # a fitted estimator keeps no recordings
+        del self._last  # needed for `find_again` only
 
     def identify(self, data: TrainingData, tracker: Tracker, *, again: bool = False) -> Block:
         """Return the balance, solved for coordinates, after the air and dead zone."""
@@ -525,7 +525,8 @@ class BalanceEstimator(CoupledEstimator):
         structure, prior_errors, problem = search.structure, search.prior, search.problem
         assert prior_errors is not None
         z = np.zeros(problem.size(structure))
-        z[: len(structure.terms)] = structure.initial(FIRST_GROWTH)
+        growing = search.active[structure.free("friction_growth")].all()
+        z[: len(structure.terms)] = structure.initial(FIRST_GROWTH if growing else 0.0)
         for place, term in enumerate(structure.terms):
             if term.kind == "loads":
                 z[place] = 1.0 / prior_errors.prior.sheet.area
@@ -577,7 +578,8 @@ def fixed_in(block: Block) -> tuple[int, ...]:
 
 def _loaded(loads: Array, model: Block, place: int) -> Block:
     """Return a model under the load of a recording, by its index."""
-    return under_load(model, loads[place])
+    # a recording behind the last one that was fitted has none
+    return under_load(model, loads[place]) if place < len(loads) else model
 
 
 def under_load(model: Block, load: Array) -> Block:

@@ -77,14 +77,13 @@ def chosen(search: Search, z: Array, tried: set[str], tracker: Tracker) -> tuple
     """
     found, hopeless = list[Trial](), set[str]()
     while True:
-        peeked = [
-            _best(search, z, starts)
-            for starts in _starts(search, z, tried)
-            if starts and starts[0].name not in hopeless
-        ]
-        least = np.sqrt(1.0 - PROMISING) * search.cost(z)
-        # those that cost no descent are tried again once others are in
-        hopeless |= {one.name for one in peeked if one.z is not z and not one.cost < least}
+        peeked, least = list[Trial](), np.sqrt(1.0 - PROMISING) * search.cost(z)
+        for starts in _starts(search, z, tried):
+            if starts and starts[0].name not in hopeless:
+                peeked.append(_best(search, z, starts))
+                # those that cost no descent are tried again once others are in
+                if starts[0].z is not z and not peeked[-1].cost < least:
+                    hopeless.add(starts[0].name)
         promising = sorted((one for one in peeked if one.cost < least), key=lambda one: one.cost)
         if not promising:
             break
@@ -101,7 +100,9 @@ def chosen(search: Search, z: Array, tried: set[str], tracker: Tracker) -> tuple
     for terms, gain in doubtful:
         if (terms & search.active).any():
             fewer = replace(search, active=search.active & ~terms)
-            without = fewer.descended(fewer.without(z), STEPS, tracker)
+            begun = z.copy()
+            begun[: terms.size][terms] = search.none(z)[: terms.size][terms]
+            without = fewer.descended(begun, STEPS, tracker)
             if not demanded(fewer, without, search, z, gain):
                 search, z = fewer, without
     return search, z
@@ -206,7 +207,8 @@ def _smooth(term: Term, free: set[Term]) -> bool:
     """Return whether a term may be left out, of those that are free."""
     kind, option = TABLE[term.kind], TABLE[term.kind].option
     if kind.name in ("elasticity", "areas", "springs"):
-        return term.which > 0 and Term(term.kind, term.which + 1, term.muscle) not in free
+        first = term.which == 0 and term.muscle is None
+        return not first and Term(term.kind, term.which + 1, term.muscle) not in free
     if term.muscle is not None or kind.name == "friction":
         return True
     return bool(option) and option not in PHENOMENA

@@ -346,6 +346,10 @@ class Structure:
     def keys(self) -> list[tuple[object, ...]]:
         """Keys of the terms across structures: limits, lags and obstacles by their initial values."""
         by: dict[str, Sequence[object]] = {"friction": self.limits, "relaxation": self.lags}
+        powers = [
+            (s, d) for s in range(len(self.bench.scheduled)) for d in range(1, self.degree + 1)
+        ]
+        by |= {"springs": [(0, 0), *powers]}
         by |= {"lags": self.lags, "obstacles": self.obstacles, "places": self.m * self.obstacles}
         return [
             (kind, by[kind][which] if kind in by else which, muscle)

@@ -146,6 +146,14 @@ def by_differences(errors: Callable[[Array], Array], steps: Array) -> Errors:
     return sloped
 
 
+def triangle_of(slopes: Array, errors: Array) -> Array:
+    """Return the triangle, (p + 1, p + 1), of derivatives, (n, p), and errors; rows not finite are 0."""
+    both = np.column_stack([slopes, errors])
+    both[~np.isfinite(both).all(axis=1)] = 0.0
+    triangle: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
+    return triangle
+
+
 def levenberg_marquardt(
     errors: Callable[[Array, bool], tuple[Array, Array]],
     step: Callable[[Array, Array, float], Array],
@@ -177,9 +185,7 @@ def levenberg_marquardt(
     for number in range(steps):
         if not len(slopes):
             found, slopes = errors(point, True)
-        both = np.column_stack([slopes, found])
-        both[~np.isfinite(both).all(axis=1)] = 0.0
-        triangle: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
+        triangle = triangle_of(slopes, found)
         for turn in range(MOST_TRIES):
             try:
                 tried = step(triangle, point, damping)

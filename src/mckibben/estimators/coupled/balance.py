@@ -310,7 +310,7 @@ class BalanceEstimator(CoupledEstimator):
             structure = self.widest(bench, timed=not still or self.lags is not None)
             search, z = self._found(data, structure, prior_errors, tracker)
         structure = search.structure
-        values = structure.expanded(z[: len(structure.terms)])
+        values = structure.expanded(z)
         balance = in_newtons(structure.block(values, final=True))
         self._keep_loads(search, z, data, balance.areas[0][0])
         fronts = [front(structure, values, channel) for channel in data.inputs]
@@ -451,8 +451,8 @@ class BalanceEstimator(CoupledEstimator):
         search, z = chosen(search, z, tried, tracker.part(0.2, 0.4))
         if structure.n == 1 and self.unknown_load is None:
             search, z = self._own_loads(search, z, data)
-        walls = np.array([term.kind == "walls" for term in structure.terms])
-        search = replace(search, active=search.active | (walls & first))
+        walls = (structure.kinds == "walls") & first
+        search = replace(search, active=search.active | walls)
         z = search.descended(z, steps, tracker.part(0.4, 0.5))
         search, z = pruned(search, z)
         there = compress(structure.terms, search.active)
@@ -484,7 +484,7 @@ class BalanceEstimator(CoupledEstimator):
 
         Asymmetry and stretch resemble friction, and may take its place where that is not yet known.
         """
-        kinds = np.array([term.kind for term in search.structure.terms])
+        kinds = search.structure.kinds
         steps, begun = min(self.steps, STEPS_BETWEEN), z
         search = replace(search, active=search.active & ~np.isin(kinds, RUBBING))
         z = search.descended(begun, steps, tracker)

@@ -19,7 +19,6 @@ from mckibben.blocks.coupled.balance_terms import TABLE
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Term
 from mckibben.numerics.descent import FIRST_DAMPING
-from mckibben.numerics.statistics import autoregression
 from mckibben.numerics.tracker import Tracker
 
 GAIN, EVIDENCE = 0.2, 5.0
@@ -94,7 +93,7 @@ def chosen(search: Search, z: Array, tried: set[str], tracker: Tracker) -> tuple
             break
         search, z = best.search.weighed(best.z), best.z
         found.append(best)
-    kinds = np.array([term.kind for term in search.structure.terms])
+    kinds = search.structure.kinds
     doubtful = [(np.isin(kinds, ("filling", "venting")), 0.0), (kinds == "asymmetry", GAIN)]
     doubtful += [(one.terms, GAIN) for one in found]
     for terms, gain in doubtful:
@@ -114,8 +113,7 @@ def demanded(search: Search, z: Array, more: Search, after: Array, gain: float =
     That is, whether it takes away more than a share of the squared errors, beyond their noise.
     """
     ratio = (search.cost(z) / more.cost(after)) ** 2
-    parts = more.problem.errors(more.structure, after)[0]
-    count = autoregression(parts).effective_sample_size(sum(part.size for part in parts))
+    count = more.independent(after)[2]
     return ratio * (1.0 - gain) > 1.0 and 0.5 * count * np.log(ratio) > EVIDENCE
 
 
@@ -135,8 +133,9 @@ def _best(search: Search, z: Array, starts: list[Trial]) -> Trial:
 def _starts(search: Search, z: Array, tried: set[str]) -> Iterator[list[Trial]]:
     """Yield the starts of every phenomenon that may be there and is not."""
     structure = search.structure
-    kinds, whiches, muscles = map(np.array, zip(*structure.terms, strict=True))
-    common = np.array([muscle is None for muscle in muscles])
+    kinds = structure.kinds
+    whiches = np.array([term.which for term in structure.terms])
+    common = np.array([term.muscle is None for term in structure.terms])
     on = {TABLE[kind].option for kind in kinds[search.active]}
 
     def trial(name: str, terms: Mask, begun: Array = z) -> Trial:

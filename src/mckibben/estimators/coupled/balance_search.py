@@ -19,7 +19,7 @@ from mckibben.blocks.coupled.balance_terms import Indices
 from mckibben.estimators.coupled.balance_prior import PriorErrors
 from mckibben.estimators.coupled.balance_problem import Problem, solve_stiff
 from mckibben.estimators.coupled.balance_structure import Structure
-from mckibben.numerics.descent import FIRST_DAMPING, LIGHTEST, levenberg_marquardt
+from mckibben.numerics.descent import FIRST_DAMPING, LIGHTEST, levenberg_marquardt, triangle_of
 from mckibben.numerics.least_squares import solve_constrained
 from mckibben.numerics.statistics import autoregression, rms
 from mckibben.numerics.tracker import Tracker
@@ -84,11 +84,15 @@ class Search:
 
     def weighed(self, z: Array) -> Search:
         """Return the search with the noise of independent errors that the runs show."""
+        variance, count, independent = self.independent(z)
+        noise = float(np.sqrt(variance * count / independent))
+        return replace(self, noise=max(noise, LEAST_NOISE))
+
+    def independent(self, z: Array) -> tuple[float, int, float]:
+        """Return the variance of the runs' errors, their number, and that of independent ones."""
         parts = self.problem.errors(self.structure, z)[0]
-        count = sum(part.size for part in parts)
-        model = autoregression(parts)
-        noise = np.sqrt(model.variance * count / model.effective_sample_size(count))
-        return replace(self, noise=max(float(noise), LEAST_NOISE))
+        model, count = autoregression(parts), sum(part.size for part in parts)
+        return model.variance, count, model.effective_sample_size(count)
 
     def cost(self, z: Array) -> float:
         """Return the root mean square error."""
@@ -129,10 +133,7 @@ class Search:
     def triangle(self, z: Array) -> Array:
         """Return the triangle of the derivatives by what is free, and of the errors."""
         found, slopes = self.errors(z, self.active)
-        both = np.column_stack([slopes[:, self.free], found])
-        both[~np.isfinite(both).all(axis=1)] = 0.0
-        triangle: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
-        return triangle
+        return triangle_of(slopes[:, self.free], found)
 
     def ahead(self, z: Array, options: list[Mask]) -> list[float]:
         """Return the cost that a linear model expects of every choice of terms."""
@@ -185,7 +186,7 @@ class Search:
         """Return linear constraints of all unknowns: sides @ z >= least."""
         structure = self.structure
         n, n_terms = structure.mix.shape[1], len(structure.terms)
-        physics = structure.constraints(structure.expanded(z[:n_terms]))
+        physics = structure.constraints(structure.expanded(z))
         on_all, least = self._of_all(*physics, z.size)
         low, high, much = structure.nonlinear_bounds()
         shape, far = z[n:n_terms], FAR * much

@@ -21,6 +21,7 @@ from itertools import product
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.coupled import balance_terms as at
@@ -280,6 +281,11 @@ class Structure:
         """Candidate terms, linear first, then nonlinear."""
         nonlinear = [Term(name, which) for name in NONLINEAR for which in range(self.at[name].size)]
         return (*(term for term, _ in self._columns), *nonlinear)
+
+    @cached_property
+    def kinds(self) -> NDArray[np.str_]:
+        """Kinds of the terms."""
+        return np.array([term.kind for term in self.terms])
 
     @cached_property
     def mix(self) -> Array:

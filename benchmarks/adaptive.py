@@ -22,7 +22,7 @@ from mckibben import Block, Recording
 from mckibben.blocks.adaptive import Adaptive, adaptive
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.control import track
-from mckibben.export.c.emulation import emulate
+from mckibben.exporting.c.emulation import emulate
 from mckibben.measured.sets import sets_in
 from mckibben.registry import load
 from mckibben.rigs import load_rig

@@ -77,8 +77,8 @@ def studied(plant: Plant) -> Study:
     return study(
         list(plant.train),
         [run for runs in plant.test.values() for run in runs],
-        inputs=bench.pressures,
-        outputs=bench.outputs,
+        input=bench.pressures,
+        output=bench.outputs,
         load=bench.loads[0] if len(bench.loads) == 1 else None,
         models="quick",
     )

@@ -18,8 +18,8 @@ import tempfile
 from pathlib import Path
 
 from mckibben.blocks.laws import examples
-from mckibben.export.c.project import described, source_files
-from mckibben.export.programs import own_compiler
+from mckibben.exporting.c.project import described, source_files
+from mckibben.exporting.programs import own_compiler
 
 SAMPLE_TIME = 0.01
 

@@ -19,8 +19,8 @@ from fuzz_c import SAMPLE_TIME, fuzzed
 from mckibben.blocks.base import Block
 from mckibben.blocks.laws import examples
 from mckibben.errors import ModelError
-from mckibben.export.c.project import described, source_files
-from mckibben.export.c.serving import Serving, limits, served, served_files
+from mckibben.exporting.c.project import described, source_files
+from mckibben.exporting.c.serving import Serving, limits, served, served_files
 
 SERVING = Serving(watchdog=0.1)
 WIDE = (-50.0, 50.0)

@@ -29,8 +29,8 @@ from mckibben.blocks.laws import examples, trial_limits, wander
 from mckibben.blocks.parameters import plain
 from mckibben.blocks.saving import load
 from mckibben.errors import MckibbenError
-from mckibben.export.c.project import c_files
-from mckibben.export.fmu.unit import fmu_files
+from mckibben.exporting.c.project import c_files
+from mckibben.exporting.fmu.unit import fmu_files
 from mckibben.recording import Recording
 from mckibben.registry import load as load_plugin
 from mckibben.registry import names

@@ -19,7 +19,7 @@ from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.laws import examples
-from mckibben.export.c.emulation import Emulation, emulate
+from mckibben.exporting.c.emulation import Emulation, emulate
 
 SAMPLE_TIME = 0.01
 

@@ -24,7 +24,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.estimators.coupled.balance import BalanceEstimator
-from mckibben.export.mjcf import export_mjcf
+from mckibben.exporting.mjcf import export_mjcf
 from mckibben.reading import read_files
 from mckibben.recording import Recording
 from mckibben.rigs import load_rig

@@ -60,7 +60,7 @@ def planned(own: Recorder, first: Recording, model: Block, seed: int) -> Array:
     names, (low, high) = (*own.pressures, *own.loads), np.transpose(own.ends)
     rates = (high - low) / CROSSING
     limits = dict(zip(names, np.column_stack([low, high, rates]).tolist(), strict=True))
-    found = plan(first, model=model, minutes=SECONDS / 60, limits=limits, seed=seed)
+    found = plan(first, minutes=SECONDS / 60, limits=limits, seed=seed)
     return (found.recording.matrix(names) - low) / (high - low)
 
 

@@ -26,8 +26,8 @@ from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.planning import clip_path
 from mckibben.blocks.predictive import Predictive
-from mckibben.export.c.emulation import emulate, missing_tools
-from mckibben.export.c.project import export_c
+from mckibben.exporting.c.emulation import emulate, missing_tools
+from mckibben.exporting.c.project import export_c
 
 STEP, LENGTH, HORIZON = 0.01, 800, 20
 QUICK = "--quick" in sys.argv

@@ -181,8 +181,8 @@ def main() -> None:
             board = mckibben.compare(
                 train,
                 test,
-                inputs=task.inputs,
-                outputs=task.outputs,
+                input=task.inputs,
+                output=task.outputs,
                 load=task.load,
                 models=models if given.without else "quick",
                 jobs=given.jobs,

@@ -13,12 +13,21 @@ from statistics import median
 
 RUNS = 5
 
+COMPARE = """
+import numpy as np, mckibben
+time = np.arange(2000) / 50
+u = 2.5 + 2.5 * np.sin(time) * np.linspace(1.0, 0.3, 2000)
+run = {"pressure": u, "displacement": 3.0 * u + np.sin(0.3 * time)}
+mckibben.compare(run, models=("pi", "gpi"), rate=50.0)
+"""
+
 COMMANDS = {
-    'python -c "import mckibben"': (["-c", "import mckibben"], 0.3),
+    'python -c "import mckibben"': (["-c", "import mckibben"], 0.05),
     'python -c "import mckibben; mckibben.PIEstimator()"': (
         ["-c", "import mckibben; mckibben.PIEstimator()"],
         0.6,
     ),
+    "compare of two models on 2 000 samples": (["-c", COMPARE], 2.0),
     "mckibben info --models": (["-m", "mckibben", "info", "--models"], 1.5),
     "mckibben --help": (["-m", "mckibben", "--help"], 0.2),
 }
@@ -40,7 +49,7 @@ def main() -> None:
     for name, (arguments, target) in COMMANDS.items():
         seconds(arguments)  # writes the bytecode, and brings files into memory
         wall, busy = map(median, zip(*(seconds(arguments) for _ in range(RUNS)), strict=True))
-        print(f"{name:<52} {wall:6.2f} {target:6.1f} {busy:9.2f}")
+        print(f"{name:<52} {wall:6.2f} {target:6.2f} {busy:9.2f}")
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from making.commands import write_commands
 from making.gallery import write_gallery
 from making.glossary import write_glossary
 from making.models import write_models
+from making.options import write_options
 from making.pages import DOCS, MADE
 
 
@@ -48,6 +49,7 @@ def main() -> int:
         warnings.simplefilter("ignore")
         write_api()
         write_commands()
+        write_options()
         write_glossary()
         with ProcessPoolExecutor(
             1

@@ -27,8 +27,8 @@ from matplotlib.figure import Figure
 
 import mckibben
 from mckibben.blocks.adaptive import Adaptive, adaptive
-from mckibben.export import Serving, state_of
-from mckibben.export.c.emulation import serial_device
+from mckibben.exporting import Serving, state_of
+from mckibben.exporting.c.emulation import serial_device
 from mckibben.link import Link
 from mckibben.rigs.drifting import Drifting
 from mckibben.signals import random_wave

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import pickle
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -17,7 +17,10 @@ from mckibben import errors
 from mckibben.app.terms import message_of
 from mckibben.cli.main import app
 from mckibben.cli.parameters import COMMANDS, Command, as_command, as_flag
-from mckibben.errors import KernelError, MckibbenError, ModelError, rendered
+from mckibben.errors import DataError, KernelError, MckibbenError, ModelError, rendered
+from mckibben.files.channels import description
+from mckibben.muscles.library import parsed
+from mckibben.rigs.files import fields_of
 
 FACES = ("app", "cli", "report")
 TEXTS = ("problem", "remedy", "instead", "no_inverse", "made_again", "hint")
@@ -132,3 +135,14 @@ def test_each_face_renders_in_its_own_terms() -> None:
     assert not re.search(r"`|\(\)", page)
     assert "“Plan the next recording”" in page
     assert message_of(ModelError("it is None")) == "It is None"
+
+
+@pytest.mark.parametrize("read", [description, parsed, fields_of])
+def test_a_file_that_is_absent_is_not_called_one_of_another_form(
+    read: Callable[[Path], object], tmp_path: Path
+) -> None:
+    """An error in data is a ValueError, as what a parser raises is."""
+    with pytest.raises(ValueError, match="cannot be read") as found:
+        read(tmp_path / "absent.toml")
+    assert isinstance(found.value, DataError)
+    assert "TOML" not in found.value.problem

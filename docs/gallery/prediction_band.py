@@ -11,7 +11,7 @@ from mckibben.signals import random_wave
 
 (train,) = mckibben.read(example.TRAIN)
 (held_out,) = mckibben.read(example.TEST)
-banded = mckibben.calibrate(mckibben.GPIEstimator().fit(train).model_, held_out)
+banded = mckibben.calibrate(mckibben.fit("gpi", train), held_out).model
 t = np.arange(2000) * 0.02
 pressure = random_wave(t, max_frequency=0.2, low=1.0, high=5.0, seed=3)
 rig = mckibben.load_rig("mas20-hanging")

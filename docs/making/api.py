@@ -21,7 +21,7 @@ class Use(NamedTuple):
 USES = {
     "recordings": Use(
         "Recordings and files",
-        "mckibben: Recording read write; mckibben.files: columns_of",
+        "mckibben: Recording ReadOptions read write info; mckibben.files: columns_of",
     ),
     "signals": Use(
         "Signals: excitations, cycles, filters",
@@ -33,12 +33,13 @@ USES = {
     ),
     "describe": Use(
         "Describe a muscle",
-        "mckibben: characterize data_gaps plan; mckibben.diagnosis: Characterization Cycle; "
-        "mckibben.metrics: Scores score rmse mae nrmse max_error r2 err loop_width loop_area crosstalk",
+        "mckibben: characterize data_gaps plan plot; mckibben.diagnosis: characterize Characterization "
+        "Cycle; mckibben.metrics: Scores score rmse mae nrmse max_error r2 err loop_width loop_area "
+        "crosstalk",
     ),
     "fit": Use(
         "Fit a model",
-        "mckibben: fit; mckibben.studying.results: Fit; "
+        "mckibben: fit models estimator; mckibben.studying.results: Fit; "
         "mckibben.estimators.core.estimator: Estimator Diagnostics; "
         "mckibben: PIEstimator GPIEstimator MPIEstimator EUPIEstimator",
     ),
@@ -48,14 +49,14 @@ USES = {
     ),
     "models": Use(
         "Run, combine and save models",
-        "mckibben: Block load Series Parallel PerChannel Channel Banded PI RateDependentPI GPI EUPI "
-        "Play Affine PiecewiseLinear Polynomial check_block",
+        "mckibben: Block load simulate Series Parallel PerChannel Channel Banded PI RateDependentPI GPI "
+        "EUPI Play Affine PiecewiseLinear Polynomial check_block",
     ),
     "control": Use(
         "Invert a model, close the loop",
-        "mckibben: invert track; mckibben.studying.results: Inverse Tracking; "
-        "mckibben.control: track Tracked control_law Controller BlockController tune_pid "
-        "DisturbanceObserver EstimatedLoad Twin preview_time previewed before Before slow_rise "
+        "mckibben: invert track learn; mckibben.studying.results: Inverse Tracking; "
+        "mckibben.control: track Tracked learn learned Learned control_law Controller BlockController "
+        "tune_pid DisturbanceObserver EstimatedLoad Twin preview_time previewed before Before slow_rise "
         "uncompensated; mckibben.stream: run FixedRate Deadlines Step",
     ),
     "rigs": Use(
@@ -70,11 +71,12 @@ USES = {
     ),
     "export": Use(
         "Export a model, drive a device",
-        "mckibben.export: export_c Serving state_of export_fmu export_ros2; "
+        "mckibben: export; mckibben.exporting: export_c Serving state_of export_fmu export_ros2; "
         "mckibben.link: Link LinkError Port Device State Statistics Note",
     ),
     "report": Use(
-        "Reports", "mckibben: write_report; mckibben.report: StudyFolder write_leaderboard"
+        "Reports",
+        "mckibben: write_report reproduce; mckibben.report: StudyFolder write_leaderboard",
     ),
     "errors": Use(
         "Errors and warnings",
@@ -82,7 +84,7 @@ USES = {
     ),
 }
 
-PACKAGES = ("control", "diagnosis", "export", "files", "link", "muscles", "report", "rigs")
+PACKAGES = ("control", "diagnosis", "exporting", "files", "link", "muscles", "report", "rigs")
 PACKAGES += ("signals", "stream")
 """Packages whose names are public, beside those of `mckibben` itself."""
 

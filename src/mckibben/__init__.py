@@ -10,6 +10,17 @@ The names in ``__init__.pyi`` are imported when they are first used: ``import mc
 
 from __future__ import annotations
 
+from typing import Any
+
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from mckibben.hints import absent
+
+_attached, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name when it is first used, or raise an error that leads to what there is instead."""
+    if name not in __all__:
+        raise AttributeError(absent("mckibben", name, __all__, "mckibben"), name=name)
+    return _attached(name)

@@ -1,6 +1,7 @@
 """The face of the package: what is here can be had from it, and is imported when it is first used."""
 
 from . import control as control
+from . import environments as environments
 from . import example as example
 from . import muscles as muscles
 from . import rigs as rigs
@@ -21,10 +22,6 @@ from .blocks.memoryless import Affine as Affine
 from .blocks.memoryless import PiecewiseLinear as PiecewiseLinear
 from .blocks.memoryless import Polynomial as Polynomial
 from .blocks.saving import load as load
-from .comparison.ranking import compare as compare
-from .diagnosis.bands import calibrate as calibrate
-from .diagnosis.characterization import characterize as characterize
-from .diagnosis.data_gaps import data_gaps as data_gaps
 from .errors import DataError as DataError
 from .errors import DataWarning as DataWarning
 from .errors import MckibbenError as MckibbenError
@@ -36,16 +33,30 @@ from .estimators.hysteresis.pi import EUPIEstimator as EUPIEstimator
 from .estimators.hysteresis.pi import PIEstimator as PIEstimator
 from .files import read as read
 from .files import write as write
+from .options import ReadOptions as ReadOptions
 from .recording import Recording as Recording
 from .report import write_report as write_report
 from .rigs import Rig as Rig
 from .rigs import load_rig as load_rig
+from .studying.results import Fit as Fit
 from .version import __version__ as __version__
+from .workflow import calibrate as calibrate
+from .workflow import characterize as characterize
 from .workflow import check as check
+from .workflow import compare as compare
+from .workflow import data_gaps as data_gaps
+from .workflow import estimator as estimator
+from .workflow import export as export
 from .workflow import fit as fit
+from .workflow import info as info
 from .workflow import invert as invert
+from .workflow import learn as learn
+from .workflow import models as models
 from .workflow import plan as plan
+from .workflow import plot as plot
+from .workflow import reproduce as reproduce
 from .workflow import review as review
+from .workflow import simulate as simulate
 from .workflow import study as study
 from .workflow import track as track
 

@@ -57,6 +57,19 @@ STEADY = 0.05
 constant in the run.
 """
 
+SYMBOLS = {
+    "pressure": "p",
+    "voltage": "u",
+    "displacement": "y",
+    "length": "l",
+    "contraction": r"\epsilon",
+    "angle": r"\varphi",
+    "velocity": "v",
+    "force": "F",
+    "torque": "M",
+}
+"""Symbols of quantities where no model's equations name them."""
+
 Sides = tuple[tuple[str, ...], tuple[str, ...]]
 """Inputs and outputs."""
 
@@ -228,6 +241,16 @@ def quantity(name: str) -> str:
     ('pressure', 'pressure_extensor')
     """
     return re.sub(r"_?\d+$", "", name)
+
+
+def channel_symbol(name: str) -> str:
+    r"""Return the usual symbol of a channel in LaTeX; empty for channels that have none.
+
+    >>> channel_symbol("pressure"), channel_symbol("displacement_2"), channel_symbol("valve")
+    ('p', 'y_{2}', '')
+    """
+    letter, number = SYMBOLS.get(quantity(name), ""), name.removeprefix(quantity(name)).strip("_")
+    return f"{letter}_{{{number}}}" if letter and number else letter
 
 
 def held_at_levels(recordings: Sequence[Recording], name: str) -> bool:

@@ -141,7 +141,7 @@ def _short(given: object, most: int = 1000) -> str:
     return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
 
 
-class DataError(MckibbenError):
+class DataError(MckibbenError, ValueError):
     """A recording, or a file with one, that cannot be used as it is."""
 
 

@@ -6,16 +6,30 @@ makes its flags from them, and forms their controls.
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from types import UnionType
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    TypeVar,
+    Union,
+    cast,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 from mckibben.errors import DataError, ModelError
+from mckibben.hints import KEYWORDS, nearest
+from mckibben.parsers import calibration, constant, limits, names, number, pair, setting, span
 
 Options = TypeVar("Options")
+
+RENAMED = {"inputs": "input", "outputs": "output"}
+"""Option of an earlier version -> its name."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +54,15 @@ class Option:
     parse: Callable[[str], Any] | None = None
 
 
+@dataclass(frozen=True)
+class Argument:
+    """Declaration of a positional argument: its placeholder in a help text, and what it is."""
+
+    metavar: str
+    help: str
+    several: bool = False
+
+
 def given_options(
     kind: type[Options],
     options: Options | None,
@@ -48,31 +71,97 @@ def given_options(
 ) -> Options:
     """Return options with some fields given by name; ``others`` are further names for the remedy.
 
+    Texts are parsed as on the command line; where there may be several names, a text is one.
+
     Raises
     ------
     ModelError
-        On a name that is no field.
+        On a name that is no field, which names the nearest, and on a value of another kind.
     """
     from mckibben.signals.checking import generator
 
     base: Any = options if options is not None else kind()
     if not issubclass(type(base), kind):
         problem = f"these are no {kind.__name__}, but {type(base).__name__}"
-        raise ModelError(problem, parameter="options", remedy="give those of this operation")
-    if strange := [name for name in given if name not in base.__dataclass_fields__]:
-        raise ModelError(
-            f"there is no option {strange[0]!r}",
-            remedy=f"use {', '.join((*base.__dataclass_fields__, *others))}",
+        remedy = (
+            "give data first and options by name; arrays are {'pressure': u, 'displacement': y}"
         )
-    found = replace(base, **given) if given else base
-    for name, hint in get_type_hints(kind).items():
-        if get_origin(hint) is Literal and getattr(found, name) not in get_args(hint):
-            problem = f"it cannot be {getattr(found, name)!r:.60}"
-            raise ModelError(
-                problem, parameter=name, remedy=f"use one of {', '.join(get_args(hint))}"
-            )
-    generator(getattr(found, "seed", 0))  # refuses what is no seed
-    return found
+        raise ModelError(problem, parameter="options", remedy=remedy)
+    known = (*base.__dataclass_fields__, *others)
+    given = {name if name in known else RENAMED.get(name, name): one for name, one in given.items()}
+    if strange := [name for name in given if name not in base.__dataclass_fields__]:
+        hint = nearest(strange[0], known, {k: v for k, v in KEYWORDS.items() if v in known})
+        remedy = f"use `{hint}`" if hint else f"use one of {', '.join(known)}"
+        if "settings" in known and not hint:
+            remedy = f"if a model has it, give `settings[{strange[0]}]=VALUE`; or {remedy}"
+        raise ModelError(f"there is no option {strange[0]!r}", remedy=remedy)
+    values: dict[str, Any] = {}
+    for name, hint in get_type_hints(kind, include_extras=True).items():
+        values[name] = _as_declared(hint, name, given.get(name, getattr(base, name)))
+    generator(values.get("seed", 0))  # refuses what is no seed
+    return replace(base, **values)
+
+
+def _as_declared(hint: Any, name: str, value: Any) -> Any:
+    """Return the value of an option; texts are parsed as on the command line.
+
+    Raises
+    ------
+    ModelError
+        If it is of another kind.
+    """
+    kind, option = get_args(hint)[:2]
+    if isinstance(value, str) and option.parse is not None:
+        value = parsed(option, value, name)
+        value = dict([value]) if is_mapping(kind) else value
+    if is_mapping(kind) and isinstance(value, Mapping) and option.parse is not None:
+        value = dict(
+            parsed(option, f"{key}={one}", name)
+            if isinstance(one, str) and not _fits(get_args(kind)[1], one)
+            else (key, one)
+            for key, one in value.items()
+        )
+    if isinstance(value, str) and kind in (Names, Sequence[str]) and option.parse is None:
+        value = (value,)
+    if not _fits(kind, value):
+        known = [one for part in (kind, *get_args(kind)) for one in choices(part)]
+        wanted = str(kind).replace("collections.abc.", "").replace("typing.", "")
+        remedy = f"use one of {', '.join(map(str, known))}" if known else f"give {wanted}"
+        raise ModelError(f"it cannot be {value!r:.60}", parameter=name, remedy=remedy)
+    return value
+
+
+def choices(kind: Any) -> tuple[Any, ...]:
+    """Return the values of a literal type; none of others."""
+    return get_args(kind) if get_origin(kind) is Literal else ()
+
+
+def _fits(kind: Any, value: Any) -> bool:
+    """Return whether a value is of a type, its entries too."""
+    value = value.tolist() if hasattr(value, "tolist") else value  # NumPy's
+    origin, inner = get_origin(kind), get_args(kind)
+    if kind is Any:
+        return True
+    if origin in (Union, UnionType):
+        return any(_fits(one, value) for one in inner)
+    if origin is Literal:
+        return value in inner
+    if is_mapping(kind):
+        return isinstance(value, Mapping) and all(_fits(inner[1], one) for one in value.values())
+    if origin is tuple and inner[-1] is not Ellipsis:
+        alike = isinstance(value, Sequence) and not isinstance(value, str)
+        return alike and len(value) == len(inner) and all(map(_fits, inner, value))
+    if origin in (Sequence, tuple):
+        alike = isinstance(value, Sequence) and not isinstance(value, str)
+        return alike and all(_fits(inner[0], one) for one in value)
+    if isinstance(value, bool) and kind is not bool:
+        return False
+    return isinstance(value, {float: float | int, Path: str | Path}.get(kind, kind))
+
+
+def is_mapping(kind: Any) -> bool:
+    """Return whether a type is a mapping."""
+    return isinstance(get_origin(kind), type) and issubclass(get_origin(kind), Mapping)
 
 
 def parsed(option: Option, text: str, name: str) -> Any:
@@ -93,82 +182,9 @@ def parsed(option: Option, text: str, name: str) -> Any:
         ) from None
 
 
-# Parsers of options. A ValueError is raised for a text of another form.
+Names = str | Sequence[str] | None
+"""A name or several; None where they are found by themselves."""
 
-
-def pair(text: str) -> tuple[str, str]:
-    """Return name and value of ``NAME=VALUE``."""
-    name, _, value = text.partition("=")
-    if not (name and value):
-        raise ValueError
-    return name.strip(), value.strip()
-
-
-def setting(text: str) -> tuple[str, Any]:
-    """Return name and value of ``NAME=VALUE``, the value parsed as JSON if possible.
-
-    >>> setting("n-operators=4"), setting("initial=rest")
-    (('n_operators', 4), ('initial', 'rest'))
-    """
-    name, value = pair(text)
-    try:
-        found = json.loads(value)
-    except (ValueError, RecursionError):
-        found = None if value.lower() == "none" else value
-    return name.replace("-", "_"), tuple(found) if isinstance(found, list) else found
-
-
-def number(text: str) -> tuple[str, float]:
-    """Return name and number of ``NAME=NUMBER``."""
-    name, value = pair(text)
-    return name, float(value)
-
-
-def constant(text: str) -> tuple[str, tuple[float, str]]:
-    """Return channel, value and unit of ``force=200 g``."""
-    name, value = pair(text)
-    found = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*)?", value)
-    if found is None:
-        raise ValueError
-    return name, (float(found[1]), found[2] or "")
-
-
-def calibration(text: str) -> tuple[str, tuple[str, float, float, str]]:
-    """Return channel, and column, gain, offset and unit of ``pressure=A0:2.5:-0.5:bar``."""
-    channel, value = pair(text)
-    column, gain, offset, unit = value.rsplit(":", 3)
-    if not (column and unit):
-        raise ValueError
-    return channel, (column, float(gain), float(offset), unit)
-
-
-def span(text: str) -> tuple[float, float]:
-    """Return the two numbers of ``START:END``, infinite where left out."""
-    start, end = text.split(":")
-    return float(start or "-inf"), float(end or "inf")
-
-
-def limits(text: str) -> tuple[str, tuple[float | None, ...]]:
-    """Return channel and limits of ``CHANNEL=LOW:HIGH[:RATE]``, None where left out.
-
-    >>> limits("pressure=1:5.5"), limits("force=::20")
-    (('pressure', (1.0, 5.5)), ('force', (None, None, 20.0)))
-    """
-    channel, value = pair(text)
-    parts = value.split(":")
-    if not 2 <= len(parts) <= 3:
-        raise ValueError
-    return channel, tuple(float(part) if part else None for part in parts)
-
-
-def names(text: str) -> str | tuple[str, ...]:
-    """Return the names in ``all``, ``quick``, ``none`` or ``NAME,NAME``."""
-    if text in ("all", "quick", "none"):
-        return text
-    return tuple(name.strip() for name in text.split(",") if name.strip())
-
-
-Names = tuple[str, ...] | None
 Seed = Annotated[int, Option("Seed of everything random.")]
 Jobs = Annotated[int | None, Option("Processes. Default: as many as cores.")]
 Settings = Annotated[
@@ -190,12 +206,43 @@ Fields = Annotated[
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How files are read; see `mckibben.read` for all but the last three.
+    """How data are read, wherever they are.
 
     Parameters
     ----------
-    calibration : mapping of str to (str, float, float, str)
-        Channel -> column, gain, offset and unit.
+    columns : mapping of str to str, optional
+        Channel -> column, by its header with or without the unit; ``data[1]`` is the first column of a
+        matrix ``data``. Standard channels are found by common names (``p``, ``Druck``, ...)
+        without it. ``time`` is a channel here. Other columns with flaws are then left out, with a note.
+    units : mapping of str to str, optional
+        Channel -> unit, such as ``{"pressure": "kPa"}``; overrides what the file states.
+    constants : mapping of str to (float, str), optional
+        Channel -> value and unit of a constant quantity without a column, such as ``{"force": (200,
+        "g")}``; a mass is converted to its weight. Overrides columns.
+    calibration : mapping of str to (float, float) or (str, float, float, str), optional
+        Channel -> gain and offset; or column, gain, offset and unit. The channel is gain times the
+        column, plus offset, in that unit, or else that of ``units`` or of the header.
+        ``{"displacement": (-1, 0)}`` reverses a sign.
+    rate, sample_time : float, optional
+        Samples per second, or time between samples [s], positive, where there is no column of times.
+        Without either, a scalar in the file, such as ``fs``, is used, or the recording has no time.
+        Channels with separate times are resampled to it.
+    gaps : {"error", "split", "interpolate"}
+        Treatment of missing time (a step of more than three median steps) and missing samples
+        (blank, NaN, infinite, or a code such as -9999): raise an error, split into several
+        recordings, or interpolate linearly. Bridged samples are not fitted: ``meta["bridged"]`` has
+        their first and last times.
+    raw : bool
+        Whether codes for missing samples, and counters that seem to wrap, are read as measured.
+    rest_length : float, optional
+        Length of the muscle at displacement 0 [mm], stored in ``meta``: contraction, displacement
+        and length are then converted to each other as needed.
+    header : int
+        Line of a text with the names of columns, counted from 1; 0 to detect it.
+    skip : int
+        Lines after it that are left out.
+    encoding : str, optional
+        Of a text, such as ``"cp932"``; default as found.
     between : (float, float), optional
         Part of every recording [s].
     resample : float, optional
@@ -222,15 +269,18 @@ class ReadOptions:
         ),
     ] = field(default_factory=dict)
     calibration: Annotated[
-        Mapping[str, tuple[str, float, float, str]],
+        Mapping[str, tuple[float, float] | tuple[str, float, float, str]],
         Option(
-            "A channel in raw volts or counts, as pressure=A0:2.5:-0.5:bar.",
-            "CHANNEL=COLUMN:GAIN:OFFSET:UNIT",
+            "A channel in raw volts or counts, as pressure=A0:2.5:-0.5:bar, or pressure=2.5:-0.5.",
+            "CHANNEL=[COLUMN:]GAIN:OFFSET[:UNIT]",
             "--calibrate",
             calibration,
         ),
     ] = field(default_factory=dict)
     rate: Annotated[float | None, Option("Samples per second, without a time column.", "HZ")] = None
+    sample_time: Annotated[
+        float | None, Option("Time between samples [s], without a time column.", "SECONDS")
+    ] = None
     gaps: Annotated[
         Literal["error", "split", "interpolate"],
         Option("Treatment of gaps in time and missing samples."),
@@ -246,51 +296,59 @@ class ReadOptions:
     skip: Annotated[int, Option("Lines after the header that are left out.", "N")] = 0
     encoding: Annotated[str | None, Option("Encoding of a text. Default: as found.", "NAME")] = None
     between: Annotated[
-        tuple[float, float] | None,
+        tuple[float | None, float | None] | None,
         Option("Part of every recording [s]; either may be left out.", "START:END", "", span),
     ] = None
     resample: Annotated[
         float | None, Option("Sample time to resample to, without aliasing.", "SECONDS")
     ] = None
     zero: Annotated[
-        tuple[str, ...],
+        Sequence[str],
         Option("Channel set to 0 where the input is lowest; repeatable.", "CHANNEL"),
     ] = ()
 
-    def arguments(self) -> dict[str, Any]:
-        """Return the arguments of `mckibben.read`."""
+    def __post_init__(self) -> None:
+        """Name the columns and units of calibrated channels with the others."""
         columns, units = dict(self.columns), dict(self.units)
-        for channel, (column, _, _, unit) in self.calibration.items():
-            columns[channel] = column
-            units.setdefault(channel, unit)
-        return {
-            "columns": columns,
-            "units": units,
-            "calibration": {
-                name: (gain, zero) for name, (_, gain, zero, _) in self.calibration.items()
-            },
-            "constants": dict(self.constants),
-            "rate": self.rate,
-            "gaps": self.gaps,
-            "raw": self.raw,
-            "rest_length": self.rest_length,
-            "header": self.header,
-            "skip": self.skip,
-            "encoding": self.encoding,
-        }
+        lines: dict[str, tuple[float, float]] = {}
+        for channel, given in self.calibration.items():
+            if len(given) == 2:
+                lines[channel] = given
+                continue
+            column, gain, offset, unit = given
+            for stated, value in ((columns, column), (units, unit)):
+                if stated.setdefault(channel, value) != value:
+                    problem = f"it is {stated[channel]!r}, and {value!r} in the calibration"
+                    raise DataError(problem, channel=channel, remedy="give one of them")
+            lines[channel] = gain, offset
+        merged = {"columns": columns, "units": units, "calibration": lines}
+        for name, mapping in merged.items():
+            object.__setattr__(self, name, mapping)
+
+    @property
+    def lines(self) -> Mapping[str, tuple[float, float]]:
+        """Gain and offset of every calibrated channel."""
+        return cast("Mapping[str, tuple[float, float]]", self.calibration)
 
 
 @dataclass(frozen=True)
-class FitOptions:
-    """Options of `fit`."""
+class ChannelOptions:
+    """Options of `info` and `data_gaps`, and the first of others: what drives, and what moves."""
 
     input: Inputs = None
     output: Outputs = None
+
+
+@dataclass(frozen=True)
+class FitOptions(ChannelOptions):
+    """Options of `fit`."""
+
     prior: Annotated[
-        str | None, Option("A similar muscle (muscles list), or a data sheet (.toml).", "NAME|FILE")
+        str | Path | Any | None,
+        Option("A similar muscle (muscles list), or a data sheet (.toml).", "NAME|FILE"),
     ] = None
     residual_of: Annotated[
-        Path | None,
+        Path | Any | None,
         Option("Saved model (JSON) that is subtracted first; the sum of both is saved.", "MODEL"),
     ] = None
     target: Annotated[
@@ -304,12 +362,22 @@ class FitOptions:
 
 
 @dataclass(frozen=True)
-class CompareOptions:
+class CharacterizeOptions(ChannelOptions):
+    """Options of `characterize`: of several inputs, those that only schedule."""
+
+    scheduling: Annotated[
+        Sequence[str],
+        Option("Other input: use only samples where it is constant; repeatable.", "CHANNEL"),
+    ] = ()
+
+
+@dataclass(frozen=True)
+class CompareOptions(ChannelOptions):
     """Options of `compare` and `study`: data, models and processes.
 
     Parameters
     ----------
-    inputs, outputs : sequence of str, optional
+    input, output : str or sequence of str, optional
         ``pressure`` and ``displacement``, for several muscles ``pressure_1`` and so on. For several
         outputs, models are chosen by the mean error.
     load : str, optional
@@ -328,13 +396,11 @@ class CompareOptions:
         Whether to allow test recordings that were fitted, and repeated training recordings.
     """
 
-    inputs: Inputs = None
-    outputs: Outputs = None
     load: Annotated[str | None, Option("Load that varies: one model for all loads.", "CHANNEL")] = (
         None
     )
     models: Annotated[
-        str | Sequence[str],
+        str | Sequence[str] | Mapping[str, Any],
         Option("Models by short name (info --models), or a quick choice.", "all|quick|NAME,...",
                parse=names),
     ] = "all"  # fmt: skip
@@ -348,13 +414,22 @@ class CompareOptions:
     allow_shared: Annotated[
         bool, Option("Allow test data that were fitted; every result states it.")
     ] = False
+    quick: Annotated[bool, Option("Models that take seconds; same as --models quick.")] = False
+
+    def __post_init__(self) -> None:
+        """Take the quick models where none are named."""
+        if self.quick and self.models not in ("all", "quick"):
+            problem = "it chooses models, and some are named"
+            raise ModelError(problem, parameter="quick", remedy="leave one of both out")
+        if self.quick:
+            object.__setattr__(self, "models", "quick")
 
 
 @dataclass(frozen=True)
 class StudyOptions(CompareOptions):
     """Options of `study`: those of `compare`, and those of a log and a closed loop."""
 
-    rig: Annotated[str | None, Option("Several muscles: rig to close a loop on.")] = None
+    rig: Annotated[str | Any | None, Option("Several muscles: rig to close a loop on.")] = None
     compensator: Annotated[
         Path | Any | None, Option("Of a loop's log: the compensator that ran (JSON).", "MODEL")
     ] = None
@@ -399,6 +474,9 @@ class TrackOptions:
     pressure_loop: Annotated[
         bool, Option("Correct pressures by measured ones, as regulators do.")
     ] = True
+    controller_out: Annotated[
+        Path | None, Option("Controller to write (JSON), for export.", "FILE")
+    ] = None
     fields: Fields = field(default_factory=dict)
     seed: Seed = 0
 
@@ -416,6 +494,78 @@ class LearnOptions:
     best: Annotated[
         bool, Option("Write the compensator of the best repetition, not the next one to try.")
     ] = False
+
+
+@dataclass(frozen=True)
+class SimulateOptions:
+    """Options of `simulate`: how the run begins, and the band."""
+
+    initial: Annotated[
+        Literal["measured", "first_sample", "virgin"],
+        Option(
+            "Memory before the first sample: measured (from the first measured output), first_sample "
+            "(at rest at the first input), or virgin."
+        ),
+    ] = "measured"
+    interval: Annotated[
+        float | None,
+        Option("With a calibrated model: add the band of this coverage, as 0.9.", "LEVEL"),
+    ] = None
+    fields: Fields = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CalibrateOptions:
+    """Options of `calibrate`: what a new run is like, and what was fitted."""
+
+    exchangeable: Annotated[
+        Literal["auto", "run", "block"],
+        Option("What a new run is like: runs, or long blocks of runs. auto: runs from 9 on."),
+    ] = "auto"
+    fitted: Annotated[
+        Any, Option("Recordings the model was fitted to (refused); repeatable.", "FILE")
+    ] = ()
+
+
+@dataclass(frozen=True)
+class ReviewOptions:
+    """Options of `review`: what ran, and whether its model is fitted again."""
+
+    model: Annotated[Path | Any | None, Option("The model that ran, or its inverse.", "MODEL")] = (
+        None
+    )
+    compensator: Annotated[Path | Any | None, Option("The compensator that ran.", "MODEL")] = None
+    refit: Annotated[bool, Option("Fit the model again to the log.")] = True
+    seed: Seed = 0
+
+
+@dataclass(frozen=True)
+class PlotOptions(ChannelOptions):
+    """Options of `plot`: what is drawn."""
+
+    model: Annotated[
+        Path | Any | None, Option("Saved model to draw against the recordings.", "MODEL")
+    ] = None
+    kind: Annotated[
+        str | None,
+        Option("time, loop (default); with a model also fit (default), loops, residuals."),
+    ] = None
+    width: Annotated[
+        Literal[1, 2] | None,
+        Option("Width: 1 column of a journal (88 mm) or 2 (180 mm). Default: by the panels."),
+    ] = None
+
+
+@dataclass(frozen=True)
+class ReproduceOptions:
+    """Options of `reproduce`: the rig, and how much is done."""
+
+    quick: Annotated[bool, Option("Skip the slow parts.")] = False
+    rig: Annotated[
+        Any, Option("Rig to record, and to close loops on. Default: the paper's.", "RIG")
+    ] = None
+    seed: Seed = 0
+    jobs: Jobs = None
 
 
 @dataclass(frozen=True)
@@ -467,8 +617,8 @@ class InvertOptions:
             raise ModelError(
                 f"`{both[0]}` and `{both[1]}` exclude each other", remedy=f"leave out `{both[1]}`"
             )
-        for way, names in {"adaptive": ("time", "noise"), "predictive": PREDICTIVE}.items():
-            alone = [name for name in names if getattr(self, name) is not None]
+        for way, needing in {"adaptive": ("time", "noise"), "predictive": PREDICTIVE}.items():
+            alone = [name for name in needing if getattr(self, name) is not None]
             if alone and not ways[way]:
                 raise ModelError(
                     f"it is of a compensator with `{way}`",

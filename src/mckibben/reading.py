@@ -3,60 +3,24 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from mckibben.errors import DataError
+from mckibben.files.memory import Data, InMemory, items
 from mckibben.options import ReadOptions
-from mckibben.recording import Recording, is_frame
-from mckibben.recording import listed as recordings_of
+from mckibben.recording import Recording
+from mckibben.system.showing import Result
 
 if TYPE_CHECKING:
     from mckibben.channels import Channels, Names
     from mckibben.diagnosis.data_gaps import Gap
     from mckibben.files.choosing import Seen
 
-Data = Recording | str | Path | Sequence[Recording | str | Path]
-"""Recordings, or files or folders with some."""
-
-
-def prepared(recordings: list[Recording], reading: ReadOptions) -> list[Recording]:
-    """Return recordings cut, resampled and zeroed."""
-    from mckibben.channels import by_name
-    from mckibben.signals import cut, resample, zeroed
-
-    if reading.between is not None:
-        recordings = [cut(one, *reading.between) for one in recordings]
-    if reading.resample is not None:
-        recordings = [resample(one, reading.resample) for one in recordings]
-    if reading.zero:
-        drives = [(*by_name([one])[0], "pressure")[0] for one in recordings]
-        pairs = zip(recordings, drives, strict=True)
-        recordings = [zeroed(one, list(reading.zero), over) for one, over in pairs]
-    return recordings
-
-
-def items(data: Any) -> list[Recording | Path]:
-    """Return data as a list of recordings and files; data frames are converted to recordings.
-
-    Raises
-    ------
-    DataError
-        If there is anything else.
-    """
-    single = is_frame(data) or isinstance(data, Recording | str | Path | np.ndarray)
-    listed = [data] if single or not isinstance(data, Iterable) else list(data)
-    found: list[Recording | Path] = []
-    for one in listed:
-        if isinstance(one, str | Path):
-            found.append(Path(one))
-        else:
-            found += recordings_of(one)
-    return found
+DERIVED = "displacement"
+"""Channel that the rest length makes of another where none is named."""
 
 
 def files_of(data: Data) -> list[Path]:
@@ -64,27 +28,37 @@ def files_of(data: Data) -> list[Path]:
     return [one for one in items(data) if isinstance(one, Path)]
 
 
-def loaded(data: Data) -> list[Recording]:
-    """Return the recordings among data."""
-    return [one for one in items(data) if isinstance(one, Recording)]
+def loaded(data: Data) -> list[InMemory]:
+    """Return what of data is in memory."""
+    return [one for one in items(data) if not isinstance(one, Path)]
 
 
 def read_files(
-    data: Data,
-    channels: Sequence[str] | None,
-    reading: ReadOptions | None = None,
+    data: Data, channels: Sequence[str] | None, reading: ReadOptions | None = None
 ) -> list[Recording]:
-    """Return recordings, and those in files and folders, which must have some channels."""
+    """Return the recordings in data, which must have some channels, however short they are."""
     from mckibben.files import read
 
-    reading = reading or ReadOptions()
-    found: list[Recording] = []
-    for one in items(data):
-        if isinstance(one, Recording):
-            found.append(one)
-        else:
-            found += read(one, channels=channels, informative=False, **reading.arguments())
-    return prepared(found, reading)
+    return read(data, reading, channels=channels, informative=False)
+
+
+def only(recordings: list[Recording]) -> Recording:
+    """Return the only one of recordings.
+
+    Raises
+    ------
+    DataError
+        If there is none, or there are several.
+    """
+    if not recordings:
+        raise DataError("there is no recording", remedy="give one")
+    if len(recordings) > 1:
+        raise DataError(
+            f"there are {len(recordings)} recordings, or parts between gaps",
+            file=recordings[0].source,
+            remedy="give one, cut it first, or give `gaps=interpolate`",
+        )
+    return recordings[0]
 
 
 def read_sides(
@@ -110,24 +84,33 @@ def read_sides(
         As `mckibben.read`, of the channels that are needed.
     """
     reading = reading or ReadOptions()
-    named = [n for names in words for n in ([names] if isinstance(names, str) else names or ())]
-    with warnings.catch_warnings(record=True) as caught:
-        found = [read_files(some, named, reading) for some in data]
-    if reading.rest_length is not None and not named:
-        found = [[one.with_derived(["displacement"]) for one in some] for some in found]
-    channels = resolve([one for some in found for one in some])
-    if any(name not in one for runs in found for one in runs for name in channels.sides):
-        needed = [*channels.sides, *named]
-        return [read_files(some, needed, reading) for some in data], channels  # or raises
-    for one in caught:
-        warnings.warn(one.message, one.category, stacklevel=2)
-    return found, channels
+    named = [name for names in words for name in _listed(names)]
+    channels: Channels | None = None
+    for needed in ((), None):  # flaws of columns matter where what is left of others does not do
+        try:
+            with warnings.catch_warnings(record=True) as caught:
+                found = [read_files(some, needed, reading) for some in data]
+            if reading.rest_length is not None:
+                found = [[one.with_derived(named or [DERIVED]) for one in some] for some in found]
+            channels = resolve([one for some in found for one in some])
+        except DataError:
+            if needed is None:
+                raise
+            continue
+        every = [one for runs in found for one in runs]
+        wanted = (*channels.sides, *(named if needed is not None else ()))
+        if all(name in one for one in every for name in wanted):
+            for one in caught:
+                warnings.warn(one.message, one.category, stacklevel=2)
+            return found, channels
+    assert channels is not None
+    return [read_files(some, [*channels.sides, *named], reading) for some in data], channels
 
 
 def read_loop(
     data: Data,
-    input: str | None = None,  # noqa: A002
-    output: str | None = None,
+    input: Names = None,  # noqa: A002
+    output: Names = None,
     reading: ReadOptions | None = None,
     others: Sequence[str] = (),
 ) -> tuple[list[Recording], str, str]:
@@ -147,8 +130,8 @@ def read_loop(
     return recordings, moved_by(recordings, given) if input is None else given, wanted
 
 
-@dataclass(frozen=True)
-class Contents:
+@dataclass(frozen=True, repr=False)
+class Contents(Result):
     """Contents of files.
 
     Parameters
@@ -163,6 +146,30 @@ class Contents:
     columns: Mapping[str, list[Seen]]
     recordings: list[Recording]
     gaps: tuple[Gap, ...] | str
+
+    face: ClassVar[str] = "contents"
+
+    @property
+    def drawn(self) -> list[Recording]:
+        """What a plot of it draws."""
+        return self.recordings
+
+    def to_frame(self) -> Any:
+        """Return the channels as a data frame: recording, channel, unit, lowest and highest."""
+        import pandas as pd
+
+        rows = [
+            {
+                "recording": one.name,
+                "channel": name,
+                "unit": one.units[name],
+                "min": float(samples.min()),
+                "max": float(samples.max()),
+            }
+            for one in self.recordings
+            for name, samples in one.channels.items()
+        ]
+        return pd.DataFrame(rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the samples, for JSON."""
@@ -190,13 +197,10 @@ class Contents:
         return {**read, "data_gaps": plain(self.gaps)}
 
 
-def look(
-    files: Sequence[Path],
-    reading: ReadOptions,
-    inputs: Sequence[str] | None = None,
-    outputs: Sequence[str] | None = None,
+def contents(
+    data: Data, reading: ReadOptions, inputs: Names = None, outputs: Names = None
 ) -> Contents:
-    """Return the contents of files, and the data gaps of the recordings in them.
+    """Return the contents of data, and the data gaps of the recordings in them.
 
     Raises
     ------
@@ -205,19 +209,18 @@ def look(
     """
     from mckibben.diagnosis.data_gaps import data_gaps
     from mckibben.files import read
-    from mckibben.files.reading import look as look_into
+    from mckibben.files.reading import look
 
-    named = [*(inputs or ()), *(outputs or ())] or None
-    arguments = {"channels": named, "informative": False, **reading.arguments()}
+    named = [*_listed(inputs), *_listed(outputs)] or None
     recordings: list[Recording] = []
     columns: dict[str, list[Seen]] = {}
-    for file in files:
-        if file.is_dir():
-            recordings += read(file, **arguments)
+    for one in items(data):
+        if isinstance(one, Recording) or (isinstance(one, Path) and one.is_dir()):
+            recordings += read(one, reading, channels=named, informative=False)
         else:
-            found, columns[str(file)] = look_into(file, **arguments)
+            found, seen = look(one, reading, named)
             recordings += found
-    recordings = prepared(recordings, reading)
+            columns[str(one) if isinstance(one, Path) else found[0].name] = seen
     gaps: tuple[Gap, ...] | str
     try:
         gaps = data_gaps(recordings, inputs, outputs)
@@ -226,3 +229,7 @@ def look(
             raise
         gaps = str(error)
     return Contents(columns, recordings, gaps)
+
+
+def _listed(names: Names) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names or ())

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import builtins
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple, SupportsFloat, SupportsIndex
+from typing import Any, ClassVar, NamedTuple, Protocol, Self, SupportsFloat, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array, check_finite
 from mckibben.errors import DataError
-from mckibben.system.showing import DrawsItself
+from mckibben.registry import load
+from mckibben.system.atomic import digest
+from mckibben.system.showing import DrawsItself, Hinted
 
 STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
     {
@@ -31,6 +34,16 @@ STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
     }
 )
 """Units of the standard channels; ``pressure_2`` and ``pressure_extensor`` follow ``pressure``."""
+
+
+class Frame(Protocol):
+    """What a data frame is recognized by, of pandas or alike."""
+
+    columns: Any
+    attrs: Any
+
+    def to_numpy(self) -> Any:
+        """Return its values."""
 
 
 class Plausible(NamedTuple):
@@ -73,6 +86,9 @@ PERIODIC = "periodic"
 REST_LENGTH = 'the rest length (`rest_length=MM`, or meta["rest_length"] in Python)'
 """Remedy that states the rest length."""
 
+OWN = "mckibben"
+"""Entry of ``attrs`` of a data frame that was a recording: its grid, units and meta."""
+
 SAME_TIME = 1e-3
 """Relative difference up to which sample times are equal."""
 
@@ -114,13 +130,14 @@ def conversion(wanted: str, given: str, rest_length: float | None) -> tuple[floa
 
 
 @dataclass(frozen=True, eq=False)
-class Recording(DrawsItself):
+class Recording(Hinted, DrawsItself):
     """Samples of one run, on a uniform time grid.
 
     Parameters
     ----------
     channels : mapping of str to array_like, shape (n,)
         The samples; finite, all of the same length, at least two. Copied, and read-only after.
+        ``time`` [s], uniform, is the sample time and the start, and no channel.
     sample_time : float or None
         Time between samples [s], positive; None where the recording has no time, which only
         rate-independent models accept.
@@ -146,7 +163,18 @@ class Recording(DrawsItself):
     start_time: float = 0.0
     meta: Mapping[str, Any] = field(default_factory=dict)
 
+    def __new__(cls, *_: Any, **given: Any) -> Self:
+        """Refuse channels by keyword."""
+        if strange := [name for name in given if name not in cls.__dataclass_fields__]:
+            raise DataError(
+                f"there is no argument {strange[0]!r}",
+                remedy='give channels by name: Recording({"pressure": u}, sample_time=0.01)',
+            )
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
+        if is_frame(self.channels):
+            raise DataError("it is a data frame", remedy="read it with mckibben.read")
         for what, named in (
             ("channels", self.channels),
             ("units", self.units),
@@ -157,6 +185,7 @@ class Recording(DrawsItself):
                     f"{what} cannot be {named!r:.60}", remedy='give them by name: {"pressure": ...}'
                 )
         channels = {name: _frozen(name, samples) for name, samples in self.channels.items()}
+        times = channels.pop("time", None)
         if not channels:
             raise DataError(
                 "a recording needs at least one channel", remedy="name a column to read"
@@ -171,6 +200,13 @@ class Recording(DrawsItself):
                 f"{min(lengths.values())} sample(s) are too few", remedy="give at least two samples"
             )
         step: Any = self.sample_time
+        if times is not None:
+            if step is not None or self.units.get("time", "s") != "s":
+                problem = "a recording has times [s], or a sample time"
+                raise DataError(problem, channel="time", remedy="leave out one of them")
+            step, start = _grid(times)
+            object.__setattr__(self, "sample_time", step)
+            object.__setattr__(self, "start_time", start)
         if step is not None and not (isinstance(step, SupportsFloat) and 0 < float(step) < np.inf):
             raise DataError(
                 f"a sample time of {step!r:.60} s is impossible",
@@ -187,7 +223,7 @@ class Recording(DrawsItself):
                     channel=name,
                     remedy="convert it, or read the file with mckibben.read, which converts",
                 )
-        strangers = set(self.units) - set(channels)
+        strangers = set(self.units) - set(channels) - {"time"}
         if strangers:
             raise DataError(
                 f"units are given for absent channels {sorted(strangers)}", remedy="drop them"
@@ -230,8 +266,29 @@ class Recording(DrawsItself):
     def __contains__(self, channel: object) -> bool:
         return channel in self.channels
 
-    def __getitem__(self, channel: str) -> Array:
-        """Return the samples of one channel, shape (n,), read-only."""
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of the channels, as a data frame does."""
+        return iter(self.channels)
+
+    @overload
+    def __getitem__(self, channel: str) -> Array: ...
+    @overload
+    def __getitem__(self, channel: builtins.slice | list[str]) -> Recording: ...
+    def __getitem__(self, channel: str | builtins.slice | list[str]) -> Array | Recording:
+        """Return the samples of a channel, shape (n,); or the recording of a time [s], or of channels.
+
+        Samples are read-only. ``run["pressure"]``, ``run[2.0:5.0]``, ``run[["pressure", "force"]]``.
+        """
+        if isinstance(channel, builtins.slice):
+            return self._during(channel)
+        if isinstance(channel, list):
+            return self.select(channel)
+        if not isinstance(channel, str):
+            raise DataError(
+                f"a channel is named, and this is {type(channel).__name__}",
+                file=self.source,
+                remedy="use .slice(start, stop) of samples, a list of names, or .matrix(names)[rows]",
+            )
         if channel not in self.channels:
             remedy = f"name one of them, or map a column with `columns[{channel}]=COLUMN`"
             if any(conversion(channel, name, 1.0) for name in self.channels):
@@ -242,6 +299,16 @@ class Recording(DrawsItself):
                 remedy=remedy,
             )
         return self.channels[channel]
+
+    def _during(self, wanted: builtins.slice) -> Recording:
+        ends = (wanted.start, wanted.stop)
+        if any(isinstance(end, SupportsIndex) for end in ends) or wanted.step is not None:
+            raise DataError(
+                f"[{wanted.start}:{wanted.stop}] may be samples or seconds",
+                file=self.source,
+                remedy="use .slice(start, stop) of samples, or decimals of seconds, as [2.0:5.0]",
+            )
+        return self.between(*ends)
 
     @property
     def n_samples(self) -> int:
@@ -337,12 +404,12 @@ class Recording(DrawsItself):
         Parameters
         ----------
         frame : pandas.DataFrame
-            Its columns are channels, in the package's units (bar, mm, N, s, rad). A column or an index
-            named ``time`` [s], or an index of dates or durations, is the time grid.
+            What `to_frame` returned; or any other, which is understood as a file with its headers: see
+            `mckibben.read`. A column or an index of times is the time grid.
         sample_time : float, optional
             Time between rows [s], without such a column; none where neither is given.
         units : mapping of str to str, optional
-            Units of channels that the package has no unit for.
+            Channel -> unit.
         **meta
             What else is known, as ``name="run 1"``.
 
@@ -351,19 +418,17 @@ class Recording(DrawsItself):
         DataError
             On times that are not uniform, and samples that are none.
         """
-        start, known, columns = 0.0, frame.attrs.get("mckibben", {}), frame
-        stamps = frame.index
-        if "time" in frame:
-            stamps, columns = frame["time"], frame.drop(columns="time")
-        kind = stamps.dtype.kind
-        if stamps.name == "time" or kind in "mM":
-            time = stamps.to_numpy(f"{kind}8[ns]" if kind in "mM" else None)
-            seconds = (time - time[:1]) / np.timedelta64(1, "s") if kind in "mM" else time
-            sample_time, start = _grid(_frozen("time", seconds), *known.get("grid") or ())
-        channels = {str(name): columns[name].to_numpy() for name in columns}
-        carried = {name: unit for name, unit in known.get("units", {}).items() if name in channels}
-        units = carried | dict(units or {})
-        return cls(channels, sample_time, units, start, known.get("meta", {}) | meta)
+        known = frame.attrs.get(OWN, {})
+        if not is_own(frame):
+            read = load("readers", "table")
+            options = {"sample_time": sample_time, "units": units or {}}
+            found, *more = read(frame, informative=False, **options)
+            if more:
+                raise DataError("it has several recordings", remedy="use `mckibben.read`")
+            return cls(**vars(found) | {"meta": {**found.meta, **meta}})
+        channels = {str(name): frame[name].to_numpy() for name in frame}
+        step, start = known["grid"] or (None, 0.0)
+        return cls(channels, step, known["units"], start, known["meta"] | meta)
 
     def to_frame(self) -> Any:
         """Return the channels as a data frame of pandas over time [s]; the inverse of `from_frame`."""
@@ -373,7 +438,7 @@ class Recording(DrawsItself):
         frame = pd.DataFrame(dict(self.channels), index=index)
         grid = None if self.sample_time is None else (self.sample_time, self.start_time)
         about = {"grid": grid, "units": dict(self.units), "meta": dict(self.meta)}
-        frame.attrs["mckibben"] = about
+        frame.attrs[OWN] = about | {"digest": _frame_digest(frame)}
         return frame
 
     def with_derived(self, channels: Iterable[str]) -> Recording:
@@ -386,6 +451,45 @@ class Recording(DrawsItself):
                         found[wanted] = line[0] * samples + line[1]
                         break
         return self.with_channels(**found) if found else self
+
+    def between(self, start: float | None = None, stop: float | None = None) -> Recording:
+        """Return the samples from ``start`` up to, not including, ``stop``, in seconds of its own time.
+
+        They may lie outside of it, start before stop; default from its first, to its last sample.
+
+        Raises
+        ------
+        DataError
+            If it has no time, or fewer than two samples are left.
+        """
+        step = sample_time_of(self, "be cut by time", "use Recording.slice, which counts samples")
+        ends = (-np.inf if start is None else start, np.inf if stop is None else stop)
+        first, last = (
+            int(np.clip(np.ceil((end - self.start_time) / step - 1e-6), 0, len(self)))
+            for end in ends
+        )
+        if last - first < 2:
+            raise DataError(
+                f"there are {max(last - first, 0)} samples from {ends[0]:g} to {ends[1]:g} s",
+                file=self.source,
+                remedy=f"stay within {self.time[0]:g} and {self.time[-1]:g} s",
+            )
+        return self.slice(first, last)
+
+    def resample(self, sample_time: float) -> Recording:
+        """Return it at another sample time [s], without aliasing; see `mckibben.signals.resample`."""
+        found: Recording = load("readers", "resample")(self, sample_time)
+        return found
+
+    def to_xarray(self) -> Any:
+        """Return the channels as a data set of xarray over time [s], with units as attributes."""
+        try:
+            import xarray
+        except ImportError:
+            problem = "data sets need the library xarray"
+            raise DataError(problem, remedy="pip install xarray, or use to_frame()") from None
+        samples = {n: ("time", x, {"units": self.units[n]}) for n, x in self.channels.items()}
+        return xarray.Dataset(samples, {"time": self.time}, dict(self.meta))
 
     def with_meta(self, **meta: Any) -> Recording:
         """Return a recording with entries of ``meta`` added or replaced."""
@@ -513,6 +617,19 @@ def _grid(time: Array, step: float = 0.0, start: float = 0.0) -> tuple[float, fl
             remedy="resample the frame, or write it to a CSV and read that",
         )
     return float(steps.mean()), float(time[0])
+
+
+def is_own(frame: Any) -> bool:
+    """Return whether a data frame is unchanged since `Recording.to_frame` returned it."""
+    known = frame.attrs.get(OWN)
+    return known is not None and known["digest"] == _frame_digest(frame)
+
+
+def _frame_digest(frame: Any) -> str:
+    """Return a digest of the names and values of a data frame, by which changes are seen."""
+    names = repr([frame.index.name, *frame.columns]).encode()
+    tables = [frame.index.to_numpy(), *(frame[name].to_numpy() for name in frame)]
+    return digest(names + b"".join(np.ascontiguousarray(one).tobytes() for one in tables))
 
 
 def is_frame(given: object) -> bool:

@@ -6,6 +6,7 @@ entry points in the groups ``mckibben.blocks``, ``mckibben.estimators`` and so o
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -136,9 +137,13 @@ PLUGINS: dict[str, dict[str, str]] = {
     },
     "faces": {
         "card": "mckibben.report.notebook:card",
+        "lines": "mckibben.report.text:shown",
         "plot": "mckibben.report.figures:plot",
     },
     "models": {},
+    "operations": {
+        "simulate": "mckibben.workflow:simulate",
+    },
     "papers": {
         "activation-pressure": "mckibben.papers.activation_pressure.run:run",
         "field-models": "mckibben.papers.field_models.run:run",
@@ -152,6 +157,10 @@ PLUGINS: dict[str, dict[str, str]] = {
         "mpi-narmax": "mckibben.papers.mpi_narmax.protocol:mpi_narmax",
         "multistate-friction": "mckibben.papers.multistate_friction.protocol:multistate_friction",
         "sdchm": "mckibben.papers.sdchm.protocol:sdchm",
+    },
+    "readers": {
+        "resample": "mckibben.signals:resample",
+        "table": "mckibben.files:read",
     },
     "setups": {
         "arm": "mckibben.rigs.setups.arm:Arm",
@@ -218,9 +227,12 @@ def load(group: str, name: str) -> Any:
             raise ModelError(
                 f"the {kind} {name!r} was removed", remedy=f"use {successor!r} instead"
             )
+        close = get_close_matches(str(name).lower().replace("_", "-"), locations, 3, 0.65)
         raise ModelError(
-            f"there is no {kind} named {name!r}",
-            remedy=f"use one of {', '.join(sorted(locations))}",
+            f"there is no {kind} named {name!r:.60}",
+            remedy=f"use {' or '.join(close)}"
+            if close
+            else f"use one of {', '.join(sorted(locations))}",
         )
     module, _, attribute = locations[name].partition(":")
     try:

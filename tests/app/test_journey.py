@@ -80,7 +80,7 @@ def test_one_muscle_from_the_example_to_c(browser: Any, bench: Workbench, tmp_pa
             names = archive.namelist()
         assert any(name.endswith("CMakeLists.txt") for name in names)
         if which("cc"):
-            from mckibben.export.programs import self_test
+            from mckibben.exporting.programs import self_test
 
             folder = tmp_path / names[0].split("/")[0]
             assert self_test(folder, folder.name.replace("-", "_"))

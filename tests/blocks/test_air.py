@@ -15,7 +15,7 @@ from scipy.signal import cont2discrete, lfilter
 from mckibben import ModelWarning, Series
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.memoryless import Affine
-from mckibben.export import export_c
+from mckibben.exporting import export_c
 from tests.blocks.strategies import numbers, paths
 
 Array = NDArray[np.float64]

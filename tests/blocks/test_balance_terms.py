@@ -13,7 +13,7 @@ from mckibben.blocks.coupled import balance_terms
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_terms import LIMITS, LINEAR, NONLINEAR, TABLE, Sizes
 from mckibben.blocks.fields import rows
-from mckibben.export.c.translator import Translation
+from mckibben.exporting.c.translator import Translation
 from mckibben.muscles.scaling import resized
 from tests.blocks.balances import STEP, balances
 

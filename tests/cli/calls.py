@@ -55,6 +55,7 @@ CALLS: dict[str, Call] = {
     "invert": call_of(f"{MODEL} --predictive -o out.json", MODEL),
     "track": call_of(f"{INVERSE} --rig {RIG} --reference {RUN} -o out.csv", INVERSE, RUN, RIG),
     "learn": call_of(f"{INVERSE} loop.csv -o out.json", INVERSE, "loop.csv"),
+    "review": call_of("loop.csv --compensator inverse.json --no-refit"),
     "plan": call_of(f"{RUN} --minutes 0.5 -o out.csv", RUN),
     "plot": call_of(f"{RUN} --model {MODEL} -o out.png", RUN, MODEL),
     "reproduce": call_of("multistate --quick --jobs 1"),

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import GPI, Recording, compare, registry
+from mckibben import GPI, Recording, registry
 from mckibben.comparison.leaderboard import Leaderboard
-from mckibben.comparison.ranking import Standing
+from mckibben.comparison.ranking import Standing, compare
 from mckibben.signals import irregular_triangle, triangle
 
 TIME = np.arange(0, 12, 0.02)

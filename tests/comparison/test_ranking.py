@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import GPI, DataError, ModelError, Recording, compare, registry
+from mckibben import GPI, DataError, ModelError, Recording, registry
 from mckibben.channels import Channels
 from mckibben.comparison.leaderboard import Leaderboard, order, recommended
+from mckibben.comparison.ranking import compare
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.metrics import USEFUL
 from mckibben.signals import irregular_triangle, triangle

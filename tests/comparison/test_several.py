@@ -75,10 +75,10 @@ def test_a_force_beside_other_inputs_is_given_and_never_commanded() -> None:
     found = channels_of(runs, "force")
     assert (found.inputs, found.outputs, found.unused) == (("force",), told.outputs, told.inputs)
     both = ["pressure", "force"]
-    plan = plan_of(runs, [], inputs=both, models=["balance"], settings=None, seed=0)
+    plan = plan_of(runs, [], input=both, models=["balance"], seed=0)
     assert plan.empty.inputs == ("pressure",)
     with pytest.raises(DataError, match="force"):
-        plan_of([*runs, hung(5.0).select(["pressure", "displacement"])], inputs=both)
+        plan_of([*runs, hung(5.0).select(["pressure", "displacement"])], input=both)
 
 
 def test_only_what_is_held_at_a_level_of_each_recording_is_held_at_levels() -> None:
@@ -123,16 +123,16 @@ def test_of_runs_that_each_hold_the_input_the_last_at_each_level_are_held_out() 
 
 def test_models_without_a_place_are_left_out_and_said() -> None:
     runs = [run(5.0), run(4.0)]
-    several = plan_of(runs, run(3.0, 4), models="all", settings=None, seed=0)
+    several = plan_of(runs, run(3.0, 4), models="all", seed=0)
     assert {"balance", "tsfnn"} <= set(several.items)
     assert "pressure_1" in several.empty.left_out["sdchm"]
     alone = [run(5.0).with_channels(**{name: np.zeros(TIME.size)}) for name in INPUTS]
-    told = plan_of([*runs, *alone], run(3.0, 4), models="all", settings=None, seed=0)
+    told = plan_of([*runs, *alone], run(3.0, 4), models="all", seed=0)
     assert {"sdchm", "balance", "tsfnn"} <= set(told.items)
     assert "gpi" in several.empty.left_out
     assert "mpi-narmax" in several.empty.left_out
     one = run(5.0).select(["pressure_1", "displacement_1"])
-    single = plan_of([one], (), models="all", settings=None, seed=0)
+    single = plan_of([one], (), models="all", seed=0)
     assert "gpi" in single.items
     assert "sdchm" in single.empty.left_out
 
@@ -141,4 +141,4 @@ def test_outputs_of_different_units_have_no_mean() -> None:
     one = run(3.0)
     mixed = one.with_channels(force=one["displacement_2"])
     with pytest.raises(DataError, match="force"):
-        compare(mixed, outputs=["displacement_1", "force"], models=["coupled-memory"], jobs=1)
+        compare(mixed, output=["displacement_1", "force"], models=["coupled-memory"], jobs=1)

@@ -14,14 +14,14 @@ import mckibben
 SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
-    {"errors", "arrays", "registry", "numerals", "version", "system", "numerics"},
+    {"errors", "hints", "arrays", "registry", "numerals", "version", "system", "numerics"},
     {"recording", "signals", "channels", "metrics", "splits"},
-    {"options"},
+    {"options", "keywords", "parsers"},
     {"files"},
     {"rigs"},
     {"blocks"},
     {"muscles"},
-    {"estimators", "export", "stream", "link", "outputs", "checkpoints", "example"},
+    {"estimators", "exporting", "stream", "link", "outputs", "checkpoints", "example"},
     {"control"},
     {"environments"},
     {"diagnosis"},
@@ -43,9 +43,12 @@ BASE = {"arrays", "errors"}
 
 STANDS_ON = {
     "numerics": {"numerics", *BASE},
-    "files": {"files", "recording", "registry", "system", *BASE},
+    "files": {
+        *("files", "recording", "registry", "system", "options", "keywords", "signals", "channels"),
+        *BASE,
+    },
     "rigs": {"rigs", "recording", "signals", "registry", "system", "metrics", *BASE},
-    "export": {"export", "blocks", "outputs", "registry", "system", *BASE},
+    "exporting": {"exporting", "blocks", "outputs", "registry", "system", *BASE},
     "stream": {"stream", "blocks", *BASE},
     "link": {"link", "recording", "system", *BASE},
     "control": {

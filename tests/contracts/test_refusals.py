@@ -83,7 +83,6 @@ NO_MODEL: list[tuple[str, dict[str, Any], str]] = [
     ("balance", {"damping": (0.1,)}, "damping.*2"),
     ("balance", {"walls": (0.0, -0.1)}, "walls"),
     ("balance", {"bladders": (4.0, -5.0)}, "bladders"),
-    ("balance", {"pushes": (-4.0, 5.0)}, "pushes"),
     ("balance", {"mass": (-4.0, 5.0)}, "mass"),
     ("balance", {"mass": (0.1, 0.1)}, "mass and pushes"),
     ("balance", {"friction_growth": -0.5}, "friction_growth"),

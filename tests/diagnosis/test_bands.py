@@ -18,7 +18,6 @@ from mckibben.diagnosis.bands import (
     LEVEL,
     SHARES,
     TestedBand,
-    calibration,
     find_band,
     n_branches,
     outside,
@@ -48,7 +47,7 @@ def inside(banded: Banded, run: Recording) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def banded() -> Banded:
-    return calibrate(MODEL, [noisy(seed) for seed in range(40)])
+    return calibrate(MODEL, [noisy(seed) for seed in range(40)]).model
 
 
 @pytest.mark.parametrize("unit", ["run", "block"])
@@ -98,8 +97,8 @@ def test_higher_levels_are_wider_and_hold_the_value(banded: Banded) -> None:
 
 
 def test_runs_are_units_from_nine_on_and_long_blocks_below() -> None:
-    few, found = calibration(MODEL, [noisy(seed) for seed in range(4)])
-    many, _ = calibration(MODEL, [noisy(seed) for seed in range(9)])
+    few = found = calibrate(MODEL, [noisy(seed) for seed in range(4)])
+    many = calibrate(MODEL, [noisy(seed) for seed in range(9)])
     assert (few.band.unit, many.band.unit, many.band.units) == ("block", "run", 9)
     assert few.band.units > 4
     assert found.runs == 4
@@ -117,7 +116,8 @@ def test_a_band_is_wider_at_speed_only_where_that_is_narrower(late: float) -> No
         y = np.interp(grid - late / STEP, grid, y)
         y += 0.005 * np.random.default_rng(seed).standard_normal(300)
         runs.append(Recording({"pressure": u, "displacement": y}, STEP))
-    banded, found = calibration(MODEL, runs)
+    found = calibrate(MODEL, runs)
+    banded = found.model
     assert (banded.band.widening[0] > 0) == (late > 0)
     assert (found.over_constant[0] < 0.95) == (late > 0)
     ends = banded.simulate(runs[0])
@@ -145,7 +145,8 @@ def test_outputs_have_bands_of_their_own_and_angles_too() -> None:
         names = ["pressure", "pressure_2", "angle", "displacement"]
         units = {"angle": "rad", "pressure_2": "bar"}
         runs.append(Recording(dict(zip(names, np.hstack([u, y]).T, strict=True)), STEP, units))
-    banded, found = calibration(model, runs)
+    found = calibrate(model, runs)
+    banded = found.model
     np.testing.assert_allclose(found.widths, 2 * 1.7 * sizes, rtol=0.15)
     assert [c.unit for c in banded.outputs] == ["rad"] * 3 + ["mm"] * 3
 
@@ -176,7 +177,7 @@ def test_a_model_that_is_solved_for_displacement_is_calibrated() -> None:
         runs.append(
             Recording({"displacement": y + off, "force": forces.simulate(y)}, STEP, {"force": "N"})
         )
-    banded = calibrate(forces.inverse(), runs)
+    banded = calibrate(forces.inverse(), runs).model
     assert inside(banded, runs[0]).mean() > 0.8
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import DataError, Recording, data_gaps
-from mckibben.diagnosis.data_gaps import RULES
+from mckibben import DataError, Recording
+from mckibben.diagnosis.data_gaps import RULES, data_gaps
 from mckibben.report.words import gap_run, gap_sentence
 from tests.diagnosis.lacking import Recorder, lacking
 from tests.plants import PLANTS

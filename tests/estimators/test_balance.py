@@ -16,6 +16,7 @@ from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import DISPLACEMENT, FORCE, PRESSURE, Channel
 from mckibben.blocks.memoryless import PiecewiseLinear
 from mckibben.estimators.coupled.balance import TERMS, BalanceEstimator
+from mckibben.estimators.coupled.balance_bench import with_loads
 from mckibben.estimators.coupled.balance_slopes import run
 from mckibben.rigs import load_rig
 from mckibben.signals.broadband import random_wave
@@ -266,6 +267,23 @@ def test_weights_that_nobody_measured_are_found() -> None:
     assert error(estimator, hung(4, 0.0)) < 2.5 * NOISE  # under the load of the first
 
 
+def test_every_recording_has_its_load_also_one_that_is_left_out() -> None:
+    runs = [hung(1, 0.0), hung(2, 40.0)]
+    still = dict.fromkeys(("pressure", "displacement"), np.zeros(400))
+    runs = [run.select(["pressure", "displacement"]) for run in runs] + [Recording(still, STEP)]
+    estimator = BalanceEstimator(unknown_load=True, steps=2, n_stops=2, terms=()).fit(runs)
+    assert estimator.loads_.shape == (3, 1)
+    assert estimator.loads_[1] > 0.0
+    assert not estimator.loads_[[0, 2]].any()
+
+
+def test_what_a_missing_load_is_does_not_depend_on_samples_that_do_not_count() -> None:
+    first, second = recording(1), recording(2).select(["pressure", "displacement"])
+    counting = np.arange(len(first)) >= 600
+    _, filled = with_loads([first, second], ["force"], [counting, np.ones(len(second), dtype=bool)])
+    np.testing.assert_allclose(filled["force"], first["force"][600:].mean())
+
+
 def test_recordings_that_begin_under_a_pressure_long_held_count_as_a_whole() -> None:
     def held(seed: int) -> Recording:
         time = np.arange(1200) * STEP
@@ -305,6 +323,8 @@ def test_what_does_not_move_or_means_nothing_is_refused_by_name() -> None:
         BalanceEstimator().fit(Recording(both | moved, STEP))
     with pytest.raises(ModelError, match="magic"):
         BalanceEstimator(terms=("mass", "magic")).fit(first)
+    with pytest.raises(ModelError, match="unknown_load"):
+        BalanceEstimator(tare=True, unknown_load=True).fit(first)
     for lags in ((12.0, 1.0), (5.0, 500.0)):
         with pytest.raises(ModelError, match="lags"):
             BalanceEstimator(lags=lags).fit(first)

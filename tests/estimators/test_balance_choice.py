@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mckibben.blocks.coupled.balance import balance_in
+from mckibben.blocks.coupled.balance_terms import PHENOMENA
 from mckibben.blocks.memoryless import PiecewiseLinear
 from mckibben.estimators.coupled.balance import BalanceEstimator
-from mckibben.estimators.coupled.balance_choice import PHENOMENA
 from mckibben.recording import Recording
 from tests.plants.sampled import Plant, clean, with_one
 

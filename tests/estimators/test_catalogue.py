@@ -28,7 +28,7 @@ from mckibben.estimators.catalogue import (
 )
 from mckibben.estimators.core.estimator import Estimator, Purpose
 from mckibben.estimators.hysteresis.pi import PIEstimator
-from mckibben.options import setting
+from mckibben.parsers import setting
 
 FITTED = Path(__file__).parents[2] / "docs" / "models" / "fitted"
 MODELS = registry.names("estimators")

@@ -7,7 +7,6 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from sklearn.model_selection import GridSearchCV, cross_val_score
 
 from mckibben import (
     GPI,
@@ -18,8 +17,7 @@ from mckibben import (
 )
 from mckibben.blocks.base import Block
 from mckibben.papers.paper import printed
-from tests.estimators.examples import CASES, quick
-from tests.estimators.examples import recorded as example_runs
+from tests.estimators.examples import quick
 
 TIME = np.linspace(0, 1, 1500)
 PRESSURE = 2.5 * (1 - 0.7 * np.floor(6 * TIME).clip(0, 5) / 5) * (1 - np.cos(12 * np.pi * TIME))
@@ -131,22 +129,3 @@ def test_derivatives_by_thresholds_agree_with_differences() -> None:
             )
             error = np.abs(apart @ linear / 2e-6 - slopes[:, place])
             assert np.quantile(error, 0.98) < 1e-3 * np.abs(slopes).max()  # where no operator turns
-
-
-# -- what is the same for all: one estimator of each kind of recording ------------------------------
-
-FIRST = {kind: name for name, kind in reversed(CASES)}
-ONE_OF_EACH = pytest.mark.parametrize(
-    ("name", "kind"), [(name, kind) for kind, name in FIRST.items()]
-)
-
-
-@ONE_OF_EACH
-def test_scikit_learn_validates_and_searches(name: str, kind: str) -> None:
-    runs = list(example_runs(kind))
-    first = np.arange(len(runs)) < len(runs) // 2
-    fold = [(np.flatnonzero(~first), np.flatnonzero(first))]
-    scores = cross_val_score(quick(name, kind), runs, cv=2, error_score="raise")
-    search = GridSearchCV(quick(name, kind), {"seed": [0]}, cv=fold, error_score="raise")
-    search.set_params(refit=False).fit(runs)
-    assert search.cv_results_["mean_test_score"] == pytest.approx([scores[0]])

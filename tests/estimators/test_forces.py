@@ -144,6 +144,28 @@ class TestBalanceForce:
         np.testing.assert_allclose(np.concatenate(forces[0]), np.concatenate(forces[1]), atol=1e-6)
 
 
+class TestSlack:
+    """Force of a muscle that is held so short that it goes slack below a pressure, as a rope does."""
+
+    @staticmethod
+    def held(length: float, seed: int) -> Recording:
+        rng = np.random.default_rng(seed)
+        levels = np.append(0.0, rng.uniform(0.0, 6.0, 12))
+        pressure = np.interp(np.arange(1200), np.linspace(0, 1199, 13), levels)
+        contraction = 130.0 - length
+        force = np.maximum(pressure * (75.0 - 2.0 * contraction) - 60.0 - 10.0 * contraction, 0.0)
+        channels = {"pressure": pressure, "length": np.full(1200, length)}
+        return Recording(channels | {"force": force + 0.3 * rng.standard_normal(1200)}, 0.05)
+
+    def test_a_muscle_that_rubber_pulls_goes_slack(self) -> None:
+        train = [self.held(130.0 - x, place) for place, x in enumerate((0.0, 4.0, 8.0, 12.0))]
+        test = [self.held(130.0 - x, 10 + place) for place, x in enumerate((2.0, 6.0, 10.0))]
+        fit: Any = BalanceForceEstimator(input="length").fit(train)
+        for found, run in zip(fit.predict(test), test, strict=True):
+            assert np.std(found - run["force"]) < 0.01 * np.ptp(run["force"])
+            assert found.min() > -1.0
+
+
 class TestHeldLengths:
     """Force of a muscle that is held at lengths, by a play of pressure that its contraction widens."""
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mckibben import Block
 from mckibben.blocks.base import Stream
-from mckibben.export import export_c
+from mckibben.exporting import export_c
 
 Array = NDArray[np.float64]
 Precision = Literal["double", "float32"]

@@ -10,8 +10,8 @@ import pytest
 
 from mckibben import Block, ModelError, Series
 from mckibben.blocks.adaptive import Adaptive
-from mckibben.export import export_c
-from mckibben.export.programs import self_test
+from mckibben.exporting import export_c
+from mckibben.exporting.programs import self_test
 from mckibben.registry import load
 from mckibben.stream import Step
 from tests.export.building import FLAGS, SAMPLE_TIME, Compiled, build

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben.export import export_c
-from mckibben.export.c.language import FUNCTIONS
+from mckibben.exporting import export_c
+from mckibben.exporting.c.language import FUNCTIONS
 from tests.export.building import FLAGS, SAMPLE_TIME
 from tests.export.models import MODELS, difference, path_for, simulated
 from tests.tools import needs

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from mckibben.export.c import emulation
-from mckibben.export.c.emulation import emulate
+from mckibben.exporting.c import emulation
+from mckibben.exporting.c.emulation import emulate
 from tests.export.building import SAMPLE_TIME
 from tests.export.models import MODELS
 from tests.export.test_c import SINGLE

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from mckibben import Block, DataError, ModelError
 from mckibben.blocks.base import Stream
 from mckibben.blocks.laws import examples
-from mckibben.export import export_fmu
-from mckibben.export.fmu.unit import own_platform
+from mckibben.exporting import export_fmu
+from mckibben.exporting.fmu.unit import own_platform
 from tests.export.building import SAMPLE_TIME
 from tests.export.models import MODELS, difference, path_for, simulated
 from tests.tools import needs

@@ -18,7 +18,7 @@ from mckibben import workflow
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.errors import DataError, ModelError
-from mckibben.export.mjcf import Sites, export_mjcf, mjcf
+from mckibben.exporting.mjcf import Sites, export_mjcf, mjcf
 from mckibben.recording import Recording
 from mckibben.rigs import load_rig
 from mckibben.signals import random_wave

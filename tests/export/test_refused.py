@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mckibben import Block, ModelError, ModelWarning, Series
-from mckibben.export import export_c
+from mckibben.exporting import export_c
 from tests.export.building import SAMPLE_TIME
 from tests.export.models import example
 

@@ -13,8 +13,8 @@ import pytest
 from mckibben import GPI, ModelError, muscles
 from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.laws import examples
-from mckibben.export import export_ros2
-from mckibben.export.ros2.package import ros2_files
+from mckibben.exporting import export_ros2
+from mckibben.exporting.ros2.package import ros2_files
 from tests.tools import needs
 
 STUBS = Path(__file__).parent / "ros2_stubs"

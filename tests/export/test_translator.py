@@ -14,8 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben.errors import KernelError
-from mckibben.export.c.project import SHARED
-from mckibben.export.c.translator import Translation
+from mckibben.exporting.c.project import SHARED
+from mckibben.exporting.c.translator import Translation
 from tests.export import programs
 from tests.export.building import FLAGS
 from tests.tools import needs

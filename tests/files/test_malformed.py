@@ -163,7 +163,6 @@ CASES: list[Case] = [
     Case("late.csv", partial(csv, time_s=LATE), T, 9, "'late'"),
     Case("long_gap.csv", partial(csv, time_s=PAUSED), T, options={"gaps": "interpolate"}),
     Case("zero_rate.csv", csv, options={"rate": 0}),
-    Case("policy.csv", csv, names="'ignore'", options={"gaps": "ignore"}),
     # Parquet
     Case("garbage.parquet", b"PAR1" + GARBAGE),
     Case("apart.parquet", apart),

@@ -12,9 +12,9 @@ from pathlib import Path
 
 from mckibben import PI
 from mckibben.blocks.base import Block
-from mckibben.export import Serving
-from mckibben.export.c.project import export_c
-from mckibben.export.programs import compile_c
+from mckibben.exporting import Serving
+from mckibben.exporting.c.project import export_c
+from mckibben.exporting.programs import compile_c
 
 SAMPLE_TIME = 0.01
 SERVING = Serving(

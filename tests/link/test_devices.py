@@ -10,9 +10,9 @@ import pytest
 
 from mckibben.blocks.laws import examples
 from mckibben.errors import DataError, ModelError
-from mckibben.export import Serving, export_c, state_of
-from mckibben.export.c import emulation
-from mckibben.export.c.emulation import serial_device
+from mckibben.exporting import Serving, export_c, state_of
+from mckibben.exporting.c import emulation
+from mckibben.exporting.c.emulation import serial_device
 from mckibben.link import Link, LinkError
 from tests.export.building import build
 from tests.export.models import path_for

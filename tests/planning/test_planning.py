@@ -12,7 +12,7 @@ import pytest
 from mckibben import PI, Recording, data_gaps, load_rig, plan
 from mckibben.blocks.base import Block
 from mckibben.errors import DataError, ModelError
-from mckibben.options import limits as limits_of
+from mckibben.parsers import limits as limits_of
 from mckibben.planning.limits import Limit, narrowed
 from mckibben.planning.motion import motion
 from mckibben.report.words import plan_sentences

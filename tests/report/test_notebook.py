@@ -14,8 +14,9 @@ import mckibben
 from mckibben import Recording, example
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.control import track
-from mckibben.errors import MckibbenError
-from mckibben.system.showing import DrawsItself
+from mckibben.errors import MckibbenError, in_terms_of
+from mckibben.report.text import shown
+from mckibben.system.showing import DrawsItself, Result
 
 EVIL = '<img src=x onerror="alert(1)">\x1b[2J'
 
@@ -61,11 +62,14 @@ def things(train: Recording, board: Leaderboard) -> dict[str, Any]:
     }
 
 
-def test_they_print_three_lines_and_cards_bring_nothing_along(things: dict[str, Any]) -> None:
+def test_they_print_as_commands_do_and_cards_bring_nothing_along(things: dict[str, Any]) -> None:
     for name, thing in things.items():
         lines = str(thing).splitlines()
-        assert 1 < len(lines) <= 3, name
-        assert max(map(len, lines)) <= 80, name
+        if isinstance(thing, Result):
+            assert lines == in_terms_of("\n".join(shown(thing))).splitlines(), name
+        else:
+            assert 1 < len(lines) <= 3, name
+            assert max(map(len, lines)) <= 80, name
         card = thing._repr_html_()
         assert len(card) < 12_000, name
         assert not re.search(r"<script|https?:|src=|url\(|on\w+=", card), name

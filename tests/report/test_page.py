@@ -188,7 +188,7 @@ def test_hostile_names_stay_words(name: str) -> None:
     assert parsed.words.count(name) >= 4
     title = parsed.figures["lead"][0][0]["layout"]["xaxis"]["title"]["text"]
     assert title.startswith("pressure")
-    assert "<" not in title
+    assert "<" not in title.replace("<i>u</i>", "")
 
 
 def test_pages_of_little_are_whole() -> None:

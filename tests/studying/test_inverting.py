@@ -139,7 +139,7 @@ def test_commands_end_at_the_recorded_inputs_also_of_linear_models() -> None:
 
 def test_recorded_commands_that_are_no_input_are_named() -> None:
     runs = [run.with_channels(command_pressure=run["pressure"]) for run in (TRAIN, TEST)]
-    found = study(runs[:1], runs[1:], models=["gpi"], inputs="pressure", jobs=1).inverse
+    found = study(runs[:1], runs[1:], models=["gpi"], input="pressure", jobs=1).inverse
     assert found is not None
     assert found.commands == ("command_pressure",)
 

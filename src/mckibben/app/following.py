@@ -81,7 +81,7 @@ def made(workspace: Workspace, name: str, use: str, settings: Mapping[str, Any])
         given = {"learned": tuple(run.select(names) for run in workspace.with_role("train"))}
     elif use != "inverse":
         given[use] = True
-    return invert(block, **given).block
+    return invert(block, **given).model
 
 
 def of_model(workspace: Workspace, name: str, key: str, make: Callable[[], Any]) -> Any:

@@ -157,7 +157,7 @@ def fit(
     (train, test), data = workspace.train_and_test(), workspace.digest()
     plan = plan_of(
         *(train, test),
-        inputs=inputs, outputs=outputs, load=load or None, models=[model],
+        input=inputs, output=outputs, load=load or None, models=[model],
         seed=seed, allow_shared=allow_shared,
     )  # fmt: skip
     *_, last = ranked(plan, jobs=1, watch=lambda _, share, cost: tell(share, cost))

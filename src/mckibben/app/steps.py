@@ -13,6 +13,7 @@ import mckibben
 from mckibben.errors import DataError
 from mckibben.files.choosing import Seen
 from mckibben.files.reading import look
+from mckibben.options import ReadOptions
 from mckibben.recording import Recording
 
 Role = Literal["train", "test", "unused"]
@@ -46,6 +47,10 @@ class Reading(Plain):
     def options(self) -> dict[str, Any]:
         """Return the options that are given."""
         return self.model_dump(exclude_defaults=True)
+
+    def read_options(self) -> ReadOptions:
+        """Return the options without the channels."""
+        return ReadOptions(**self.model_dump(exclude_defaults=True, exclude={"channels"}))
 
 
 FUNCTIONS = {
@@ -129,7 +134,7 @@ def applied(recording: Recording, steps: Sequence[Step]) -> Recording:
 
 def understand(path: Path, reading: Reading) -> tuple[list[Recording], list[Seen]]:
     """Return the recordings of a file, and its columns; errors are those of `mckibben.read`."""
-    found, columns = look(path, informative=False, most=LARGEST, **reading.options())
+    found, columns = look(path, reading.read_options(), reading.channels, LARGEST)
     if (chosen := reading.channels) is not None:
         found = [one.select([name for name in one.channels if name in chosen]) for one in found]
     return found, columns

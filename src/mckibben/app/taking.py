@@ -40,7 +40,7 @@ def report(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Js
     models = fitted(workspace)
     if not models:
         raise DataError("no model is fitted to these recordings", remedy="fit one under Models")
-    given = {"inputs": of["inputs"], "outputs": of["outputs"], "load": of["load"] or None}
+    given = {"input": of["inputs"], "output": of["outputs"], "load": of["load"] or None}
     given |= {"models": models, "jobs": 1} | options
     train, test = workspace.with_role("train"), workspace.with_role("test")
     found = study(train, test, **given, progress=tell)
@@ -88,7 +88,7 @@ def recordings(workspace: Workspace, tell: Tell, *, file: str, options: Json, of
 
 
 def _zip(path: Path, fill: Callable[[Path], Any]) -> None:
-    from mckibben.export.folders import zipped
+    from mckibben.exporting.folders import zipped
     from mckibben.system.atomic import replacing
 
     with TemporaryDirectory() as folder:
@@ -164,19 +164,20 @@ def script(workspace: Workspace, of: Json) -> str:
     """Return a Python script: read, compare, save, invert, export."""
     models = fitted(workspace)
     lines = ['"""What was done in the workbench; run it in its folder."""', ""]
-    lines += ["import mckibben", "from mckibben import workflow", ""]
+    lines += ["import mckibben", ""]
     for role in ("train", "test"):
         runs = [f"    {one.code()}," for one in workspace.entries() if one.role == role]
         lines += [f"{role} = [", *runs, "]"]
-    given = {key: of[key] for key in ("inputs", "outputs", "load") if of[key]} | {"models": models}
+    given = {"input": of["inputs"], "output": of["outputs"], "load": of["load"]}
+    given = {key: value for key, value in given.items() if value} | {"models": models}
     lines += ["board = mckibben.compare(", "    train,", "    test,"]
     lines += [*(f"    {key}={value!r}," for key, value in given.items()), ")", "print(board)"]
     for chosen in (row["model"] for row in workspace.results() if row["name"] == of["model"]):
         lines.append(f"model = next(row.block for row in board.rows if row.model == {chosen!r})")
         lines.append(f'model.save("{chosen}.json")')
         if (use := of["use"]) in FLAGS:
-            lines.append(f"inverse = workflow.invert(model{FLAGS[use]})")
-            lines.append(f'inverse.block.save("{chosen}-{use}.json")')
+            lines.append(f"inverse = mckibben.invert(model{FLAGS[use]})")
+            lines.append(f'inverse.model.save("{chosen}-{use}.json")')
             step = ", sample_time=train[0].sample_time"
-            lines.append(f'workflow.export(inverse, "{chosen}-{use}-c", "c"{step})')
+            lines.append(f'mckibben.export(inverse, "{chosen}-{use}-c", "c"{step})')
     return "\n".join(lines) + "\n"

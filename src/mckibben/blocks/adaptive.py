@@ -129,8 +129,8 @@ class Prompt(Block):
     formulas = (r"y_t = y_{m,t} + r_{t-1} - r_{t-T_d/T}",)
 
     late: Annotated[FiniteFloat, Gt(0), "T_d [s]"]
-    reference: ChannelField
-    measured: ChannelField
+    reference: Annotated[ChannelField, "r"]
+    measured: Annotated[ChannelField, "y_{m}"]
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return the dead time in samples, less the one of the sample hold."""

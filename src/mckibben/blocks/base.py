@@ -34,7 +34,7 @@ from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 from mckibben.system.atomic import write_text
 from mckibben.system.compiling import bound
-from mckibben.system.showing import DrawsItself
+from mckibben.system.showing import DrawsItself, Hinted
 from mckibben.system.threads import on_all_cores
 
 Advance = Callable[[], None]
@@ -71,7 +71,7 @@ class Board(Protocol):
         """Set the start state of the blocks called last from their joint state."""
 
 
-class Block(DrawsItself, Parametrised):
+class Block(Hinted, DrawsItself, Parametrised):
     """An immutable parameter set with dynamics.
 
     Concrete blocks are frozen dataclasses, registered under `kind`. They are independent of data

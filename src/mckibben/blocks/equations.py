@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import count, groupby
 from typing import TYPE_CHECKING, Any
 
 from mckibben.blocks.inverse import Inverse, commands
 from mckibben.blocks.notation import (
     MANY,
-    Symbol,
     Written,
+    bare,
     indexed,
     lettered,
     meanings,
     resolved,
     short,
-    symbol_of,
+    stem,
     symbols,
     tex,
     with_unit,
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
     from mckibben.blocks.base import Block
 
 Units = dict[str, str]
+
+SEPARATOR = r",\; "
+"""Between the entries of a vector."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +105,7 @@ def _quantities(part: Parametrised, prefix: str, units: Units) -> Iterator[tuple
         return
     said = meanings(type(part))
     for field in part.parameters:
-        meaning, symbol, whole = (
-            short(said.get(field, "")),
-            symbol_of(type(part), field),
-            getattr(part, field),
-        )
+        meaning, whole = short(said.get(field, "")), getattr(part, field)
         for index, value in leaves(whole):
             if isinstance(value, Parametrised):
                 called = field.replace("_", " ")
@@ -118,7 +118,7 @@ def _quantities(part: Parametrised, prefix: str, units: Units) -> Iterator[tuple
             name = next(names)
             bracket = re.search(r" \[([^\]]*)\]$", name)
             unit = bracket[1] if bracket else unit_of(part, field, index, units) or ""
-            letter = indexed(symbol.letter, index, symbol.first)
+            letter = part.symbol_of(field, index)
             name = name[: bracket.start()] if bracket else name
             yield prefix, Quantity(name, letter, unit, meaning)
 
@@ -169,42 +169,79 @@ def _title(part: Parametrised, called: str = "") -> str:
     return f"{title}: {' → '.join(ends)}"
 
 
-def _channels(part: Any) -> Iterator[str]:
-    """Yield the meanings of the channel letters u, x and y."""
+def channel_symbols(block: Parametrised) -> dict[str, str]:
+    """Return channel name -> its letter in the equations of a block, or of its parts, in LaTeX.
+
+    Channels are left out that have no letter of their own.
+    """
+    found = {name: letter for letter, name, _ in _lettered(block)}
+    if not found:
+        every = [getattr(block, field.name) for field in fields(block)]  # type: ignore[arg-type]
+        parts = [part for value in every for _, part in leaves(value)]
+        for part in parts:
+            if isinstance(part, Parametrised):
+                found = channel_symbols(part) | found
+    used = Counter(found.values())
+    return {name: letter for name, letter in found.items() if used[letter] == 1}
+
+
+def _lettered(part: Any) -> list[tuple[str, str, str]]:
+    """Return letter, name and unit of the channels of a part with formulas.
+
+    Channels of one letter are counted, whichever fields they belong to.
+    """
     if not hasattr(part, "ports") or not part.formulas:
-        return
+        return []
     ports = zip("uxy", part.ports, strict=True)
-    letters: list[str] = []
-    for field, letter in {field: letter for letter, names in ports for field in names}.items():
+    found = []
+    for field, usual in {field: letter for letter, names in ports for field in names}.items():
         channels: Any = getattr(part, field, ())
-        one = not isinstance(channels, tuple)
-        symbol = symbols(part.__class__).get(field, Symbol(letter if one else f"{letter}_i"))
-        letters += lettered(symbol.letter, (channels,) if one else channels)
-    if letters:
+        several = channels if isinstance(channels, tuple) else (channels,)
+        found += [(part.letter_of(field, k) or f"{usual}_i", one) for k, one in enumerate(several)]
+    alike = Counter(letter for letter, _ in found)
+    counted = {letter: count() for letter in alike}
+    return [
+        (
+            indexed(letter, (next(counted[letter]),), 1) if alike[letter] > 1 else bare(letter),
+            one.name,
+            one.unit,
+        )
+        for letter, one in found
+    ]
+
+
+def _channels(part: Any) -> Iterator[str]:
+    """Yield the meanings of the channel letters."""
+    if letters := [lettered(*one) for one in _lettered(part)]:
         yield r",\quad ".join(letters)
 
 
 def _numbers(part: Parametrised, units: Units) -> Iterator[str]:
-    """Yield the values of numbers, vectors and matrices; of large ones their shape."""
-    for field, symbol in symbols(type(part)).items():
-        value: Any = getattr(part, field, None)
-        if isinstance(value, float):
-            text = f"{symbol.letter} = {tex(value)}"
-        elif isinstance(value, tuple) and value and isinstance(value[0], float):
-            if len(value) > MANY:
-                yield symbol.of_shape(len(value))
-                continue
-            values = r",\; ".join(map(tex, value))
-            text = f"{symbol.stem} = ({values})"
-        elif isinstance(value, tuple) and any(isinstance(row, tuple) and row for row in value):
-            n, width = len(value), max(map(len, value))
-            if n * width > MANY:
-                yield symbol.of_shape(n, width)
-                continue
-            rows = r" \\ ".join(" & ".join(map(tex, row)) for row in value)
-            yield rf"{symbol.stem} = \begin{{pmatrix}} {rows} \end{{pmatrix}}"
-            continue
-        else:
-            continue
-        alike = {unit_of(part, field, at, units) or "" for at, _ in leaves(value)}
-        yield with_unit(text, alike.pop() if len(alike) == 1 else "")
+    """Yield the values of numbers, of vectors, and of the rows of matrices; of large ones the size.
+
+    Numbers of one field that have several letters or units are written apart.
+    """
+    for field in symbols(type(part)):
+        called = [
+            (part.symbol_of(field, index), index, value)
+            for index, value in leaves(getattr(part, field, None))
+            if isinstance(value, float)
+        ]
+        large = len(called) > MANY
+
+        def alike(one: tuple[str, tuple[int, ...], float]) -> tuple[object, ...]:
+            letter, index, _ = one
+            unit = "" if large else unit_of(part, field, index, units) or ""  # noqa: B023
+            return unit, stem(letter), index[:-1]
+
+        for (unit, *_), group in groupby(called, alike):
+            letters, _, values = zip(*group, strict=True)
+            listed = letters if len(letters) < 3 else (letters[0], r"\ldots", letters[-1])
+            if large:
+                yield rf"{_vector(listed)} \in \mathbb{{R}}^{{{len(letters)}}}"
+            else:
+                yield with_unit(f"{_vector(listed)} = {_vector([*map(tex, values)])}", str(unit))
+
+
+def _vector(entries: Sequence[str]) -> str:
+    return f"({SEPARATOR.join(entries)})" if len(entries) > 1 else entries[0]

@@ -111,17 +111,29 @@ class PIDFeedback(Block):
     formulas = (
         r"p_i = p_{b,i} + k_{p,i} e_i + k_{i,i} \int e_i\, dt - k_{d,i} \dot{y}_i,\quad "
         "e_i = r_i - y_i",
+        r"p_{\min} \le p_i \le p_{\max},\quad \dot{y}_i \text{ is filtered with the time constant } T",
     )
 
     kp: Annotated[Vector, "k_{p,i} [bar/mm]"]
     ki: Annotated[Vector, "k_{i,i} [bar/mm s]"]
     kd: Annotated[Vector, "k_{d,i} [bar s/mm]"]
-    limits: Annotated[tuple[FiniteFloat, FiniteFloat], r"p_{\pm,i} [bar]"]
+    limits: Annotated[tuple[FiniteFloat, FiniteFloat], "p_i [bar]"]
     filter_time: Annotated[FiniteFloat, Ge(0), "T [s]"]
     driven: Annotated[Channels, "r_i"]
-    scheduled: Annotated[Channels, "x_i"]
+    scheduled: Annotated[Channels, "y_i"]
     given: Annotated[Channels, "p_i"]
     late: bool = False
+
+    def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return the symbol of a number, or of a limit."""
+        if field == "limits":
+            return (r"p_{\min}", r"p_{\max}")[index[0]]
+        return super().symbol_of(field, index)
+
+    def letter_of(self, field: str, place: int) -> str:
+        """Return the letter of a channel: what feedback is added to is behind the measurements."""
+        added = field == "scheduled" and place >= len(self.driven)
+        return "p_{b,i}" if added else super().letter_of(field, place)
 
     def __post_init__(self) -> None:
         self.check_channels()

@@ -10,10 +10,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
-
-if TYPE_CHECKING:
-    from mckibben.blocks.fields import Channel
+from html import unescape
+from typing import NamedTuple
 
 MANY = 12
 """Number of entries above which only the shape is written."""
@@ -33,16 +31,6 @@ class Symbol(NamedTuple):
     first: int = 1
     unit: str | None = None
 
-    @property
-    def stem(self) -> str:
-        """The letter without its subscript."""
-        return re.sub(r"_(\{[^}]*\}|\w)$", "", self.letter)
-
-    def of_shape(self, *sizes: int) -> str:
-        """Return the dimensions of an array in LaTeX, instead of its values."""
-        shape = r" \times ".join(map(str, sizes))
-        return rf"{self.stem} \in \mathbb{{R}}^{{{shape}}}"
-
 
 @cache
 def symbols(cls: type) -> dict[str, Symbol]:
@@ -57,7 +45,7 @@ def symbols(cls: type) -> dict[str, Symbol]:
     return found
 
 
-def symbol_of(cls: type, field: str) -> Symbol:
+def declared(cls: type, field: str) -> Symbol:
     """Return the symbol of a field: as declared, or by its name."""
     named = rf"\mathrm{{{field.replace('_', chr(92) + ' ')}}}"
     return symbols(cls).get(field, Symbol(named))
@@ -91,19 +79,36 @@ class Written:
 def indexed(symbol: str, index: Sequence[int], first: int) -> str:
     r"""Return a symbol with numeric subscripts.
 
-    >>> indexed("w_i", (2,), 1), indexed("S_{kj}", (0, 1), 1), indexed("T_p", (), 1)
-    ('w_{3}', 'S_{1,2}', 'T_p')
+    >>> indexed("w_i", (2,), 1), indexed("S_{kj}", (0, 1), 1), indexed("k_{p,i}", (0,), 1)
+    ('w_{3}', 'S_{1,2}', 'k_{p,1}')
     """
     if not index:
         return symbol
     *outer, last = index
     numbers = ",".join([*(str(place + 1) for place in outer), str(last + first)])
-    stem, _, below = symbol.rpartition("_")
-    if not stem:
+    before, _, below = symbol.rpartition("_")
+    if not before:
         return f"{symbol}_{{{numbers}}}"
-    letters = below.strip("{}")
-    kept = letters[: -len(index)].rstrip(",") if len(letters) > len(index) else ""
-    return f"{stem}_{{{kept + ',' if kept else ''}{numbers}}}"
+    letters = re.findall(r"\\[a-z]+|\w", below)
+    return f"{before}_{{{','.join([*letters[: -len(index)], numbers])}}}"
+
+
+def stem(symbol: str) -> str:
+    r"""Return a symbol without its indices: letters within a subscript that are words stay.
+
+    >>> stem("w_{3}"), stem("k_{p,2}"), stem("T_p")
+    ('w', 'k_{p}', 'T_p')
+    """
+    return re.sub(r"_\{,?\}", "", re.sub(r",?\b\d+\b", "", symbol))
+
+
+def bare(letter: str) -> str:
+    """Return the letter of a field of channels without its running index.
+
+    >>> bare("y_i"), bare("p_{b,i}"), bare("y_{m}")
+    ('y', 'p_{b}', 'y_{m}')
+    """
+    return re.sub(r",\w\}$", "}", re.sub(r"_\w$", "", letter))
 
 
 def resolved(unit: str, place: int, units: Mapping[str, str]) -> str:
@@ -163,6 +168,15 @@ def tex(value: float, digits: int = 4) -> str:
     return rf"{mantissa} \times 10^{{{int(exponent)}}}" if exponent else mantissa
 
 
+def in_unicode(symbol: str) -> str:
+    r"""Return a symbol in LaTeX with its Greek letters as such.
+
+    >>> in_unicode(r"\tau_{l}")
+    'τ_{l}'
+    """
+    return re.sub(r"\\([a-z]+)", lambda word: unescape(f"&{word[1]};"), symbol)
+
+
 def unit_tex(unit: str) -> str:
     r"""Return a unit in LaTeX.
 
@@ -175,20 +189,15 @@ def unit_tex(unit: str) -> str:
     return rf"\mathrm{{{text}}}" if unit else ""
 
 
-def lettered(symbol: str, channels: Sequence[Channel]) -> list[str]:
-    r"""Return the meanings of the channel letters.
+def lettered(letter: str, name: str, unit: str) -> str:
+    r"""Return the meaning of a channel's letter.
 
-    >>> from mckibben.blocks.fields import PRESSURE
-    >>> lettered("u", [PRESSURE])
-    ['u\\text{: pressure}\\,[\\mathrm{bar}]']
+    >>> lettered("u", "pressure", "bar")
+    'u\\text{: pressure}\\,[\\mathrm{bar}]'
     """
-    found = []
-    for place, channel in enumerate(channels):
-        letter = indexed(symbol, (place,), 1) if len(channels) > 1 else symbol
-        name = re.sub(r"[\\{}$&#^~%]", " ", channel.name).replace("_", r"\_")
-        unit = rf"\,[{unit_tex(channel.unit)}]" if channel.unit else ""
-        found.append(rf"{letter}\text{{: {name}}}{unit}")
-    return found
+    name = re.sub(r"[\\{}$&#^~%]", " ", name).replace("_", r"\_")
+    measure = rf"\,[{unit_tex(unit)}]" if unit else ""
+    return rf"{letter}\text{{: {name}}}{measure}"
 
 
 def with_unit(text: str, unit: str) -> str:

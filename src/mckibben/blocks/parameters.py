@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from mckibben.arrays import Array
-from mckibben.blocks.notation import symbol_of
+from mckibben.blocks.notation import declared, indexed, symbols
 from mckibben.errors import ModelError
 
 Made = TypeVar("Made")
@@ -125,11 +125,21 @@ class Parametrised(metaclass=Checked):
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
         """Return the unit of a number of a field, as `Symbol` writes it; None if none is declared."""
         del index
-        return symbol_of(type(self), field).unit
+        return declared(type(self), field).unit
 
     def name_of(self, field: str, index: tuple[int, ...]) -> str:
         """Return the label of a parameter: the field's name, and its indices."""
         return " ".join([field.replace("_", " "), *(str(place + 1) for place in index)])
+
+    def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return the symbol of a number of a field in the equations, in LaTeX, with its indices."""
+        symbol = declared(type(self), field)
+        return indexed(symbol.letter, index, symbol.first)
+
+    def letter_of(self, field: str, place: int) -> str:
+        """Return the letter of a channel of a field in the equations; empty if none is declared."""
+        del place
+        return symbols(type(self))[field].letter if field in symbols(type(self)) else ""
 
     @property
     def n_parameters(self) -> int:

@@ -68,7 +68,7 @@ class Repetition(Block):
     n_states = 1  # sample since the start
     parameters = ("corrections",)
     same_length = ("corrections", "driven", "given")
-    formulas = (r"y_i(t) = u_i(t) + c_{i,t}",)
+    formulas = (r"y_{i,t} = u_{i,t} + c_{i,t},\quad t \text{ counts samples of } T_s",)
 
     corrections: Annotated[Rows, "c_{i,t} [{out0}]"]
     sample_time: Annotated[FiniteFloat, Gt(0), "T_s [s]"]

@@ -101,7 +101,10 @@ def load(path: str | Path) -> Block:
         problem = f"it is not readable as a model ({str(error)[:200]})"
         remedy = "save the model again"
     if path.suffix.casefold() in SOUGHT and path.is_file():
-        problem, remedy = "this is a recording", "the model comes first, then recordings"
+        problem, remedy = (
+            "this is a recording",
+            "give a model first; recordings are read with mckibben.read",
+        )
     raise ModelError(problem, file=path, remedy=remedy)
 
 

@@ -48,22 +48,33 @@ class Commands(click.Group):
         """Return one, loaded."""
         if cmd_name not in COMMANDS:
             return None
+        if find_spec(f"mckibben.cli.commands.{cmd_name}") is None:
+            from mckibben.cli.operations import operation_command
+
+            return operation_command(cmd_name)
         found: click.Command = import_module(f"mckibben.cli.commands.{cmd_name}").__dict__[cmd_name]
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of them."""
+        about = {**_summaries("mckibben.workflow"), **_summaries("mckibben.cli.commands")}
         with formatter.section("Commands"):
-            formatter.write_dl([(name, _summary(name)) for name in COMMANDS])
+            formatter.write_dl([(name, about[name]) for name in COMMANDS])
 
 
-def _summary(name: str) -> str:
-    """Return the first line of a command's module."""
-    spec = find_spec(f"mckibben.cli.commands.{name}")
-    if spec is None or spec.origin is None:
-        return ""
-    text = ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding="utf-8"))) or ""
-    return text.partition("\n")[0]
+def _summaries(package: str) -> dict[str, str]:
+    """Return the first lines of docstrings of modules and functions, by name, without loading them."""
+    found: dict[str, str] = {}
+    spec = find_spec(package)
+    for folder in () if spec is None else spec.submodule_search_locations or ():
+        for path in Path(folder).glob("*.py"):
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            found[path.stem] = (ast.get_docstring(tree) or "").partition("\n")[0]
+            for node in tree.body:
+                if isinstance(node, ast.FunctionDef):
+                    text = ast.get_docstring(node) or ""
+                    found.setdefault(node.name, text.partition("\n")[0])
+    return found
 
 
 def _show_version(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:

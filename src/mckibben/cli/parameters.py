@@ -6,40 +6,33 @@ import shlex
 import sys
 import types
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from inspect import Parameter, cleandoc, signature
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import click
 
-from mckibben.errors import in_terms_of, python_operation, python_parameter
-from mckibben.options import Option, parsed
-
-
-@dataclass(frozen=True)
-class Argument:
-    """A positional argument.
-
-    Parameters
-    ----------
-    metavar : str
-        What stands for it in the help.
-    help : str
-        What it is.
-    """
-
-    metavar: str
-    help: str
-
+from mckibben.errors import DataError, in_terms_of, python_operation, python_parameter
+from mckibben.options import Argument, Option, is_mapping, parsed
 
 COMMANDS = (
     *("study", "characterize", "fit", "compare", "check", "calibrate", "simulate", "invert"),
-    *("track", "learn", "plan", "plot", "reproduce", "measured", "info", "link", "example"),
+    *(
+        "track",
+        "learn",
+        "review",
+        "plan",
+        "plot",
+        "reproduce",
+        "measured",
+        "info",
+        "link",
+        "example",
+    ),
     *("export", "rig", "muscles", "app"),
 )
-"""Commands: each is a module of `mckibben.cli.commands` of its name, whose docstring is its help.
-"""
+"""Commands: operations of `mckibben.workflow`, or modules of `mckibben.cli.commands` of that name."""
 
 _flags: dict[str, str] = {}
 """Flags of the running command, by parameter name."""
@@ -48,13 +41,22 @@ _flags: dict[str, str] = {}
 class Command(click.Command):
     """A command whose flags are named in errors."""
 
-    def make_context(self, *given: Any, **more: Any) -> click.Context:
-        """Store the arguments as typed."""
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **more: Any,
+    ) -> click.Context:
+        """Store the arguments as typed; refuse one given twice that may be given once."""
         _flags.clear()
         for param in self.params:
             if isinstance(param, click.Option) and param.name:
                 _flags[param.name] = max(param.opts, key=len)
-        return super().make_context(*given, **more)
+                typed = [word for word in args if word.partition("=")[0] in param.opts]
+                if len(typed) > 1 and not param.multiple and not param.is_flag:
+                    raise click.UsageError(f"{typed[0]} is given {len(typed)} times.")
+        return super().make_context(info_name, args, parent, **more)
 
 
 def as_flag(name: str, key: str | None = None, value: str | None = None) -> str:
@@ -80,7 +82,6 @@ Files = Annotated[
     tuple[Path, ...], Argument("FILES...", "Recordings: CSV, TSV, Parquet, MAT, HDF5, TDMS, bags.")
 ]
 Test = Annotated[tuple[Path, ...], Option("Recording to test on; repeatable.", "FILE")]
-ModelFile = Annotated[Path, Argument("MODEL", "Saved model (JSON).")]
 Quick = Annotated[bool, Option("Models that take seconds; same as --models quick.")]
 Force = Annotated[bool, Option("Replace files that mckibben did not write, except inputs.")]
 Json = Annotated[bool, Option("Print the result as JSON on standard output.", flag="--json")]
@@ -102,25 +103,30 @@ def command(run: Callable[..., int | None]) -> click.Command:
     Parameters that are dataclasses are asked for field by field. The help is the docstring of the
     function, or of its module where it has none. What the function returns is the exit code.
     """
-    groups: dict[str, Any] = {}
-    params: list[click.Parameter] = []
     hints = get_type_hints(run, include_extras=True)
-    for name, parameter in signature(run).parameters.items():
-        hint = hints[name]
-        if is_dataclass(hint):
-            groups[name] = hint
+    taken = {name: (hints[name], one.default) for name, one in signature(run).parameters.items()}
+    text = run.__doc__ or sys.modules[run.__module__].__doc__ or ""
+    return command_of(run.__name__.strip("_").replace("_", "-"), text, run, taken)
+
+
+def command_of(
+    name: str, text: str, run: Callable[..., int | None], taken: Mapping[str, tuple[Any, Any]]
+) -> click.Command:
+    """Return a command that calls a function with parameters of some types and defaults."""
+    groups: dict[str, Any] = {key: hint for key, (hint, _) in taken.items() if is_dataclass(hint)}
+    params: list[click.Parameter] = []
+    for key, (hint, default) in taken.items():
+        if key in groups:
             inner = get_type_hints(hint, include_extras=True)
             params += [made(f.name, inner[f.name], _default(f)) for f in fields(hint)]
         else:
-            params.append(made(name, hint, parameter.default))
+            params.append(made(key, hint, default))
 
     def call(**given: Any) -> int | None:
-        for name, group in groups.items():
-            given[name] = group(**{f.name: given.pop(f.name) for f in fields(group)})
+        for key, group in groups.items():
+            given[key] = group(**{f.name: given.pop(f.name) for f in fields(group)})
         return run(**given)
 
-    text = run.__doc__ or sys.modules[run.__module__].__doc__ or ""
-    name = run.__name__.strip("_").replace("_", "-")
     return Command(name, callback=call, params=params, help=cleandoc(text))
 
 
@@ -143,7 +149,7 @@ def made(name: str, hint: Any, default: Any) -> click.Parameter:
             metavar=about.metavar,
             required=required,
             nargs=-1 if several else 1,
-            default=None if required or several else default,
+            **({} if required or several else {"default": default}),  # None would count as given
         )
     flags = [name, *_spellings(name, about.flag)]
     if kind is bool:
@@ -157,10 +163,10 @@ def made(name: str, hint: Any, default: Any) -> click.Parameter:
         metavar=about.metavar or None,
         help=about.help,
         required=required,
-        multiple=several or mapping,
+        multiple=(several and about.parse is None) or mapping,
         nargs=width if about.parse is None else 1,
         show_default=_is_plain(default, about),
-        callback=_parsed(name, about, mapping, several, default),
+        callback=_parsed(name, about, mapping, default),
         **({"default": default} if _is_plain(default, about) else {}),
     )
 
@@ -174,13 +180,14 @@ def _spellings(name: str, flag: str) -> list[str]:
 def _unwrapped(kind: Any) -> tuple[Any, bool, int]:
     """Return the type of one value, whether it may be repeated, and its number of words."""
     if get_origin(kind) in (Union, types.UnionType):
-        kind = next(one for one in get_args(kind) if one not in (type(None), Any))
-    if get_origin(kind) in (list, tuple):
+        known = [one for one in get_args(kind) if one not in (type(None), Any)]
+        kind = next((one for one in known if get_origin(one) is Sequence), known[0])
+    if get_origin(kind) in (list, tuple, Sequence):
         inside = get_args(kind)
         if get_origin(kind) is tuple and inside[-1] is not Ellipsis:
             return inside[0], False, len(inside)
         return inside[0], True, 1
-    if isinstance(get_origin(kind), type) and issubclass(get_origin(kind), Mapping):
+    if is_mapping(kind):
         return Mapping, False, 1
     return kind, False, 1
 
@@ -198,9 +205,7 @@ def _is_plain(default: Any, about: Option) -> bool:
     return isinstance(default, int | float | str | Path) and default != "" and not about.parse
 
 
-def _parsed(
-    name: str, about: Option, mapping: bool, several: bool, default: Any
-) -> Callable[..., Any]:
+def _parsed(name: str, about: Option, mapping: bool, default: Any) -> Callable[..., Any]:
     """Return the parser of an option's words."""
 
     def value(context: click.Context, parameter: click.Parameter, given: Any) -> Any:
@@ -209,9 +214,12 @@ def _parsed(
             return None if default is Parameter.empty else default
         if about.parse is None:
             return given
-        if not (mapping or several):
+        if not mapping:
             return parsed(about, given, name)
         found = [parsed(about, text, name) for text in given]
-        return dict(found) if mapping else tuple(found)
+        if len(both := dict(found)) < len(found):
+            double = next(key for key, _ in found if [k for k, _ in found].count(key) > 1)
+            raise DataError("it is given twice", parameter=name, channel=double, remedy="give one")
+        return both
 
     return value

@@ -11,14 +11,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mckibben.cli.output import INTERRUPTED, InterruptionError, say
 from mckibben.outputs import UNFINISHED
 from mckibben.system.workers import leave
-
-if TYPE_CHECKING:
-    from mckibben.comparison.leaderboard import Leaderboard
 
 PATIENCE = 1.3
 """How long the work may take to stop before the program ends without it [s]."""
@@ -113,15 +110,16 @@ def how_to_go_on(folder: Path | None) -> str:
     return f"Stopped; the same command resumes from {place}."
 
 
-def stop_short(board: Leaderboard, folder: Path | None) -> None:
-    """Exit if a comparison was stopped before it was done.
+def stop_short(found: Any, folder: Path | None) -> None:
+    """Exit if a comparison, or a study, was stopped before it was done.
 
     Raises
     ------
     InterruptionError
         With how many models are done.
     """
-    if board.stopped:
+    board = getattr(found, "leaderboard", found)
+    if getattr(board, "stopped", False):
         done = len(board.rows)
         text = f"{done} of {done + len(board.pending)} models are done."
         raise InterruptionError(f"{how_to_go_on(folder)} {text}")

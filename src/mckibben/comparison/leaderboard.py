@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Unpack
 
 import numpy as np
 
@@ -15,12 +15,15 @@ from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.inverse import Inverse
 from mckibben.diagnosis.bands import TestedBand
 from mckibben.diagnosis.branch_gaps import Memory
-from mckibben.errors import MckibbenError
+from mckibben.errors import MckibbenError, ModelError
+from mckibben.files.memory import Data
+from mckibben.keywords import SimulateKeywords
 from mckibben.metrics import Scores
 from mckibben.numerics.statistics import half_interval
+from mckibben.registry import load
 from mckibben.splits import Span
 from mckibben.system.atomic import Numbers, plain
-from mckibben.system.showing import DrawsItself
+from mckibben.system.showing import Result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -326,7 +329,7 @@ class Doubt(Numbers):
 
 
 @dataclass(frozen=True, repr=False)
-class Leaderboard(DrawsItself, Numbers):
+class Leaderboard(Result):
     """Models chosen on training data, and their errors on independent test data.
 
     Parameters
@@ -393,9 +396,6 @@ class Leaderboard(DrawsItself, Numbers):
     outside: Mapping[str, float] = field(default_factory=dict)
     parts: tuple[tuple[Span, ...], ...] = ()
 
-    def __repr__(self) -> str:
-        return str(self)
-
     @property
     def input(self) -> str:
         """The input, or all inputs."""
@@ -415,6 +415,30 @@ class Leaderboard(DrawsItself, Numbers):
         recommended where the choice is no better there than the constant.
         """
         return recommended(self.rows, self.constant)[0]
+
+    @property
+    def model(self) -> Block:
+        """The chosen model, fitted to the training recordings.
+
+        Raises
+        ------
+        ModelError
+            If none is recommended.
+        """
+        best = self.best
+        if best is None or best.block is None:
+            problem = "no model is recommended"
+            raise ModelError(problem, remedy="see the rows, each with its error and its block")
+        return best.block
+
+    def simulate(self, data: Data, **options: Unpack[SimulateKeywords]) -> Any:
+        """Simulate the chosen model on a recording; see `mckibben.simulate`."""
+        return load("operations", "simulate")(self.model, data, **options)
+
+    @property
+    def failed(self) -> bool:
+        """Whether no model worked."""
+        return bool(self.rows) and sum(map(len, self.failures.values())) == len(self.rows)
 
     @property
     def not_recommended(self) -> Against | None:

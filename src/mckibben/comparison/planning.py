@@ -134,7 +134,7 @@ def _data_of(
     notes = reading_notes(every)
     if not sides[0]:
         raise DataError("there are no recordings to fit", remedy="give at least one")
-    channels = channels or channels_of(every, chosen.inputs, chosen.outputs, chosen.load)
+    channels = channels or channels_of(every, chosen.input, chosen.output, chosen.load)
     unit = _unit_of(sides, channels)
     sides = [[one.with_derived(channels.sides) for one in side] for side in sides]
     shared = check_shared(

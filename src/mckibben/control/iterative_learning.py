@@ -27,6 +27,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -38,7 +39,7 @@ from mckibben.blocks.repetition import Repetition
 from mckibben.control.connecting import find
 from mckibben.errors import DataError, require
 from mckibben.recording import REFERENCE, Recording, sample_time_of
-from mckibben.system.atomic import Numbers
+from mckibben.system.showing import Result
 
 SEGMENTS = 8
 """Half-overlapping parts of the motion over which its spectrum is averaged."""
@@ -53,8 +54,8 @@ MOST_REPETITIONS = 1000
 """Largest number of repetitions."""
 
 
-@dataclass(frozen=True)
-class Learned(Numbers):
+@dataclass(frozen=True, repr=False)
+class Learned(Result):
     """What repetitions of a motion have taught.
 
     Parameters
@@ -83,6 +84,18 @@ class Learned(Numbers):
     expected: Mapping[str, float]
     convergence: Mapping[str, float]
     runs: tuple[Recording, ...] = field(repr=False)
+
+    face: ClassVar[str] = "learned"
+
+    @property
+    def model(self) -> Block:
+        """The compensator of the best repetition."""
+        return self.best
+
+    @property
+    def drawn(self) -> tuple[Recording, ...]:
+        """What a plot of it draws."""
+        return self.runs
 
 
 def learn(

@@ -159,9 +159,7 @@ def track(
     changed = plant.changed(settings)
     lead = round(approach / step)
     path = reference.matrix(followed)
-    ramp = np.linspace(0.0, 1.0, lead, endpoint=False)[:, np.newaxis] * path[0]
-    path = np.concatenate([ramp, path])
-    n = len(path)
+    n = lead + len(path)
     scored = slice(lead + round(settle / step), n)
     if scored.start >= n:
         raise ModelError(
@@ -180,6 +178,9 @@ def track(
     loop = PressureLoop(low, high, step)
     controller.reset(step)
     measured = changed.reset(seed)
+    share = np.linspace(0.0, 1.0, lead, endpoint=False)[:, np.newaxis]
+    begun = measured[at_y]  # a length at rest is not 0
+    path = np.concatenate([begun + share * (path[0] - begun), path])
     late = [measured] * (delay + 1)
     seen, commands = np.empty((n, len(measured))), np.empty((n, len(driven)))
     clipped, unreached, times = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), np.empty(n)

@@ -9,8 +9,8 @@ unit's samples on average (Lee, Barber and Willett, Distribution-free inference 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,14 +23,17 @@ from mckibben.blocks.free_runs import free_run
 from mckibben.blocks.inverse import commands
 from mckibben.blocks.runs import FreeRun
 from mckibben.errors import DataError, ModelError
+from mckibben.keywords import SimulateKeywords
 from mckibben.numerals import numeral
 from mckibben.numerics.blocks import block_length
 from mckibben.numerics.statistics import correlation_length
 from mckibben.recording import Recording, check_sample_times, listed
+from mckibben.registry import load
 from mckibben.signals.reversals import reversals
 from mckibben.signals.shared_rows import check_shared
 from mckibben.system.atomic import Numbers
 from mckibben.system.progress import Tell, one_by_one, telling
+from mckibben.system.showing import Result
 
 if TYPE_CHECKING:
     from mckibben.splits import Split
@@ -72,12 +75,13 @@ SHARES = 0.8, 0.97
 """Least and greatest share of the samples of a test recording in a band of 0.9 that is known."""
 
 
-@dataclass(frozen=True)
-class Calibration:
-    """A band, and its width.
+@dataclass(frozen=True, repr=False)
+class Calibration(Result):
+    """A model with a band, and the band's width.
 
     Parameters
     ----------
+    model : Banded
     band : Band
     runs : int
         Recordings of the calibration.
@@ -89,11 +93,29 @@ class Calibration:
         These over the width of a band that is the same everywhere.
     """
 
+    face: ClassVar[str] = "calibration"
+
+    model: Banded = field(repr=False)
     band: Band
     runs: int
     memory: float
     widths: tuple[float, ...]
     over_constant: tuple[float, ...]
+    fitted_known: bool = False
+    """Whether it was made sure that the model was not fitted to these recordings."""
+
+    def at(self, level: float) -> Banded:
+        """Return the model with the band of another level."""
+        return self.model.at(level)
+
+    def simulate(self, data: Any, **options: Unpack[SimulateKeywords]) -> Any:
+        """Simulate the model on a recording; see `mckibben.simulate`."""
+        return load("operations", "simulate")(self.model, data, **options)
+
+    @property
+    def drawn(self) -> Block:
+        """What a plot of it draws."""
+        return self.model
 
     def to_dict(self) -> dict[str, Any]:
         """Return the numbers, for JSON."""
@@ -116,12 +138,12 @@ def calibrate(
     exchangeable: Unit = "auto",
     fitted: Sequence[Recording] = (),
     progress: bool | Tell | None = None,
-) -> Banded:
+) -> Calibration:
     """Return a model with a band that covers a share of the samples of new, similar runs.
 
     The model runs free over each recording, and its errors give the half width of the band by split
     conformal prediction. The width is constant, or grows with the speed of the modelled output,
-    whichever is narrower in cross-validation. ``banded.at(0.9)`` chooses the level; n units allow
+    whichever is narrower in cross-validation. ``found.at(0.9)`` chooses the level; n units allow
     n / (n + 1). On motion of another kind than the recordings' no level is guaranteed.
 
     Parameters
@@ -157,19 +179,7 @@ def calibrate(
     >>> list(mckibben.calibrate(model, run).at(0.8).simulate(run).channels)
     ['pressure', 'displacement', 'displacement_lower', 'displacement_upper']
     """
-    with telling(progress, "calibrating") as tell:
-        return calibration(model, listed(recordings), exchangeable, listed(fitted), tell)[0]
-
-
-def calibration(
-    model: Block,
-    recordings: Sequence[Recording],
-    exchangeable: Unit = "auto",
-    fitted: Sequence[Recording] = (),
-    tell: Tell | None = None,
-) -> tuple[Banded, Calibration]:
-    """Return a model with its band, and the band's width; see `calibrate`."""
-    model = inside(model)
+    model, recordings, fitted = inside(model), listed(recordings), listed(fitted)
     if commands(model):
         raise ModelError(
             f"{model.title!r} computes inputs, but bands are of outputs",
@@ -182,11 +192,11 @@ def calibration(
         check_units(recording, model.outputs)
     inputs, outputs = ([c.name for c in channels] for channels in (model.inputs, model.outputs))
     check_shared({"fit": fitted, "calibrate": recordings}, inputs, outputs)
-    runs = [free_run(model, one) for one in one_by_one(recordings, tell)]
+    with telling(progress, "calibrating") as tell:
+        runs = [free_run(model, one) for one in one_by_one(recordings, tell)]
     # the first sample, a start, is not scored
     held = [replace(run, counts=np.arange(len(run)) > 0) for run in runs]
-    found = find_band(model, held, exchangeable)
-    return Banded(model, found.band), found
+    return replace(find_band(model, held, exchangeable), fitted_known=bool(fitted))
 
 
 def find_band(
@@ -234,7 +244,7 @@ def find_band(
         level=level,
         memory=memory * max(run.sample_time or 0.0 for run in runs),
     )
-    return Calibration(band, len(runs), memory, widths, ratios)
+    return Calibration(Banded(model, band), band, len(runs), memory, widths, ratios)
 
 
 def _narrowest(

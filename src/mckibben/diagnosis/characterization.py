@@ -32,8 +32,7 @@ from mckibben.numerics.statistics import half_interval, hats
 from mckibben.recording import FEWEST_SAMPLES, Recording, listed
 from mckibben.signals.holds import STILL, holds, moves
 from mckibben.signals.reversals import whole_cycles
-from mckibben.system.atomic import Numbers
-from mckibben.system.showing import DrawsItself
+from mckibben.system.showing import Result
 
 LEVEL, NO_GAP = 0.01, 0.01
 """Significance level of the loop test; mean gap between branches, relative to the output range,
@@ -64,8 +63,8 @@ class Level:
     found: Characterization
 
 
-@dataclass(frozen=True, kw_only=True)
-class Characterization(DrawsItself, Numbers):
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Characterization(Result):
     """Characterization of a muscle from recordings; None for quantities that they do not determine.
 
     Units are those of the channels; percentages are of the output range. Figures are medians over
@@ -109,6 +108,8 @@ class Characterization(DrawsItself, Numbers):
     levels : tuple of Level
         Levels at which other inputs are constant. The loop is that of the level of largest output
         motion.
+    notes : tuple of str
+        What was assumed in reading.
     """
 
     face: ClassVar[str] = "characterization"
@@ -149,9 +150,13 @@ class Characterization(DrawsItself, Numbers):
     falls: bool = False
     levels: tuple[Level, ...] = ()
     intervals: dict[str, Range] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
-    def __repr__(self) -> str:
-        return str(self)
+    def to_frame(self) -> Any:
+        """Return the cycles as a data frame: extremes, mean speed, and width [%]."""
+        import pandas as pd
+
+        return pd.DataFrame([vars(one) for one in self.cycles])
 
     @property
     def output_span(self) -> float:

@@ -23,7 +23,7 @@ from mckibben.recording import Recording, check_sample_times, listed
 from mckibben.signals.shared_rows import check_shared
 from mckibben.system.atomic import Numbers, plain
 from mckibben.system.progress import Tell, one_by_one, telling
-from mckibben.system.showing import DrawsItself
+from mckibben.system.showing import Result
 from mckibben.system.threads import one_blas_thread
 
 FEWEST_IN_ALL, FEWEST_IN_EACH = 60, 10
@@ -166,8 +166,8 @@ class OutputCheck(Numbers):
         return found | {"right": self.right}
 
 
-@dataclass(frozen=True, eq=False)
-class Validation(DrawsItself, Numbers):
+@dataclass(frozen=True, eq=False, repr=False)
+class Validation(Result):
     """Result of a model check on recordings.
 
     Parameters
@@ -193,6 +193,22 @@ class Validation(DrawsItself, Numbers):
     untested: tuple[str, ...] = ()
     runs: tuple[FreeRun, ...] = field(default=(), repr=False)
     description: ModelDescription | None = field(default=None, repr=False)
+
+    @property
+    def residuals(self) -> tuple[Array, ...]:
+        """Modelled less measured outputs of every recording, shape (n, k) each."""
+        return tuple(run.errors for run in self.runs)
+
+    def to_frame(self) -> Any:
+        """Return all causes that were tested, as a data frame."""
+        import pandas as pd
+
+        rows = [
+            {"output": one.output, "missing": each in one.missing, **vars(each)}
+            for one in self.outputs
+            for each in one.suspects
+        ]
+        return pd.DataFrame(rows)
 
     @property
     def right(self) -> bool:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.coupled.balance import balance_in
 from mckibben.blocks.equations import Quantity, quantities, written
 from mckibben.blocks.free_runs import FreeRuns
 from mckibben.blocks.inverse import commands
@@ -22,7 +23,9 @@ from mckibben.estimators.core.uncertainty import (
     unknown,
     vanishing,
 )
-from mckibben.numerics.statistics import student
+from mckibben.estimators.coupled.balance import fixed_in
+from mckibben.estimators.coupled.balance_errors import covariance_of_balance
+from mckibben.numerics.statistics import NORMAL_95, student
 from mckibben.recording import Recording
 from mckibben.system.atomic import Numbers
 
@@ -105,15 +108,13 @@ def describe(
         raise DataError("there are no recordings to describe a model on", remedy="give one or more")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
-        covariance, n_effective = uncertainty(block, recordings)
-        freedom = n_effective - np.isfinite(np.diag(covariance)).sum()
-        half = student(max(freedom, 1.0))
+        covariance, half = uncertainty(block, recordings)
     names = tuple(recording.name for recording in recordings)
     return ModelDescription(written(block), parameters(block, covariance, half), names, fitted)
 
 
 def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, float]:
-    """Return the covariance of a model's parameters, and independent samples; NaN if unknown."""
+    """Return the covariance of a model's parameters, NaN if unknown, and a half width in errors."""
     share = min(1.0, MOST_OPERATIONS / max(_operations(block, recordings), 1.0))
     kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
     share = sum(map(len, kept)) / sum(map(len, recordings))
@@ -122,11 +123,15 @@ def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, f
     runs = FreeRuns.of(block, kept)
     if not np.isfinite(runs.residual).all():
         return unknown(block), np.nan
+    if balance_in(block) is not None:
+        return share * covariance_of_balance(runs, fixed_in(block))[1], NORMAL_95
+    covariance = share * covariance_of(runs, np.flatnonzero(fixed(block)).tolist())[1]
     pairs = zip(runs.runs, runs.modelled, strict=True)
     left = [np.where(r.counts[:, None], r.outputs - found, np.nan) for r, found in pairs]
     n = sum(int(own.sum()) for own in runs.rows)
     n_effective = min(m.effective_sample_size(n) for m in autoregressions(left)) / share
-    return share * covariance_of(runs, np.flatnonzero(fixed(block)).tolist())[1], n_effective
+    freedom = n_effective - np.isfinite(np.diag(covariance)).sum()
+    return covariance, student(max(freedom, 1.0))
 
 
 def parameters(block: Block, covariance: Array, half_width: float) -> tuple[Parameter, ...]:

@@ -31,7 +31,7 @@ from mckibben.recording import COMMAND, MEASURED, REFERENCE, Recording, listed, 
 from mckibben.signals.shared_rows import check_shared
 from mckibben.splits import parts_of
 from mckibben.system.atomic import Numbers
-from mckibben.system.showing import DrawsItself
+from mckibben.system.showing import Result
 
 LONGEST_DELAY, SAMPLES_AT_LIMIT = 1.0, 3
 """Longest delay searched [s], at most an eighth of the log; number of successive samples at an
@@ -90,8 +90,8 @@ class Followed(Numbers):
     parts: Mapping[str, Array] = field(repr=False)
 
 
-@dataclass(frozen=True, eq=False)
-class Review(DrawsItself, Numbers):
+@dataclass(frozen=True, eq=False, repr=False)
+class Review(Result):
     """Review of the log of a running compensator.
 
     Parameters

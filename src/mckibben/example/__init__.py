@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import lzma
 import tempfile
+from functools import cache
 from itertools import accumulate
 from pathlib import Path
 
@@ -20,6 +21,7 @@ PACKED = Path(__file__).parent
 NAMES = ("decaying-triangle.csv", "irregular-triangle.csv")
 
 
+@cache
 def _unpacked() -> Path:
     """Return a folder with the recordings, their descriptions, and ``protocol.json``."""
     folder = (cache_folder() or Path(tempfile.mkdtemp())) / "example"
@@ -46,15 +48,21 @@ def _tables() -> dict[str, bytes]:
     return found
 
 
-FOLDER = _unpacked()
+def __getattr__(name: str) -> Path:
+    """Unpack the recordings when a path of one is asked for.
 
-TRAIN, TEST = (FOLDER / name for name in NAMES)
-"""A recording to fit models to, and one to test them on: pressure [bar], displacement [mm]."""
+    ``TRAIN`` is to fit models to, and ``TEST`` to test them on: pressure [bar], displacement [mm].
+    """
+    if name == "FOLDER":
+        return _unpacked()
+    if name in ("TRAIN", "TEST"):
+        return _unpacked() / NAMES[name == "TEST"]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def files() -> list[Path]:
     """Return the recordings, their descriptions, and ``protocol.json`` with their roles."""
-    return sorted(path for path in FOLDER.iterdir() if path.suffix in (".csv", ".json"))
+    return sorted(path for path in _unpacked().iterdir() if path.suffix in (".csv", ".json"))
 
 
 def copy_to(folder: Path, *, force: bool = False) -> int:

@@ -208,6 +208,8 @@ def _parsed(text: str) -> Folder:
 def _refusing(path: Path) -> Iterator[None]:
     try:
         yield
+    except DataError:
+        raise
     except (RecursionError, ValueError) as error:
         remedy = "correct it; docs/files.md shows what it can hold"
         raise DataError(reason(error), file=path, remedy=remedy) from None

@@ -36,7 +36,9 @@ class Seen:
 
 def seen(source: Source) -> list[Seen]:
     """Return the columns of a table and their channels; on an error, channels by header."""
-    plain = replace(source.request, columns={}, units={}, channels=None, rate=None)
+    plain = replace(
+        source.request, columns={}, units={}, channels=None, rate=None, sample_time=None
+    )
     asked, unasked = (_by_identity(one) for one in (source, replace(source, request=plain)))
     return [
         Seen(

@@ -47,12 +47,13 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
     slowest = max(steps, key=lambda name: steps[name])
     start = max(times[0] for times in needed.values())
     stop = min(times[-1] for times in needed.values())
-    if request.rate is None:
+    if request.step is None:
         whose, grid = f"times of {slowest!r}", needed[slowest]
         grid = grid[(grid >= start) & (grid <= stop)]
     else:
-        whose, count = f"{request.rate:g} a second", int((stop - start) * request.rate + 1e-6) + 1
-        grid = start + np.arange(max(0, count)) / request.rate
+        rate = request.rate or 1.0 / request.step
+        whose, count = f"{rate:g} a second", int((stop - start) * rate + 1e-6) + 1
+        grid = start + np.arange(max(0, count)) / rate
     if grid.size < 2:
         spans = [f"{name} from {t[0]:.6g} to {t[-1]:.6g} s" for name, t in needed.items()]
         problem = f"its channels have no time in common: {'; '.join(spans[:10])}"

@@ -70,7 +70,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     columns, dropped = clocks.on_one(columns, source)
     left_out |= dict.fromkeys(dropped, "it does not cover the times of the others")
     clock = columns.pop("time", None)
-    if clock is not None and clock.values is None and request.rate is not None:
+    if clock is not None and clock.values is None and request.step is not None:
         left_out[clock.header], clock = "the rate is given", None
     times = None if clock is None else times_of(clock, source)
     signals: dict[str, Signal] = {}
@@ -102,7 +102,8 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     assumed = ["time in s"] if times is not None and times.assumed else []
     assumed += [f"{name} in {one.unit}" for name, one in each if one.assumed]
     if assumed:
-        source.warn(f"{ASSUMED}{listed(assumed)}; use `units[CHANNEL]=UNIT` where that is wrong")
+        text = f"{ASSUMED}{listed(assumed)}; use `units[CHANNEL]=UNIT` where that is wrong"
+        source.warn(text, quiet=source.in_memory)  # names in a program are its author's
     absolute = [name for name, kind in references.items() if kind == "absolute"]
     if absolute:
         source.warn(f"absolute pressure, not gauge: {listed(absolute)}; no offset was removed")
@@ -206,8 +207,8 @@ def _calibration(channel: str, column: Column, source: Source) -> dict[str, Any]
     given = source.request.described.channels.get(channel)
     if given is not None and given.value is not None and column.header == channel:
         return {"value": given.value, "unit": given.unit}
-    if channel in source.request.calibration:
-        gain, offset = source.request.calibration[channel]
+    if channel in source.request.lines:
+        gain, offset = source.request.lines[channel]
     elif given is not None and given.is_calibrated and _describes(given, column):
         gain, offset = 1.0 if given.gain is None else given.gain, given.offset or 0.0
     else:

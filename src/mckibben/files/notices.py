@@ -32,11 +32,13 @@ def noted() -> Iterator[list[str]]:
         _NOTED.reset(token)
 
 
-def warn(path: Path, text: str) -> None:
-    """Issue a `DataWarning` about a file, and note it."""
+def warn(path: Path, text: str, *, quiet: bool = False) -> None:
+    """Issue a `DataWarning` about a file, unless ``quiet``, and note it."""
     notes = _NOTED.get()
     if notes is not None and text not in notes:
         notes.append(text)
+    if quiet:
+        return
     frame, level = inspect.currentframe(), 0
     while frame is not None and frame.f_code.co_filename.startswith(_HERE):
         frame, level = frame.f_back, level + 1

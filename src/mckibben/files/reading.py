@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
+from mckibben.channels import by_name
 from mckibben.files import gaps as gaps_in
 from mckibben.files import sources, timebase
 from mckibben.files.channels import about
 from mckibben.files.choosing import Seen, seen
 from mckibben.files.converting import ASSUMED, Times, in_package_units
 from mckibben.files.formats import MOST_BYTES
+from mckibben.files.memory import Data, InMemory, items, table_of
 from mckibben.files.notices import noted
-from mckibben.files.request import Gaps, Request, Source
+from mckibben.files.request import Request, Source
+from mckibben.keywords import ReadKeywords
+from mckibben.options import ReadOptions, given_options
 from mckibben.recording import Recording
+from mckibben.signals import resample, zeroed
 
 MAY_BE_HELD = frozenset(
     {"displacement", "length", "contraction", "angle", "velocity", "force", "temperature"}
@@ -27,48 +32,27 @@ MAY_BE_HELD = frozenset(
 
 
 def read(
-    path: str | Path,
+    data: Data,
+    options: ReadOptions | None = None,
     *,
-    columns: Mapping[str, str] | None = None,
-    units: Mapping[str, str] | None = None,
-    rate: float | None = None,
-    gaps: Gaps = "error",
     channels: Sequence[str] | None = None,
     informative: bool = True,
-    calibration: Mapping[str, tuple[float, float]] | None = None,
-    constants: Mapping[str, tuple[float, str]] | None = None,
     most: float = MOST_BYTES,
-    raw: bool = False,
-    rest_length: float | None = None,
-    header: int = 0,
-    skip: int = 0,
-    encoding: str | None = None,
+    **keywords: Unpack[ReadKeywords],
 ) -> list[Recording]:
-    """Read the recordings in a file, by its ending, or in a folder.
+    """Read recordings from files, by their endings, from folders, or from memory.
 
-    What ``channels.toml`` in the same folder states of the file (columns, units, calibrations,
+    What ``channels.toml`` in the same folder states of a file (columns, units, calibrations,
     constants, files with one signal each; see `mckibben.files.channels`) is used where no option is.
 
     Parameters
     ----------
-    path : path
-        Ends in one of `mckibben.files.formats.READERS`; or a folder: a bag of ROS 2, files with one
-        signal each, or several recordings.
-    columns : mapping of str to str, optional
-        Channel -> column, by its header with or without the unit; ``data[1]`` is the first column of a
-        matrix ``data``. Standard channels are found by common names (``p``, ``Druck``, ...)
-        without it. ``time`` is a channel here. Other columns with flaws are then left out, with a note.
-    units : mapping of str to str, optional
-        Channel -> unit, such as ``{"pressure": "kPa"}``; overrides what the file states.
-    rate : float, optional
-        Samples per second, positive, where there is no column of times. Without either, a scalar in
-        the file, such as ``fs``, is used, or the recording has no time. Channels with separate
-        times are resampled to this rate.
-    gaps : {"error", "split", "interpolate"}
-        Treatment of missing time (a step of more than three median steps) and missing samples
-        (blank, NaN, infinite, or a code such as -9999): raise an error, split into several
-        recordings, or interpolate linearly. Bridged samples are not fitted: ``meta["bridged"]`` has
-        their first and last times.
+    data : path, data frame, mapping of str to array_like, Recording, or sequence of these
+        A path ends in one of `mckibben.files.formats.READERS`; or is a folder: a bag of ROS 2, files
+        with one signal each, or several recordings. Headers of a frame, and names of arrays, are
+        understood as those of a file; options apply to a recording as to the file that `write` makes.
+    options : ReadOptions, optional
+        Its fields may also be given by name; see `mckibben.options.ReadOptions`.
     channels : sequence of str, optional
         Required channels, without missing samples. Others are left out, with a `DataWarning`, if
         samples are missing. By default all channels are required.
@@ -76,25 +60,8 @@ def read(
         Whether recordings must be informative: at least 10 samples, and no constant pressure or
         other requested channel, except a length or a force. Otherwise two samples are enough, as
         for simulating a model.
-    calibration : mapping of str to (float, float), optional
-        Channel -> gain and offset: the channel is gain times the column, plus offset, in the unit that
-        ``units`` or else the header states. ``{"displacement": (-1, 0)}`` reverses a sign.
-    constants : mapping of str to (float, str), optional
-        Channel -> value and unit of a constant quantity without a column, such as ``{"force": (200,
-        "g")}``; a mass is converted to its weight. Overrides columns.
     most : float
         Largest file that is read [bytes].
-    raw : bool
-        Whether codes for missing samples, and counters that seem to wrap, are read as measured.
-    rest_length : float, optional
-        Length of the muscle at displacement 0 [mm], stored in ``meta``: contraction, displacement
-        and length are then converted to each other as needed.
-    header : int
-        Line of a text with the names of columns, counted from 1; 0 to detect it.
-    skip : int
-        Lines after it that are left out.
-    encoding : str, optional
-        Of a text, such as ``"cp932"``; default as found.
 
     Returns
     -------
@@ -109,59 +76,72 @@ def read(
     DataError
         Naming file, channel, row and remedy: file missing, damaged or of an unknown kind; column
         or unit unknown or contradicted; impossible values; time repeated, going back or with gaps;
-        samples missing or fewer than 10.
+        samples missing or fewer than 10; an option that does not apply.
 
     Warns
     -----
     DataWarning
         Of units assumed, jittered time that was resampled, channels put on one clock, gaps bridged, and
         what was left out.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.arange(100) / 50
+    >>> (run,) = read({"p [kPa]": 100 + 50 * np.sin(time), "x": time**2}, rate=50, units={"x": "cm"})
+    >>> run.units["pressure"], float(run["pressure"][0]), run.sample_time
+    ('bar', 1.0, 0.02)
     """
-    request = Request(
-        columns or {},
-        units or {},
-        rate,
-        gaps,
-        channels,
-        informative,
-        calibration or {},
-        constants or {},
-        most,
-        raw,
-        rest_length,
-        header,
-        skip,
-        encoding,
-    )
-    request.check(Path(path))
-    return [each for one in sources.inside(Path(path)) for each in _read(one, request)[0]]
+    chosen = given_options(ReadOptions, options, keywords)
+    request = _request(chosen, channels=channels, informative=informative, most=most)
+    found: list[Recording] = []
+    for one in items(data):
+        if isinstance(one, Path):
+            found += [each for part in sources.inside(one) for each in _read(part, request)[0]]
+        elif isinstance(one, Recording) and not request.interprets:
+            found.append(one)
+        else:
+            found += _read(one, request)[0]
+    return _prepared(found, chosen)
 
 
-def look(path: str | Path, **options: Any) -> tuple[list[Recording], list[Seen]]:
+def _request(options: ReadOptions, **more: Any) -> Request:
+    return Request(**{one.name: getattr(options, one.name) for one in fields(options)}, **more)
+
+
+def _prepared(recordings: list[Recording], options: ReadOptions) -> list[Recording]:
+    """Return recordings cut, resampled and zeroed."""
+    if options.between is not None:
+        recordings = [one.between(*options.between) for one in recordings]
+    if options.resample is not None:
+        recordings = [resample(one, options.resample) for one in recordings]
+    if options.zero:
+        drives = [(*by_name([one])[0], "pressure")[0] for one in recordings]
+        pairs = zip(recordings, drives, strict=True)
+        recordings = [zeroed(one, list(options.zero), over) for one, over in pairs]
+    return recordings
+
+
+def look(
+    data: Path | InMemory,
+    options: ReadOptions,
+    channels: Sequence[str] | None = None,
+    most: float = MOST_BYTES,
+) -> tuple[list[Recording], list[Seen]]:
     """Return recordings as `read` does, and columns as `columns_of` does, in one pass.
 
-    Parameters
-    ----------
-    path : path
-    **options
-        Those of `read`; ``channels`` does not leave out any column.
+    ``channels`` must be there; no column is left out for them.
     """
-    request = Request(**options)
-    request.check(Path(path))
-    recordings, source = _read(Path(path), request)
+    request = _request(options, channels=channels, informative=False, most=most)
+    recordings, source = _read(data, request)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # issued when the recordings were read
-        return recordings, seen(replace(source, request=replace(source.request, channels=None)))
+        columns = seen(replace(source, request=replace(source.request, channels=None)))
+    return _prepared(recordings, options), columns
 
 
-def columns_of(path: str | Path, **options: Any) -> list[Seen]:
+def columns_of(path: str | Path, options: ReadOptions | None = None) -> list[Seen]:
     """Return the columns of a file or a folder's recording, with their channels.
-
-    Parameters
-    ----------
-    path : path
-    **options
-        Those of `read`.
 
     Returns
     -------
@@ -174,18 +154,28 @@ def columns_of(path: str | Path, **options: Any) -> list[Seen]:
         If the file is missing or damaged.
     """
     path = Path(path)
-    request = replace(Request(**options), described=about(path))
+    request = replace(_request(options or ReadOptions()), described=about(path))
     (table, *_), _ = sources.tables(path, request)
     return seen(request.of(table, path))
 
 
-def _read(path: Path, request: Request) -> tuple[list[Recording], Source]:
+def _read(data: Path | InMemory, request: Request) -> tuple[list[Recording], Source]:
     """Return the recordings of a file, with notes after earlier ones, and their first file."""
-    request = replace(request, described=about(path))
+    if isinstance(data, Path):
+        request.check(data)
+        request = replace(request, described=about(data))
     with noted() as notes:
-        tables, digest = sources.tables(path, request)
-        of_each = [request.of(table, path) for table in tables]
-        found = [each for source in of_each for each in _recordings(source, digest)]
+        if isinstance(data, Path):
+            path = data
+            tables, digest = sources.tables(path, request)
+            meta = {"file": str(path), "sha256": digest}
+        else:
+            table, path = table_of(data)
+            tables, meta = [table], {}
+            request.check(path, text=False)
+        in_memory = not isinstance(data, Path)
+        of_each = [request.of(table, path, in_memory=in_memory) for table in tables]
+        found = [each for source in of_each for each in _recordings(source, meta)]
     stated = bool(request.columns or request.units)  # then units that were assumed before are not
     recordings = []
     for recording in found:
@@ -196,7 +186,7 @@ def _read(path: Path, request: Request) -> tuple[list[Recording], Source]:
     return recordings, of_each[0]
 
 
-def _recordings(source: Source, digest: str) -> list[Recording]:
+def _recordings(source: Source, origin: Mapping[str, Any]) -> list[Recording]:
     table, request, path = source.table, source.request, source.path
     found, clock, meta = in_package_units(source)
     channels = {name: signal.samples for name, signal in found.items()}
@@ -220,7 +210,7 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
             meta[key] = {c: v for c, v in before.items() if c not in now} | meta.get(key, {})
     if source.rest_length is not None:
         meta["rest_length"] = source.rest_length
-    meta = {**table.meta, **meta, "file": str(path), "sha256": digest}
+    meta = {**table.meta, **meta, **origin}
     if table.name is not None:
         meta["name"] = f"{path.stem}[{table.name}]"
     recordings = []
@@ -235,7 +225,7 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
 def _stated_step(times: Times | None, source: Source) -> float | None:
     """Return the sample time stated by the caller or the file, checked against the times."""
     table, request = source.table, source.request
-    step = table.sample_time if request.rate is None else 1.0 / request.rate
+    step = table.sample_time if request.step is None else request.step
     if step is None and times is None and not table.own:
         step = request.described.time.sample_time
         return timebase.stated_step(source) if step is None else step
@@ -249,7 +239,9 @@ def _stated_step(times: Times | None, source: Source) -> float | None:
     else:
         return step if table.sample_time is None else table.sample_time
     problem = f"{problem}, which is not the {1 / step:g} a second requested"
-    raise source.error(problem, "leave `rate` out, or delete the column of times", "time")
+    raise source.error(
+        problem, "leave `rate` and `sample_time` out, or delete the column of times", "time"
+    )
 
 
 def _refuse_constant(pieces: Sequence[gaps_in.Piece], source: Source) -> None:

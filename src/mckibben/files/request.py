@@ -3,44 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 from mckibben.errors import DataError, require
 from mckibben.files.channels import Channel, Described, Time
 from mckibben.files.formats import MOST_BYTES
 from mckibben.files.notices import warn
 from mckibben.files.table import Table
-from mckibben.recording import FEWEST_SAMPLES, conversion
+from mckibben.options import ReadOptions
+from mckibben.recording import FEWEST_SAMPLES, SAME_TIME, conversion
 
 LONGEST = 1e6
 """Largest rest length of a muscle [mm]."""
 
-Gaps = Literal["error", "split", "interpolate"]
-
 
 @dataclass(frozen=True)
-class Request:
-    """The options of `mckibben.read`, then the settings of ``channels.toml``."""
+class Request(ReadOptions):
+    """The options of reading, what is to be read, and the settings of ``channels.toml``."""
 
-    columns: Mapping[str, str] = field(default_factory=dict)
-    units: Mapping[str, str] = field(default_factory=dict)
-    rate: float | None = None
-    gaps: Gaps = "error"
     channels: Sequence[str] | None = None
     informative: bool = True
-    calibration: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    constants: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     most: float = MOST_BYTES
-    raw: bool = False
-    rest_length: float | None = None
-    header: int = 0
-    skip: int = 0
-    encoding: str | None = None
     described: Described = field(default_factory=Described)
+
+    @property
+    def step(self) -> float | None:
+        """Sample time as requested [s]."""
+        return self.sample_time if self.rate is None else 1.0 / self.rate
 
     @property
     def fewest(self) -> int:
@@ -57,31 +50,57 @@ class Request:
         return channel in (self.channels or ()) or channel in self.columns
 
     def needs(self, channel: str) -> bool:
-        """Return whether a flaw of a channel is an error: it is requested, or none is."""
-        return not self.names_channels or channel == "time" or self.asks_for(channel)
+        """Return whether a flaw of a channel is an error: it is requested, has a unit, or none is."""
+        stated = channel == "time" or channel in self.units
+        return not self.names_channels or stated or self.asks_for(channel)
 
-    def of(self, table: Table, path: Path) -> Source:
+    def of(self, table: Table, path: Path, *, in_memory: bool = False) -> Source:
         """Return a table with this request; constants are added to the description.
 
         What this package wrote was described when it was first read, and is not calibrated twice.
         """
         channels, time = dict(self.described.channels), self.described.time
         if table.own:
+            self._check_units(table, path)
             done: Any = table.meta.get("calibration") or {}
             time, every = Time(), channels.items()
             channels = {c: one for c, one in every if one.is_calibrated and c not in done}
         for name, (value, unit) in self.constants.items():
             channels[name] = Channel(value=value, unit=unit.strip() or None)
         described = self.described.model_copy(update={"channels": channels, "time": time})
-        return Source(table, replace(self, described=described), path)
+        return Source(table, replace(self, described=described), path, in_memory)
 
-    def check(self, path: Path) -> None:
-        """Raise an error for options that are invalid for any file."""
+    def _check_units(self, table: Table, path: Path) -> None:
+        """Raise an error for a unit in which a channel of a recording is not."""
+        for one in table.columns:
+            stated = self.units.get(one.header, one.unit)
+            if stated != one.unit and one.header not in self.calibration:
+                problem = f"it is in {one.unit or 'no unit'}, and not in {stated}"
+                remedy = "leave the unit out, or state a gain with `calibration`"
+                raise DataError(
+                    problem, file=path, parameter="units", channel=one.header, remedy=remedy
+                )
+
+    @property
+    def interprets(self) -> bool:
+        """Whether an option of reading, and not of what is done then, is given."""
+        plain, done = ReadOptions(), ("between", "resample", "zero")
+        names = [one.name for one in fields(plain) if one.name not in done]
+        return any(getattr(self, name) != getattr(plain, name) for name in names)
+
+    def check(self, path: Path, *, text: bool = True) -> None:
+        """Raise an error for options that are invalid for any file, or for what is no ``text``."""
         error = partial(DataError, file=path)
-        ways = get_args(Gaps)
-        require(self.gaps in ways, "gaps", self.gaps, f"one of {', '.join(ways)}", error)
+        for name in () if text else ("header", "skip", "encoding"):
+            if getattr(self, name):
+                raise error("it is of text files", parameter=name, remedy="leave it out")
         possible = self.rate is None or 0 < self.rate < math.inf
         require(possible, "rate", self.rate, "a positive number of samples a second", error)
+        possible = self.sample_time is None or 0 < self.sample_time < math.inf
+        require(possible, "sample_time", self.sample_time, "a positive time in seconds", error)
+        if self.rate and self.sample_time and abs(self.rate * self.sample_time - 1.0) > SAME_TIME:
+            problem = f"it is {self.sample_time:g} s, but `rate` is {self.rate:g} Hz"
+            raise error(problem, parameter="sample_time", remedy="give one of both")
         possible = self.rest_length is None or 0 < self.rest_length <= LONGEST
         require(possible, "rest_length", self.rest_length, f"a length up to {LONGEST:g} mm", error)
         for name, lines in (("header", self.header), ("skip", self.skip)):
@@ -90,7 +109,7 @@ class Request:
             if not math.isfinite(value) or channel in ("", "time", *self.columns):
                 remedy = "give a finite number, to a channel that is no column and not time"
                 raise error(f"it cannot be the constant {value:g}", channel=channel, remedy=remedy)
-        for channel, (gain, offset) in self.calibration.items():
+        for channel, (gain, offset) in self.lines.items():
             if not (math.isfinite(gain) and math.isfinite(offset) and gain):
                 problem = f"it cannot be {gain:g} times a column plus {offset:g}"
                 raise error(problem, channel=channel, remedy="give finite numbers, the gain not 0")
@@ -103,6 +122,7 @@ class Source:
     table: Table
     request: Request
     path: Path
+    in_memory: bool = False
 
     @property
     def rest_length(self) -> float | None:
@@ -126,6 +146,6 @@ class Source:
         row = None if sample is None else self.table.row(sample)
         return DataError(problem, remedy=remedy, file=self.path, channel=channel, row=row)
 
-    def warn(self, text: str) -> None:
-        """Issue a `DataWarning` about this file, and note it."""
-        warn(self.path, text)
+    def warn(self, text: str, *, quiet: bool = False) -> None:
+        """Issue a `DataWarning` about this file, unless ``quiet``, and note it."""
+        warn(self.path, text, quiet=quiet)

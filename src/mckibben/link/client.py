@@ -244,7 +244,7 @@ class Link(AbstractContextManager["Link"]):
         return self._state(self._ask(Kind.STATE))
 
     def memory(self) -> Array:
-        """Return the memory of the model, in the order of its C; see `mckibben.export.state_of`."""
+        """Return the memory of the model, in the order of its C; see `mckibben.exporting.state_of`."""
         n, most, body = self.device.n_memory, (ROOM - 1) // self._kind.itemsize, b""
         for first in range(0, n, most):
             body += self._ask(Kind.READ, struct.pack("<HB", first, min(most, n - first)))

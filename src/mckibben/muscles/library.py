@@ -195,9 +195,10 @@ def parsed(path: Path) -> dict[str, Any]:
     DataError
         If it cannot be read, or is no TOML.
     """
+    text = read_text(path, most=DESCRIPTION).removeprefix("\ufeff")
     try:
-        return tomllib.loads(read_text(path, most=DESCRIPTION).removeprefix("\ufeff"))
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        return tomllib.loads(text)
+    except (RecursionError, ValueError) as error:
         raise DataError(f"it is no TOML: {error}", file=path, remedy="correct it there") from None
 
 

@@ -45,19 +45,15 @@ def resized(
     force = area * pressure
     sizes = {"": 1.0, "N": force, "N/bar": area, "bar": pressure, "mm": length}
     sizes |= {"mm/bar": length / pressure}
-    stiffness = force / length
-    tiles = {
-        "springs": [force, *len(balance.driven) * [stiffness]],
-        "obstacles": [1.0, length, *(1 + balance.n_schedules) * [stiffness]],
-    }
-    units = {name: TABLE[name].unit for name in Balance.parameters if name != "loads"}
-    units |= dict.fromkeys(("limits", "hull", "scale"), "mm")
-    units |= dict.fromkeys(("highest_pressure", "preload", "drive"), "bar")
+    names = (name for name in Balance.parameters if name != "loads")
+    units = {name: TABLE[name].units(balance.sizes) for name in names}
+    units |= dict.fromkeys(("limits", "hull", "scale"), ("mm",))
+    units |= dict.fromkeys(("highest_pressure", "preload", "drive"), ("bar",))
     changed: dict[str, Any] = {}
-    for name, unit in units.items():
+    for name, of_numbers in units.items():
         value = np.array(getattr(balance, name) or (), dtype=np.float64)
         if value.size:
-            by = np.array(tiles.get(name, [sizes.get(unit, stiffness)]))
+            by = np.array([sizes.get(unit, force / length) for unit in of_numbers])
             changed[name] = rows(value * np.resize(by, value.shape[-1:]))
     if balance.pressure_range is not None:
         changed["pressure_range"] = tuple(pressure * end for end in balance.pressure_range)

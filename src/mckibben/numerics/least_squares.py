@@ -71,7 +71,6 @@ def solve_products(
     *,
     effects: Array | None = None,
     bounded: Mask | None = None,
-    near: Array | None = None,
 ) -> Array:
     """Return damped least squares from products of columns and targets, of all in a stack.
 
@@ -90,8 +89,6 @@ def solve_products(
         the stack.
     bounded : array of bool, shape (width,), optional
         Which coefficients are non-negative; default none.
-    near : array, shape (width,), optional
-        Towards what coefficients are damped; default 0.
 
     Returns
     -------
@@ -109,8 +106,6 @@ def solve_products(
     damping = np.broadcast_to(ridge, width)[order]
     a = products[:, order][:, :, order] / (size * size.transpose(0, 2, 1)) + np.diag(damping)
     b = products[:, order, width:] / size
-    if near is not None:
-        b += damping[:, np.newaxis] * size * near[order, np.newaxis]
     if first == width:
         return np.asarray(np.linalg.solve(a, b) / size)
     lower = np.linalg.cholesky(a)

@@ -24,6 +24,7 @@ from mckibben.recording import Recording
 from mckibben.rigs import Rig, load_rig, record
 from mckibben.signals.protocol import Protocol, Role, protocol
 from mckibben.system.progress import telling
+from mckibben.system.showing import Result
 from mckibben.system.threads import one_blas_thread
 
 Cell = str | float | None
@@ -68,8 +69,8 @@ class Figure:
     panels: Mapping[str, Curves]
 
 
-@dataclass(frozen=True)
-class Reproduction:
+@dataclass(frozen=True, repr=False)
+class Reproduction(Result):
     """A re-run of a paper's experiment: on a rig or recordings, with notes on differences."""
 
     name: str
@@ -81,6 +82,15 @@ class Reproduction:
     notes: tuple[str, ...]
     quick: bool = False
     seed: int = 0
+
+    face: ClassVar[str] = "reproduction"
+
+    def to_frame(self) -> Any:
+        """Return the rows of all tables, each with the key of its table."""
+        import pandas as pd
+
+        frames = [pd.DataFrame(table.to_dict()["rows"]) for table in self.tables]
+        return pd.concat(frames, keys=[table.key for table in self.tables], names=["table", "row"])
 
     def to_dict(self) -> dict[str, Any]:
         """Return all but the figures, as in ``tables.json``."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from mckibben.planning.motion import motion
 from mckibben.recording import Recording, listed, sample_time_of
 from mckibben.rigs import Rig, load_rig
 from mckibben.signals.checking import generator
+from mckibben.system.showing import Result
 
 MOST_MINUTES = 60.0
 """Longest plan [min]; a longer one is better made in two."""
@@ -41,8 +42,8 @@ class Step:
     gaps: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, repr=False)
+class Plan(Result):
     """Plan of the next recording: commands over time, and the purpose of each part.
 
     Parameters
@@ -59,6 +60,13 @@ class Plan:
     steps: tuple[Step, ...] = field(repr=False)
     gaps: tuple[Gap, ...] = field(default=(), repr=False)
     extrapolated: tuple[str, ...] = ()
+
+    face: ClassVar[str] = "plan"
+
+    @property
+    def drawn(self) -> Recording:
+        """What a plot of it draws."""
+        return self.recording
 
     def to_dict(self) -> dict[str, Any]:
         """Return all but the samples, for JSON."""

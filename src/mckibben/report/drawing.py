@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.channels import channel_symbol
 from mckibben.recording import Recording
 
 Style = Literal["line", "fine", "broad", "beads", "specks", "dots", "rings", "ticks", "stems"]
@@ -25,7 +26,7 @@ JUMP = 0.05
 """Median step of the input over its range from which a path is drawn as dots: a line would cross the
 loop at every step."""
 
-N_COLOURS = 6
+N_COLOURS = 10
 """Number of distinguishable colours, the most models or recordings in a panel."""
 
 N_AGES = 5
@@ -43,7 +44,7 @@ class Curve:
     name : str
         In the legend; empty for none.
     colour : str
-        ``"measured"``, ``"input"``, ``"series-1"`` to ``"series-6"``, or ``"age-1"`` (early) to
+        ``"measured"``, ``"input"``, ``"series-1"`` to ``"series-10"``, or ``"age-1"`` (early) to
         ``"age-5"`` (late).
     style : Style
         How the points are drawn.
@@ -71,8 +72,31 @@ class Arrow:
 
 
 @dataclass(frozen=True)
+class Label:
+    """Label of an axis.
+
+    Parameters
+    ----------
+    name : str
+        What is drawn, in words.
+    unit : str
+        Empty for none.
+    symbol : str
+        In LaTeX, as in the equations; empty for none.
+    """
+
+    name: str
+    unit: str = ""
+    symbol: str = ""
+
+    def __str__(self) -> str:
+        """Return name and unit."""
+        return axis_label(self.name, self.unit)
+
+
+@dataclass(frozen=True)
 class Mark:
-    """A vertical line with a label at its top; with an end, a shaded interval."""
+    """A vertical line with a name; with an end, a shaded interval."""
 
     x: float
     text: str
@@ -85,7 +109,7 @@ class Panel:
 
     Parameters
     ----------
-    x_label, y_label : str
+    x_label, y_label : Label or str
         With units.
     curves : tuple of Curve
         Later ones lie on top.
@@ -101,8 +125,8 @@ class Panel:
         Least height of the y axis, so that rounding does not fill it.
     """
 
-    x_label: str
-    y_label: str
+    x_label: Label | str
+    y_label: Label | str
     curves: tuple[Curve, ...]
     title: str = ""
     arrows: tuple[Arrow, ...] = ()
@@ -132,7 +156,7 @@ class Drawing:
         At least one.
     stacked : bool
         Whether the panels stand one below the other on the same x axis; else side by side.
-    columns : int
+    abreast : int
         How many panels stand side by side at most.
     note : str
         What the figure leaves out; empty for nothing.
@@ -140,7 +164,7 @@ class Drawing:
 
     panels: tuple[Panel, ...]
     stacked: bool = False
-    columns: int = 3
+    abreast: int = 3
     note: str = ""
 
 
@@ -172,16 +196,36 @@ def axis_label(channel: str, unit: str) -> str:
     return f"{channel} [{unit}]" if unit else channel
 
 
-def time_label(recording: Recording) -> str:
+def channel_label(
+    recording: Recording, channel: str, symbols: Mapping[str, str] | None = None
+) -> Label:
+    """Return the label of the axis of a channel.
+
+    Parameters
+    ----------
+    recording : Recording
+        With the unit.
+    channel : str
+    symbols : mapping of str to str, optional
+        Of channels in the equations of the model that is drawn; others have their usual ones.
+    """
+    symbol = (symbols or {}).get(channel) or channel_symbol(channel)
+    return Label(channel, recording.units[channel], symbol)
+
+
+TIME = Label("time", "s", "t")
+
+
+def time_label(recording: Recording) -> Label:
     """Return the label of the time axis of a recording."""
-    return "sample" if recording.sample_time is None else "time [s]"
+    return Label("sample") if recording.sample_time is None else TIME
 
 
 def left_out(names: Sequence[str]) -> str:
     """Return the note on curves that are not shown.
 
-    >>> left_out(["run 7", "run 8"])
-    'Not shown: run 7, run 8.'
+    >>> left_out(["run 11", "run 12"])
+    'Not shown: run 11, run 12.'
     """
     if not names:
         return ""

@@ -7,11 +7,12 @@ from dataclasses import replace
 from inspect import signature
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 
 from mckibben.blocks.base import Block
+from mckibben.blocks.equations import channel_symbols
 from mckibben.blocks.ranges import known_ranges
 from mckibben.channels import Channels, any_moves, channels_of
 from mckibben.control.loop import ends
@@ -23,10 +24,11 @@ from mckibben.report import (
     printed,
     subjects,
 )
-from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Panel, axis_label, left_out
-from mckibben.report.shown import Shown, shown, unique
+from mckibben.report.drawing import Curve, Drawing, Panel, axis_label, left_out
+from mckibben.report.shown import MOST_RECORDINGS, Shown, shown, unique
 from mckibben.signals import decaying_triangle
 from mckibben.system.extras import demand
+from mckibben.system.showing import DrawsItself
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,11 +39,15 @@ if TYPE_CHECKING:
     from mckibben.diagnosis.check import Validation
     from mckibben.diagnosis.review import Review
     from mckibben.rigs.rig import Rig
+    from mckibben.studying.simulating import Simulation
     from mckibben.studying.study import Study
 
 T = TypeVar("T")
 
 Recordings = Recording | Sequence[Recording]
+
+Columns = Literal[1, 2]
+"""Of a journal, that a figure is as wide as."""
 
 SCREEN = 6.4 / printed.COLUMN
 """Size of a figure of pyplot over that for print."""
@@ -67,14 +73,19 @@ def draw(thing: Any, kind: str | None = None, **choices: Any) -> Drawing:
     ModelError
         On an unknown kind, or a choice that the figure does not take.
     """
-    known = FIGURES[getattr(thing, "face", "recording")]
+    if kind is not None and not isinstance(kind, str):
+        problem = f"a kind of figure is a text, and this is {type(kind).__name__}"
+        raise ModelError(problem, remedy="name what is drawn with it, as in `recording=RUN`")
+    thing = thing.drawn if isinstance(thing, DrawsItself) else thing
+    known = FIGURES.get(getattr(thing, "face", "recording"), {})
     if kind is None and "recording" in choices and "loops" in known:
         kind = "loops"
     elif kind is None and isinstance(thing, Recording) and pair_of(thing) is None:
         kind = "loop" if {"input", "output"} <= choices.keys() else "time"
-    kind = kind or next(iter(known))
+    kind = kind or next(iter(known), "")
     if kind not in known:
-        raise ModelError(f"there is no figure {kind!r}", remedy=f"use one of {', '.join(known)}")
+        remedy = f"use one of {', '.join(known)}" if known else "use to_dict(), or to_frame()"
+        raise ModelError(f"there is no figure {kind!r}", remedy=remedy)
     taken = [*signature(known[kind]).parameters][1:]
     if unknown := choices.keys() - set(taken):
         raise ModelError(
@@ -84,7 +95,14 @@ def draw(thing: Any, kind: str | None = None, **choices: Any) -> Drawing:
     return known[kind](thing, **choices)
 
 
-def write_figure(thing: Any, path: str | Path, kind: str | None = None, **choices: Any) -> None:
+def write_figure(
+    thing: Any,
+    path: str | Path,
+    kind: str | None = None,
+    *,
+    width: Columns | None = None,
+    **choices: Any,
+) -> None:
     """Write a figure for print, as `draw` makes it.
 
     Parameters
@@ -95,6 +113,9 @@ def write_figure(thing: Any, path: str | Path, kind: str | None = None, **choice
         File to write, ``.png``, ``.svg`` or ``.pdf``.
     kind : str, optional
         Which figure: see `FIGURES`.
+    width : {1, 2}, optional
+        One column of a journal, 88 mm, or two, 180 mm. Default: one, or two for panels side by
+        side.
     **choices
         What the figure takes.
 
@@ -105,7 +126,7 @@ def write_figure(thing: Any, path: str | Path, kind: str | None = None, **choice
     ModelError
         On an unknown kind, or where there is nothing to draw.
     """
-    printed.save(draw(thing, kind, **choices), path)
+    printed.save(draw(thing, kind, **choices), path, width)
 
 
 def plot(thing: Any, kind: str | None, ax: Any, choices: Mapping[str, Any]) -> Axes | list[Axes]:
@@ -113,16 +134,21 @@ def plot(thing: Any, kind: str | None, ax: Any, choices: Mapping[str, Any]) -> A
     demand("matplotlib", "figures", "plots")
     from matplotlib import pyplot, rc_context
 
+    choices = dict(choices)
+    width = choices.pop("width", None)
     drawing = draw(thing, kind, **choices)
-    with rc_context({"text.parse_math": False}):
+    with rc_context({"text.parse_math": False} if width is None else dict(printed.STYLE)):
         axes = [] if ax is None else list(np.ravel(np.asarray(ax, dtype=object)))
-        axes = axes or printed.axes_in(pyplot.figure(layout="constrained"), drawing, SCREEN)
-        if len(axes) != len(drawing.panels):
+        if not axes:
+            scale = SCREEN if width is None else 1.0
+            axes = printed.draw_on(pyplot.figure(layout="constrained"), drawing, width, scale)
+        elif len(axes) == len(drawing.panels):
+            printed.draw_into(axes, drawing)
+        else:
             raise DataError(
                 f"the figure has {len(drawing.panels)} panels, and there are {len(axes)} axes",
                 remedy="pass as many as `ax=[...]`, or none for a new figure",
             )
-        printed.draw_into(axes, drawing)
     return axes[0] if len(axes) == 1 else axes
 
 
@@ -228,7 +254,7 @@ def _block_loop(
     step = block.sample_time or SAMPLE_TIME
     units = {channel.name: channel.unit for channel in block.inputs}
     run = block.simulate(_triangle(block.title, driven, turns, middle, step, units))
-    return subjects.loop([run], driven, given)
+    return subjects.loop([run], driven, given, symbols=channel_symbols(block))
 
 
 def _against(kind: str) -> Callable[..., Drawing]:
@@ -247,6 +273,7 @@ def _against(kind: str) -> Callable[..., Drawing]:
         first, several = next(iter(blocks.values())), _several(recording)
         wanted = output or first.outputs[0].name
         coupled = coupling(several, _driving(first), (wanted,))
+        symbols = channel_symbols(first)
         runs = [
             Shown(
                 one,
@@ -254,12 +281,27 @@ def _against(kind: str) -> Callable[..., Drawing]:
                 wanted,
                 {name: block.simulate(one)[wanted] for name, block in blocks.items()},
                 "",
+                symbols=symbols,
             )
-            for one in several[:N_COLOURS]
+            for one in several[:MOST_RECORDINGS]
         ]
-        return _one_each(runs, kind, [one.name for one in several[N_COLOURS:]])
+        return _one_each(runs, kind, [one.name for one in several[MOST_RECORDINGS:]])
 
     return draw_against
+
+
+def _simulated(kind: str) -> Callable[[Simulation], Drawing]:
+    """Return the drawing function of a simulation, with what was measured where anything was."""
+
+    def draw_simulation(found: Simulation) -> Drawing:
+        run = found.recording
+        if kind == "time" or not found.metrics:
+            return _time(run)
+        output = next(iter(found.metrics))
+        pair = next(name for name in run if name not in found.metrics), output
+        return subjects.against(kind, run, pair, {"model": run[f"{output}_model"]})
+
+    return draw_simulation
 
 
 def _blocks(board: Leaderboard, models: str | Sequence[str]) -> dict[str, Block]:
@@ -287,11 +329,11 @@ def _one_each(
 ) -> Drawing:
     """Draw each recording in separate panels."""
     panels: list[Panel] = []
-    for one in runs[:N_COLOURS]:
+    for one in runs[:MOST_RECORDINGS]:
         drawing = one.draw(kind, models=models)
         title = one.name if len(runs) > 1 else ""
         panels += [replace(panel, title=title) for panel in drawing.panels]
-    named = [*(one.name for one in runs[N_COLOURS:]), *others]
+    named = [*(one.name for one in runs[MOST_RECORDINGS:]), *others]
     return replace(drawing, panels=tuple(panels), note=left_out(named))
 
 
@@ -379,6 +421,7 @@ FIGURES: Mapping[str, Mapping[str, Callable[..., Drawing]]] = MappingProxyType(
         "rig": {"loop": _of_rig(_loop), "time": _of_rig(_time)},
         "block": {"loop": _block_loop, **_AGAINST},
         "leaderboard": {"errors": model_subjects.leaderboard, **_AGAINST},
+        "simulation": {kind: _simulated(kind) for kind in ("fit", "loops", "residuals", "time")},
         "study": {
             "loops": _of_study("loops"),
             "time": _study_recordings(_time),

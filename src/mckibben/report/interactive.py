@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.report.drawing import Curve, Drawing, Panel
+from mckibben.blocks.notation import in_unicode
+from mckibben.report.drawing import Curve, Drawing, Label, Panel
 
 Json = dict[str, Any]
 
@@ -64,6 +65,20 @@ def unpacked(numbers: Json) -> Array:
 def text(words: str) -> str:
     """Return text that plotly.js shows verbatim, with its markup escaped."""
     return escape(words, quote=False)
+
+
+def labelled(label: Label | str) -> str:
+    r"""Return a label with its symbol in plotly.js's markup.
+
+    >>> labelled(Label("pressure_1", "bar", "p_{1}")), labelled(Label("contraction", "", r"\epsilon"))
+    ('pressure_1 <i>p</i><sub>1</sub> [bar]', 'contraction <i>ε</i>')
+    """
+    if isinstance(label, str):
+        return text(label)
+    letter, _, below = in_unicode(label.symbol).partition("_")
+    under = f"<sub>{text(below.strip('{}'))}</sub>" if below else ""
+    symbol = f" <i>{text(letter)}</i>{under}" if letter else ""
+    return f"{text(label.name)}{symbol}{text(f' [{label.unit}]') if label.unit else ''}"
 
 
 def resolved(value: Any, colours: Mapping[str, str]) -> Any:
@@ -126,8 +141,8 @@ def _plot(panels: tuple[Panel, ...]) -> Json:
     return {"data": traces, "layout": layout}
 
 
-def _axis(label: str) -> Json:
-    return {"title": {"text": text(label)}} if label else {}
+def _axis(label: Label | str) -> Json:
+    return {"title": {"text": labelled(label)}} if str(label) else {}
 
 
 def _ticks(panel: Panel) -> Json:

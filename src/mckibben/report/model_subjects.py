@@ -8,16 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.equations import channel_symbols
+from mckibben.channels import channel_symbol
 from mckibben.errors import ModelError
 from mckibben.recording import REFERENCE
 from mckibben.report.drawing import (
     N_COLOURS,
     POINTS,
+    TIME,
     Curve,
     Drawing,
+    Label,
     Panel,
     Style,
     axis_label,
+    channel_label,
     over_time,
     series_colour,
     time_label,
@@ -33,7 +38,7 @@ if TYPE_CHECKING:
 OFF_THE_CHART = 3.0
 """Cross-validated errors beyond so many times the largest test error would squeeze all others."""
 
-BRANCHES = (("rising", "series-1"), ("falling", "series-6"))
+BRANCHES = (("rising", "series-1"), ("falling", "series-2"))
 
 
 def leaderboard(board: Leaderboard) -> Drawing:
@@ -55,13 +60,13 @@ def leaderboard(board: Leaderboard) -> Drawing:
     chosen = [row.validation_rmse for row in ranked]
     ends = np.array([row.rmse_interval or (np.nan, np.nan) for row in ranked], dtype=float)
     ends = np.where(np.isfinite(ends), ends, tested[:, np.newaxis])
-    curves = [Curve(fitted, place, "fit", "input", "ticks")]
+    curves = [Curve(fitted, place, "fit", "measured", "ticks")]
     far = np.zeros(len(ranked), dtype=bool)
     if any(value is not None for value in chosen):
         validated = np.array([np.nan if value is None else value for value in chosen])
         far = validated > OFF_THE_CHART * tested.max()
         validated[far] = np.nan
-        curves.append(Curve(validated, place, "cross-validation", "input", "rings"))
+        curves.append(Curve(validated, place, "cross-validation", "series-2", "rings"))
     interval = (ends[:, 0], ends[:, 1])
     curves.append(Curve(tested, place, "test, 95 % interval", "series-1", "dots", None, interval))
     label = axis_label("RMSE", board.unit)
@@ -90,29 +95,29 @@ def tracking(loops: Mapping[str, Tracked], output: str, points: int = POINTS) ->
     ]
     wanted: Course = (first[REFERENCE + output], "reference", "measured", "broad")
     curves = _courses(first.time, points, wanted, *ways)
-    return Drawing((Panel(time_label(first), axis_label(output, first.units[output]), curves),))
+    return Drawing((Panel(time_label(first), channel_label(first, output), curves),))
 
 
 def inverse_check(check: InverseCheck) -> Drawing:
     """Draw reference and output, their difference, and the input computed by the inverse."""
     wanted, given = check.inverse.inputs[0], check.inverse.outputs[0]
     reference, output = check.reference[:, 0], check.output[:, 0]
-    rows: list[tuple[str, str, list[Course]]] = [
+    letters = channel_symbols(check.inverse)
+    labels = [Label(one.name, one.unit, letters.get(one.name, "")) for one in (wanted, given)]
+    rows: list[tuple[Label, list[Course]]] = [
         (
-            wanted.name,
-            wanted.unit,
+            labels[0],
             [
                 (reference, "reference", "measured", "broad"),
                 (output, "model behind its inverse", "series-1", "line"),
             ],
         ),
-        ("error", wanted.unit, [(output - reference, "", "series-6", "fine")]),
-        (given.name, given.unit, [(check.pressure[:, 0], "", "input", "line")]),
+        (Label("error", wanted.unit), [(output - reference, "", "series-6", "fine")]),
+        (labels[1], [(check.pressure[:, 0], "", "input", "line")]),
     ]
-    x, least = "time [s]" if check.timed else "sample", 1e-6 * float(np.ptp(reference))
+    x, least = TIME if check.timed else Label("sample"), 1e-6 * float(np.ptp(reference))
     panels = [
-        Panel(x, axis_label(name, unit), _courses(check.time, POINTS, *given), least=least)
-        for name, unit, given in rows
+        Panel(x, label, _courses(check.time, POINTS, *given), least=least) for label, given in rows
     ]
     return Drawing(tuple(panels), stacked=True)
 
@@ -127,7 +132,7 @@ def autocorrelation(one: OutputCheck) -> Drawing:
         Curve(lags, -band, "", "input", "fine"),
         Curve(lags, np.array(found.autocorrelation), "", "series-1", "stems"),
     )
-    return Drawing((Panel("lag [samples]", "autocorrelation", curves, zero=True),), columns=1)
+    return Drawing((Panel("lag [samples]", "autocorrelation", curves, zero=True),), abreast=1)
 
 
 def pattern(one: OutputCheck, against: Pattern) -> Drawing:
@@ -141,7 +146,8 @@ def pattern(one: OutputCheck, against: Pattern) -> Drawing:
         curves += [Curve(x, end, "", colour, "fine") for end in ends.T]
         curves.append(Curve(x, np.array([each.mean for each in bins]), label, colour, "beads"))
     what = "modelled " if against.against == "output" else ""
-    x_label = axis_label(f"{what}{against.channel}", against.unit)
+    symbol = channel_symbol(against.channel)
+    x_label = Label(f"{what}{against.channel}", against.unit, symbol)
     y_label = axis_label("residual", one.unit)
     return Drawing((Panel(x_label, y_label, tuple(curves), zero=True, least=1e-6 * one.span),))
 
@@ -156,8 +162,9 @@ def parts(one: Followed, points: int = POINTS) -> Drawing:
         (one.measured - one.reference, "error", "measured", "broad"),
         *((y, kind, series_colour(k), "line") for k, (kind, y) in enumerate(one.parts.items())),
     ]
+    labels = Label(one.output, one.unit, channel_symbol(one.output)), Label("error", one.unit)
     panels = [
-        Panel("time [s]", axis_label(name, one.unit), _courses(one.time, points, *given), zero=zero)
-        for name, given, zero in ((one.output, above, False), ("error", below, True))
+        Panel(TIME, label, _courses(one.time, points, *given), zero=zero)
+        for label, given, zero in zip(labels, (above, below), (False, True), strict=True)
     ]
     return Drawing(tuple(panels), stacked=True)

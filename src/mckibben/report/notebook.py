@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.errors import in_terms_of
 from mckibben.recording import Recording
 from mckibben.report import results, words
 from mckibben.report.builder import Item, Table, Text, cell
@@ -43,7 +44,8 @@ class Card:
     @property
     def lines(self) -> list[str]:
         """Every sentence."""
-        return [line for one in self.items if isinstance(one, Text) for line in one.sentences]
+        texts = [one for one in self.items if isinstance(one, Text)]
+        return [in_terms_of(line) for one in texts for line in one.sentences]
 
     @property
     def tables(self) -> list[Table]:
@@ -74,7 +76,8 @@ def card(thing: Any) -> Card:
     """Return the card of an object, by its ``face``."""
     pair = pair_of(thing) if isinstance(thing, Recording) else None
     path = None if pair is None else (thing[pair[0]], thing[pair[1]])
-    return Card(TITLES[thing.face](thing), results.FACES[thing.face](thing), path)
+    title = TITLES.get(thing.face, lambda one: type(one).__name__)(thing)
+    return Card(title, results.FACES[thing.face](thing), path)
 
 
 def _read_out(table: Table) -> str:

@@ -6,16 +6,17 @@ Neither pyplot nor any global state is touched, and the same drawing gives the s
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
 from mckibben.errors import DataError
 from mckibben.outputs import MAKER
-from mckibben.report.drawing import Curve, Drawing, Panel
+from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Label, Panel
 from mckibben.system.atomic import replacing
 from mckibben.system.extras import demand
 
@@ -23,25 +24,35 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLUMN = 3.5
-"""Width of a column [in]."""
+COLUMN, PAGE = 88 / 25.4, 180 / 25.4
+"""Width of one column of a journal, and of two with the space between them [in]."""
 
-PAGE = 7.2
-"""Width of two columns and the space between them [in]."""
+PAGE_HEIGHT, LEAST_HEIGHT = 240 / 25.4, 0.5
+"""Largest height of a figure, and least height of axes, which has priority [in]."""
 
-RESOLUTION = 300
-"""Of PNG [dots per inch]."""
+LABEL_HEIGHT = 0.9
+"""Up to which a label beside axes is not broken [in]."""
+
+PASSES = 3
+"""Labels are broken where axes end, and axes begin where labels end: so often both are laid out."""
+
+RESOLUTION = 600
+"""Of PNG [dots per inch], as journals ask for lines."""
 
 COLOURS: Mapping[str, str] = MappingProxyType(
     {
         "measured": "#222222",
         "input": "#777777",
-        "series-1": "#0072B2",
-        "series-2": "#E69F00",
-        "series-3": "#009E73",
-        "series-4": "#CC79A7",
-        "series-5": "#56B4E9",
-        "series-6": "#D55E00",
+        "series-1": "#0071b0",
+        "series-2": "#e7a209",
+        "series-3": "#701c46",
+        "series-4": "#da701c",
+        "series-5": "#86c9ef",
+        "series-6": "#0d5926",
+        "series-7": "#d187b0",
+        "series-8": "#896ebd",
+        "series-9": "#2d1e79",
+        "series-10": "#a03b11",
         "age-1": "#FDB42F",
         "age-2": "#ED7953",
         "age-3": "#C23C81",
@@ -49,38 +60,59 @@ COLOURS: Mapping[str, str] = MappingProxyType(
         "age-5": "#0D0887",
     }
 )
-"""Okabe and Ito's colours for what differs in kind, a scale from light to dark for time."""
+"""Hues that colour-blind readers distinguish, each of a lightness of its own, for prints in grey."""
+
+PLAIN = 3
+"""Up to so many series are solid lines; more also differ by dashes and markers."""
+
+DASHES, MARKERS = ("-", "--", "-.", ":"), ("", "o", "^")
+"""Of lines: every dash without a marker, then with one after the other."""
+
+DOTS = "os^DvP*X<>"
+"""Markers of points without a line, by series."""
+
+N_MARKERS = 8
+"""Markers along a line."""
 
 STYLE: Mapping[Any, Any] = MappingProxyType(
     {
-        "font.family": "DejaVu Sans",
-        "font.size": 7.5,
+        "font.family": "sans-serif",
+        "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "Helvetica"],
+        "font.size": 8,
+        "mathtext.fontset": "dejavusans",
         "axes.linewidth": 0.6,
         "axes.spines.top": False,
         "axes.spines.right": False,
-        "axes.titlesize": 7.5,
+        "axes.titlesize": 8,
+        "axes.labelsize": 8,
+        "xtick.labelsize": 7,
+        "ytick.labelsize": 7,
         "xtick.major.width": 0.6,
         "ytick.major.width": 0.6,
         "legend.frameon": False,
-        "legend.fontsize": 6.5,
+        "legend.fontsize": 7,
         "figure.facecolor": "white",
         "savefig.facecolor": "white",
         "pdf.fonttype": 42,
-        "svg.fonttype": "path",
+        "svg.fonttype": "none",
         "svg.hashsalt": "mckibben",
         "path.simplify": False,
         "text.parse_math": False,
     }
 )
+"""Letters of 7 to 8 pt, which vector formats hold as text."""
 
 _WIDTHS = {"line": 0.9, "fine": 0.4, "broad": 2.6, "beads": 0.5}
 """Of lines [pt], by style."""
 
-_LEGEND = 45
-"""Largest number of letters of three names in one line of a legend."""
+_POINTS = 72
+"""In an inch."""
 
-_LEGEND_LINE = 0.14
-"""Height that a figure gains by every line of a legend beyond two [in]."""
+_CATEGORIES = 0.35
+"""Largest share of a figure's width for the words beside an axis."""
+
+_HANDLE, _GAP, _BETWEEN = 2.4, 0.6, 1.4
+"""Of a legend: length of a line, its distance from its name, and between columns [letter heights]."""
 
 METADATA: Mapping[str, Mapping[str, str | None]] = MappingProxyType(
     {
@@ -92,7 +124,7 @@ METADATA: Mapping[str, Mapping[str, str | None]] = MappingProxyType(
 """What each format records of what it was made by, and not of when."""
 
 
-def save(drawing: Drawing, path: str | Path) -> None:
+def save(drawing: Drawing, path: str | Path, columns: Literal[1, 2] | None = None) -> None:
     """Write a drawing; on failure an earlier file is unchanged.
 
     Parameters
@@ -100,7 +132,10 @@ def save(drawing: Drawing, path: str | Path) -> None:
     drawing : Drawing
         What to draw.
     path : path
-        File to write; its suffix is ``.png`` (300 dots per inch), ``.svg`` or ``.pdf``.
+        File to write; its suffix is ``.png`` (600 dots per inch), ``.svg`` or ``.pdf``.
+    columns : {1, 2}, optional
+        Width: one column of a journal, 88 mm, or two, 180 mm. Default: one, or two for panels side by
+        side.
 
     Raises
     ------
@@ -113,7 +148,8 @@ def save(drawing: Drawing, path: str | Path) -> None:
 
     figure = io.BytesIO()
     with rc_context(style):
-        drawn(drawing).savefig(figure, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
+        made = drawn(drawing, columns)
+        made.savefig(figure, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
     with replacing(path) as new:
         new.write_bytes(figure.getvalue())
 
@@ -131,44 +167,89 @@ def format_of(path: Path) -> str:
     return kind
 
 
-def drawn(drawing: Drawing) -> Figure:
+def drawn(drawing: Drawing, columns: Literal[1, 2] | None = None) -> Figure:
     """Return a drawing as a matplotlib figure; `save` adds the style of this module."""
     demand("matplotlib", "figures", "figures for print")
     from matplotlib.figure import Figure
 
-    figure = Figure(layout="constrained")
-    draw_into(axes_in(figure, drawing), drawing)
+    figure = Figure(layout="constrained", dpi=RESOLUTION)  # letters are measured as they are drawn
+    draw_on(figure, drawing, columns)
     return figure
 
 
-def axes_in(figure: Figure, drawing: Drawing, scale: float = 1.0) -> list[Axes]:
-    """Return the axes of a drawing's panels in a new figure of suitable size."""
+def draw_on(
+    figure: Figure, drawing: Drawing, columns: Literal[1, 2] | None = None, scale: float = 1.0
+) -> list[Axes]:
+    """Draw into a new figure, and return its axes.
+
+    The figure is as high as its axes, labels and legends need; so no text is cut off or lies on
+    another.
+
+    Parameters
+    ----------
+    figure : Figure
+        Empty, with the layout ``"constrained"``.
+    drawing : Drawing
+    columns : {1, 2}, optional
+        Width, as in `save`.
+    scale : float
+        Of width and height.
+    """
     n = len(drawing.panels)
-    columns = 1 if drawing.stacked else min(n, drawing.columns)
-    rows = -(-n // columns)
-    width = COLUMN if columns == 1 else PAGE
-    panel_height = 1.4 if drawing.stacked else min(0.8 * width / columns, 2.6)
-    if drawing.panels[0].categories:
-        panel_height = 0.9 + 0.2 * len(drawing.panels[0].categories)
-    elif drawing.columns == 1:
-        panel_height = 1.7
-    note = 0.25 if drawing.note else 0.0
-    names = [[curve.name for curve in panel.curves if curve.name] for panel in drawing.panels]
-    lines = max(-(-len(own) // _legend_columns(own)) for own in names)
-    height = rows * panel_height + 0.2 + note + _LEGEND_LINE * max(lines - 2, 0)
-    figure.set_size_inches(scale * width, scale * height)
-    axes = figure.subplots(rows, columns, squeeze=False, sharex=drawing.stacked).ravel()
-    for axis in axes[n:]:
+    abreast = 1 if drawing.stacked or columns == 1 else min(n, drawing.abreast)
+    rows = -(-n // abreast)
+    width = scale * (COLUMN if (columns or min(abreast, 2)) == 1 else PAGE)
+    height = scale * _axes_height(drawing, width / scale / abreast)
+    figure.set_size_inches(width, 3 * rows * height)
+    every = list(figure.subplots(rows, abreast, squeeze=False, sharex=drawing.stacked).ravel())
+    axes = every[:n]
+    for axis in every[n:]:
         axis.set_axis_off()
+    for place, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=True)):
+        draw_panel(
+            axis, panel, bottom=not drawing.stacked or place == n - 1, styled=styled(drawing)
+        )
     if drawing.note:
-        figure.supxlabel(verbatim(drawing.note), fontsize="small", wrap=True)
-    return list(axes[:n])
+        size = _size("legend.fontsize")
+        note = wrapped(verbatim(drawing.note), _POINTS * width - 2 * size, size)
+        figure.supxlabel(note, fontsize=size)
+    for repetition in range(PASSES):
+        figure.draw_without_rendering()
+        boxes = [axis.get_window_extent().height / figure.dpi for axis in every[::abreast]]
+        others = figure.get_size_inches()[1] - sum(boxes)
+        fitting = min(height, max((scale * PAGE_HEIGHT - others) / rows, LEAST_HEIGHT))
+        for panel, axis in zip(drawing.panels, axes, strict=True):
+            wrap_labels(axis, panel, _POINTS * max(fitting, LABEL_HEIGHT))
+        if repetition:
+            figure.set_size_inches(width, others + rows * fitting)
+        else:
+            _legends(figure, axes)
+    return axes
+
+
+def _legends(figure: Figure, axes: Sequence[Axes]) -> None:
+    """Add one legend above all axes, or one to each where a look has several names.
+
+    The figure becomes as high as the legends need at most.
+    """
+    own = [_entries(axis) for axis in axes]
+    every = list({(one.name, one.look): one for entries in own for one in entries}.values())
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(width, height + sum(map(len, own)))
+    if len({one.look for one in every}) == len(every):
+        _legend(figure, every, _POINTS * width, loc="outside upper left")
+    else:
+        for axis in axes:
+            axis_legend(axis)
 
 
 def draw_into(axes: Sequence[Axes], drawing: Drawing) -> None:
-    """Draw every panel into its axes."""
+    """Draw every panel into given axes, each with its legend above."""
+    last = len(axes) - 1
     for place, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=True)):
-        draw_panel(axis, panel, bottom=not drawing.stacked or place == len(axes) - 1)
+        draw_panel(axis, panel, not drawing.stacked or place == last, styled(drawing))
+        wrap_labels(axis, panel, _inside(axis)[1])
+        axis_legend(axis)
 
 
 def verbatim(words: str) -> str:
@@ -176,12 +257,95 @@ def verbatim(words: str) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in words)
 
 
-def draw_panel(axis: Axes, panel: Panel, bottom: bool) -> None:
+def wrapped(words: str, width: float, size: float) -> str:
+    """Return text in lines of a width, broken where words end, or within words that are longer.
+
+    Parameters
+    ----------
+    words : str
+        In one line.
+    width, size : float
+        Of a line, and of the letters [pt].
+    """
+    lines = [""]
+    for piece in re.findall(rf"[^{_ENDS}]*[{_ENDS}]+|[^{_ENDS}]+", words):
+        if lines[-1] and _width(lines[-1] + piece.rstrip(), size) > width:
+            lines.append("")
+        while (fits := _letters(piece.rstrip(), width, size)) < len(piece.rstrip()):
+            lines[-1], piece = piece[:fits], piece[fits:]
+            lines.append("")
+        lines[-1] += piece
+    return "\n".join(line.strip() for line in lines)
+
+
+_ENDS = r"\s_/,;\-"
+"""Letters after which a name may be broken."""
+
+
+def _letters(words: str, width: float, size: float) -> int:
+    """Return how many letters fit into a width, at least one."""
+    fits = len(words)
+    while fits > 1 and _width(words[:fits], size) > width:
+        fits -= 1
+    return max(fits, 1)
+
+
+def _width(words: str, size: float, mathematics: bool = False) -> float:
+    """Return the width of text [pt]."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import text_to_path
+
+    if not words:
+        return 0.0
+    found = text_to_path.get_text_width_height_descent(
+        words, FontProperties(size=size), mathematics
+    )
+    return float(found[0])
+
+
+def _size(name: str) -> float:
+    """Return a size of letters from matplotlib's settings [pt]."""
+    from matplotlib import rcParams
+    from matplotlib.font_manager import FontProperties
+
+    settings: Mapping[Any, Any] = rcParams
+    return float(FontProperties(size=settings[name]).get_size_in_points())
+
+
+def _figure(axis: Axes) -> Figure:
+    figure = axis.get_figure(root=True)
+    assert figure is not None
+    return figure
+
+
+def _inside(axis: Axes) -> tuple[float, float]:
+    """Return width and height of axes [pt]."""
+    box = axis.get_window_extent()
+    points = _POINTS / _figure(axis).dpi
+    return box.width * points, box.height * points
+
+
+def _axes_height(drawing: Drawing, width: float) -> float:
+    """Return the height of axes [in] in panels of a width."""
+    if drawing.panels[0].categories:
+        return 0.3 + 0.2 * len(drawing.panels[0].categories)
+    if drawing.stacked or drawing.abreast == 1:
+        return 1.2
+    return min(0.62 * width, 2.2)
+
+
+def styled(drawing: Drawing) -> bool:
+    """Return whether a drawing has more series than differ by colour alone."""
+    curves = [curve for panel in drawing.panels for curve in panel.curves]
+    return len({one.colour for one in curves if one.colour.startswith("series")}) > PLAIN
+
+
+def draw_panel(axis: Axes, panel: Panel, bottom: bool, styled: bool = False) -> None:
     """Draw a panel into axes, with the label of x if it is the lowest of a stack."""
     if panel.zero:
         axis.axhline(0, color="#aaaaaa", linewidth=0.6, zorder=0)
     for curve in panel.curves:
-        _curve(axis, curve)
+        _curve(axis, curve, styled)
     for arrow in panel.arrows:
         axis.annotate(
             "",
@@ -190,61 +354,130 @@ def draw_panel(axis: Axes, panel: Panel, bottom: bool) -> None:
             arrowprops={"arrowstyle": "-|>", "color": "#222222", "linewidth": 0.8},
         )
     for mark in panel.marks:
+        look: dict[str, Any] = {"label": verbatim(mark.text)}
         if mark.until is not None:
-            axis.axvspan(mark.x, mark.until, color="#0072b2", alpha=0.1, linewidth=0, zorder=0)
-        axis.axvline(mark.x, color="#777777", linewidth=0.6, linestyle=":")
-        axis.annotate(
-            verbatim(mark.text),
-            xy=(mark.x, 1),
-            xycoords=("data", "axes fraction"),
-            xytext=(2, 1),
-            textcoords="offset points",
-            fontsize=6,
-        )
+            axis.axvspan(mark.x, mark.until, color="#e5eef5", linewidth=0, zorder=0, **look)
+            look = {}
+        axis.axvline(mark.x, color="#777777", linewidth=0.6, linestyle=":", zorder=0, **look)
     if panel.y_range is not None:
         axis.set_ylim(panel.y_range)
     if bottom:
-        axis.set_xlabel(verbatim(panel.x_label))
-    axis.set_ylabel(verbatim(panel.y_label))
+        axis.set_xlabel("x")  # holds the place until `wrap_labels`
+    axis.set_ylabel("y" if str(panel.y_label) else "")
+    if panel.title:
+        axis.set_title("title", loc="left")
     if panel.categories:
-        axis.set_yticks(range(len(panel.categories)), [verbatim(w) for w in panel.categories])
-        axis.set_ylim(len(panel.categories) - 0.5, -0.5)
+        widest = _POINTS * _figure(axis).get_size_inches()[0] * _CATEGORIES
+        size = _size("ytick.labelsize")
+        words = [wrapped(verbatim(one), widest, size) for one in panel.categories]
+        axis.set_yticks(range(len(words)), words)
+        axis.set_ylim(len(words) - 0.5, -0.5)
         axis.set_xlim(left=0)
-    handles, names = axis.get_legend_handles_labels()
-    if handles:
-        axis.legend(
-            *(handles, names),
-            title=verbatim(panel.title) or None,
-            ncols=_legend_columns(names),
-            loc="lower left",
-            bbox_to_anchor=(0, 1),
+
+
+def wrap_labels(axis: Axes, panel: Panel, height: float) -> None:
+    """Write labels and title of axes in lines as long as these; ``height`` of the axes in pt."""
+    width, size = _inside(axis)[0], _size("axes.labelsize")
+    if axis.get_xlabel():
+        axis.set_xlabel(_worded(panel.x_label, width, size), parse_math=True)
+    if axis.get_ylabel():
+        axis.set_ylabel(_worded(panel.y_label, height, size), parse_math=True)
+    if panel.title:
+        words = wrapped(verbatim(panel.title), width, _size("axes.titlesize"))
+        legend = axis.get_legend()
+        axis.set_title(words, loc="left") if legend is None else legend.set_title(words)
+
+
+def _worded(label: Label | str, width: float, size: float) -> str:
+    """Return a label in lines, with its symbol as mathematics."""
+    if isinstance(label, str):
+        label = Label(label)
+    symbol = f"${label.symbol}$" if label.symbol else ""
+    unit = f"[{verbatim(label.unit)}]" if label.unit else ""
+    tail = " ".join(filter(None, (symbol, unit.replace("$", r"\$"))))
+    words = wrapped(verbatim(label.name), width, size)
+    last = _width(words.rpartition("\n")[2] + " ", size) + _width(tail, size, bool(symbol))
+    return words.replace("$", r"\$") + ("\n" if last > width else " ") * bool(tail) + tail
+
+
+class _Entry(NamedTuple):
+    """What is in a legend: a name, what is drawn, and how it looks."""
+
+    name: str
+    handle: Any
+    look: tuple[Any, ...]
+
+
+def _entries(axis: Axes) -> list[_Entry]:
+    """Return what is in the legend of axes."""
+    found = []
+    for handle, name in zip(*axis.get_legend_handles_labels(), strict=True):
+        attributes = ("color", "linestyle", "linewidth", "marker", "markerfacecolor", "facecolor")
+        look = (getattr(handle, f"get_{one}", lambda: None)() for one in attributes)
+        found.append(_Entry(name, handle, tuple(map(str, look))))
+    return found
+
+
+def axis_legend(axis: Axes) -> None:
+    """Add a legend above axes, no wider than these, and with their title."""
+    _legend(axis, _entries(axis), _inside(axis)[0], loc="lower left", bbox_to_anchor=(0, 1))
+    title, legend = axis.get_title(loc="left"), axis.get_legend()
+    if title and legend is not None:
+        axis.set_title("", loc="left")
+        legend.set_title(title)
+
+
+def _legend(where: Axes | Figure, entries: Sequence[_Entry], width: float, **place: Any) -> None:
+    """Add a legend with as many columns as a width [pt] has room for."""
+    size = _size("legend.fontsize")
+    beside, gap = (_HANDLE + _GAP) * size, _BETWEEN * size
+    room = width - 2 * size
+    names = [wrapped(one.name, room - beside, size) for one in entries]
+    sizes = [beside + max(_width(line, size) for line in name.split("\n")) for name in names]
+
+    def needed(columns: int) -> float:
+        """Return the width of a legend that is filled column by column, as matplotlib does."""
+        return sum(max(one) + gap for one in np.array_split(sizes, columns)) - gap
+
+    fitting = [n for n in range(1, len(names) + 1) if needed(n) <= room]
+    if names:
+        where.legend(
+            *([one.handle for one in entries], names),
+            ncols=max(fitting, default=1),
+            handlelength=_HANDLE,
+            handletextpad=_GAP,
+            columnspacing=_BETWEEN,
             borderaxespad=0.2,
             alignment="left",
+            **place,
         )
-    else:
-        axis.set_title(verbatim(panel.title), loc="left")
 
 
-def _legend_columns(names: Sequence[str]) -> int:
-    return 3 if sum(map(len, names[:3])) < _LEGEND else 1
-
-
-def _curve(axis: Axes, curve: Curve) -> None:
+def _curve(axis: Axes, curve: Curve, styled: bool) -> None:
     colour = COLOURS[curve.colour]
     # A name that begins with an underscore would be left out of the legend.
     label = f" {verbatim(curve.name)}" if curve.name.startswith("_") else verbatim(curve.name)
     look: dict[str, Any] = {"color": colour, "label": label or None}
+    series = int(curve.colour.removeprefix("series-")) - 1 if "series" in curve.colour else None
+    if not styled:
+        series = None
     if curve.style in _WIDTHS:
         look["linewidth"] = _WIDTHS[curve.style]
         if curve.style == "broad":
             look["alpha"] = 0.35
+        if series is not None:
+            look["linestyle"] = DASHES[series % len(DASHES)]
+            look["marker"] = MARKERS[series // len(DASHES)]
+            step = max(curve.x.size // N_MARKERS, 1)
+            look |= {"markersize": 3, "markevery": (series * step // N_COLOURS, step)}
         if curve.style == "beads":
-            look |= {"marker": "o", "markersize": 1.6}
+            bead = "o" if series is None else DOTS[series]
+            look |= {"marker": bead, "markersize": 1.6 if series is None else 2.4, "markevery": 1}
         axis.plot(curve.x, curve.y, **look)
         return
-    look |= {"linestyle": "none", "marker": "o", "markersize": 4}
+    look |= {"linestyle": "none", "marker": DOTS[series or 0], "markersize": 4}
     if curve.style == "specks":
-        look["markersize"] = 1.6
+        look["markersize"] = 1.6 if series is None else 2.4
     elif curve.style == "rings":
         look["markerfacecolor"] = "none"
     elif curve.style == "ticks":

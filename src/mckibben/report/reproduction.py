@@ -147,7 +147,7 @@ def drawing(figure: Figure) -> Drawing:
         seen |= {*given}
         panels.append(Panel(figure.text.x, figure.text.y, tuple(curves), title))
     wide = sum(map(len, names)) > LONGEST
-    return Drawing(tuple(panels), columns=2 if wide or len(panels) in (2, 4) else 3)
+    return Drawing(tuple(panels), abreast=2 if wide or len(panels) in (2, 4) else 3)
 
 
 # -- Markdown ------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from mckibben.papers.paper import paper
 from mckibben.reading import read_files
 from mckibben.recording import Recording
 from mckibben.report.reproduction import reproduction_page
-from mckibben.rigs import load_rig
+from mckibben.rigs import Rig, load_rig
 from mckibben.system import threads, workers
 from mckibben.system.atomic import to_json
 
@@ -27,7 +27,7 @@ def rerun(
     data: Path | None = None,
     reading: ReadOptions | None = None,
     *,
-    rig: str | None = None,
+    rig: str | Path | Rig | None = None,
     out: Path | None = None,
     quick: bool = False,
     seed: int = 0,
@@ -44,7 +44,7 @@ def rerun(
     runs = None if data is None else _recordings(data, reading)
     given: dict[str, Any] = {
         "name": name,
-        "rig": rig and load_rig(rig),
+        "rig": None if rig is None else load_rig(rig),
         "data": runs,
         "quick": quick,
     }

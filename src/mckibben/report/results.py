@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from mckibben import registry
 from mckibben.numerals import counted, numeral, percent
 from mckibben.recording import reading_notes
-from mckibben.report import interactive, model_subjects, words
+from mckibben.report import interactive, model_subjects, reproduction, words
 from mckibben.report.builder import Equations, Figure, Item, Table, Text, Tile
 from mckibben.report.columns import columns_of_board
 from mckibben.report.drawing import POINTS
@@ -214,21 +214,23 @@ def simulation(found: Simulation) -> list[Item]:
         [f"{name} [{units[name]}]", *(one[key] for key in ("rmse", "mae", "max_error", "r2"))]
         for name, one in found.metrics.items()
     ]
-    items: list[Item] = []
-    if rows:
-        items.append(Table(["output", "RMSE", "MAE", "Largest", "R²"], rows))
+    table = Table(["output", "RMSE", "MAE", "Largest", "R²"], rows)
+    items: list[Item] = [table] if rows else recording(found.recording)
     if found.interval is not None:
         items.append(Text([
             f"{name}: the band for {percent(found.interval, 3)} holds {percent(one['coverage'], 3)} of "
             f"the samples; {numeral(one['band_width'], 3)} {units[name]} wide on average"
             for name, one in found.metrics.items()
         ]))  # fmt: skip
+    run = found.recording.name
+    beyond = [words.outside_calibration(run, *each) for each in found.outside]
+    items.append(Text([*found.notes, *beyond], "note", listed=True))
     return items
 
 
 def inverse(found: Inverse) -> list[Item]:
     """Return inputs, outputs and reachable range of an inverse."""
-    made = found.block
+    made = found.model
     units = {channel.name: channel.unit for channel in (*made.inputs, *made.outputs)}
     given, wanted = (
         ", ".join(f"{one.name} [{one.unit}]" if one.unit else one.name for one in side)
@@ -480,7 +482,10 @@ def calibration(found: Calibration) -> list[Item]:
         for channel, width, ratio in zip(band.given, found.widths, found.over_constant, strict=True)
     ]
     headings = ["Output", "Level", "Width of its band", "Unit", "Of one of constant width"]
-    return [Text([said]), Table(headings, rows)]
+    notes = [words.calibrated_on_blocks(found)] if band.unit == "block" else []
+    if not found.fitted_known:
+        notes.append("give `fitted`, which makes sure that no recording was fitted")
+    return [Text([said]), Table(headings, rows), Text(notes, "note", listed=True)]
 
 
 # --- Papers, rigs and devices -----------------------------------------------------------------------
@@ -545,13 +550,23 @@ def device(found: Device, state: State) -> list[Item]:
 FACES: Mapping[str, Callable[[Any], list[Item]]] = MappingProxyType(
     {
         "block": block,
+        "calibration": calibration,
         "characterization": characterization,
+        "contents": contents,
+        "exported": exported,
+        "fit": fit,
+        "inverse": inverse,
         "leaderboard": leaderboard,
+        "learned": learned,
+        "plan": plan,
         "recording": recording,
+        "reproduction": reproduction.items,
         "review": review,
         "rig": rig,
+        "simulation": simulation,
         "study": study,
         "tracked": tracked,
+        "tracking": tracking,
         "validation": check,
     }
 )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.equations import channel_symbols
 from mckibben.diagnosis.coupling import coupling
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
@@ -48,6 +49,8 @@ class Shown:
     test_from: int | None = None
     several: bool = False
     """Whether the recording has other outputs, which are shown separately."""
+    symbols: Mapping[str, str] = field(default_factory=dict)
+    """Of channels, as in the equations of the model that is drawn."""
 
     @property
     def name(self) -> str:
@@ -61,7 +64,8 @@ class Shown:
             problem, remedy = "no model of this study worked", "see the reasons in its leaderboard"
             raise ModelError(problem, remedy=remedy)
         pair = self.input, self.output
-        return against(kind, self.recording, pair, outputs, self.test_from, points)
+        own = self.symbols if len(outputs) == 1 else None
+        return against(kind, self.recording, pair, outputs, self.test_from, points, own)
 
 
 def shown(study: Study) -> tuple[Shown, ...]:
@@ -74,6 +78,8 @@ def shown(study: Study) -> tuple[Shown, ...]:
     coupled = coupling([*study.train, *study.test], board.inputs, board.outputs)
     several = len(board.outputs) > 1
     ranked = [row.model for row in study.leaderboard.rows if row.model in study.predictions]
+    chosen = next((row.block for row in board.rows if row.model in ranked[:1]), None)
+    letters = {} if chosen is None else channel_symbols(chosen)
     n_train = len(study.train)
     parts = [_part_of(study, recording) for recording in study.test]
     runs = [
@@ -91,6 +97,7 @@ def shown(study: Study) -> tuple[Shown, ...]:
             role,
             start,
             several,
+            letters,
         )
         for place, run, role, start in runs
         for column, pair in enumerate(coupled.pairs([run]))

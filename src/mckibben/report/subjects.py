@@ -18,11 +18,12 @@ from mckibben.report.drawing import (
     Arrow,
     Curve,
     Drawing,
+    Label,
     Mark,
     Panel,
     Style,
     along,
-    axis_label,
+    channel_label,
     left_out,
     over_time,
     series_colour,
@@ -46,16 +47,20 @@ def time_course(
             t, y = over_time(recording.time, recording[channel], points)
             name = name if channel == channels[0] else ""
             curves.append(Curve(t, y, name, colour, _measured_style(recording)))
-        panels.append(Panel(time_label(kept[0]), _label(kept[0], channel), tuple(curves)))
+        panels.append(Panel(time_label(kept[0]), channel_label(kept[0], channel), tuple(curves)))
     return Drawing(tuple(panels), stacked=True, note=note)
 
 
 def loop(
-    recordings: Sequence[Recording], input_name: str, output_name: str, points: int = POINTS
+    recordings: Sequence[Recording],
+    input_name: str,
+    output_name: str,
+    points: int = POINTS,
+    symbols: Mapping[str, str] | None = None,
 ) -> Drawing:
     """Draw the output over the input: a single recording coloured by time, several by recording."""
     kept, note = _first(recordings)
-    x_label, y_label = _label(kept[0], input_name), _label(kept[0], output_name)
+    x_label, y_label = (channel_label(kept[0], name, symbols) for name in (input_name, output_name))
     arrows = directions(kept[0][input_name], kept[0][output_name])
     if len(kept) == 1:
         curves = _by_age(kept[0], input_name, output_name, points)
@@ -79,6 +84,7 @@ def against(
     outputs: Mapping[str, Array],
     test_from: int | None = None,
     points: int = POINTS,
+    symbols: Mapping[str, str] | None = None,
 ) -> Drawing:
     """Draw the free runs of models with a recording.
 
@@ -95,6 +101,8 @@ def against(
         First sample that is held out.
     points : int
         Of a curve.
+    symbols : mapping of str to str, optional
+        Of channels, as in the models' equations.
     """
     u, y = recording[pair[0]], recording[pair[1]]
     left, dots = kind == "residuals", _jumps(u)
@@ -106,7 +114,9 @@ def against(
         style: Style = "fine" if left else "line"
         values = y - modelled if left else modelled
         drawn.append((model, series_colour(place), values, style, model))
-    label = axis_label(f"{recording.origin} − model" if left else pair[1], recording.units[pair[1]])
+    label = channel_label(recording, pair[1], symbols)
+    if left:
+        label = Label(f"{recording.origin} − model", label.unit)
     least, panels = 1e-6 * float(np.ptp(y)), []
     if kind != "fit":
         paths = tuple(
@@ -115,7 +125,14 @@ def against(
         )
         arrows = () if left else directions(u, y)
         panels.append(
-            Panel(_label(recording, pair[0]), label, paths, arrows=arrows, zero=left, least=least)
+            Panel(
+                channel_label(recording, pair[0], symbols),
+                label,
+                paths,
+                arrows=arrows,
+                zero=left,
+                least=least,
+            )
         )
     if kind != "loops":
         t = recording.time
@@ -126,7 +143,7 @@ def against(
         marks = () if test_from is None else (Mark(float(t[test_from]), HELD_OUT, float(t[-1])),)
         x = time_label(recording)
         panels.append(Panel(x, label, courses, marks=marks, zero=left, least=least))
-    return Drawing(tuple(panels), columns={"fit": 1, "residuals": 2}.get(kind, 3))
+    return Drawing(tuple(panels), abreast={"fit": 1, "residuals": 2}.get(kind, 3))
 
 
 def directions(u: Array, y: Array) -> tuple[Arrow, ...]:
@@ -203,7 +220,3 @@ def _colours(recordings: Sequence[Recording]) -> list[tuple[str, str]]:
     if len(recordings) == 1:
         return [("", "measured")]
     return [(recording.name, series_colour(i)) for i, recording in enumerate(recordings)]
-
-
-def _label(recording: Recording, channel: str) -> str:
-    return axis_label(channel, recording.units[channel])

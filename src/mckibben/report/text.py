@@ -25,6 +25,13 @@ def lines(items: Sequence[Item]) -> Iterator[str]:
             yield f"{item.what}: {item.text}"
 
 
+def shown(found: Any) -> Iterator[str]:
+    """Return the lines of a result, by its ``face``, and its notes."""
+    from mckibben.report.results import FACES
+
+    yield from lines(FACES[found.face](found))
+
+
 def table(one: Table) -> str:
     """Return a table of the terminal's width; numbers are aligned right, text left."""
     from rich.console import Console

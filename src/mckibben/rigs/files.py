@@ -86,8 +86,9 @@ def _toml(value: Any) -> str:
 
 def fields_of(path: Path) -> dict[str, Any]:
     """Return the fields in a rig's file; raise a `DataError` if it is none."""
+    text = read_text(path, most=DESCRIPTION)
     try:
-        fields = _plain(tomllib.loads(read_text(path, most=DESCRIPTION)))
+        fields = _plain(tomllib.loads(text))
     except (ValueError, RecursionError) as error:
         raise DataError(
             f"this is not TOML: {str(error)[:200]}", file=path, remedy="correct the file"

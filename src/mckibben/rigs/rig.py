@@ -419,19 +419,21 @@ def quantity(channel: str) -> str:
 # -- its file, and the published rig of its name ---------------------------------------------
 
 
-def load_rig(rig: str | Path) -> Rig:
+def load_rig(rig: str | Path | Rig) -> Rig:
     """Return a rig by name, or from a file.
 
     Parameters
     ----------
-    rig : str or path
-        A name of `rig_names`, or a path that ends in ``.toml``.
+    rig : str, path or Rig
+        A name of `rig_names`, or a path that ends in ``.toml``; a rig is returned as it is.
 
     Raises
     ------
     DataError
         On an unknown name, or a file that is not a rig: the text names the parameter and its range.
     """
+    if isinstance(rig, Rig):
+        return rig
     path = named_toml(rig, PUBLISHED, "rig")
     return _from_fields(fields_of(path), path)
 

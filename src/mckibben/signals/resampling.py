@@ -19,33 +19,8 @@ PASS_SHARE = 0.8
 
 
 def cut(recording: Recording, start: float, stop: float = np.inf) -> Recording:
-    """Return the samples from ``start`` up to, not including, ``stop``, in seconds of its own time.
-
-    Parameters
-    ----------
-    recording : Recording
-        With time.
-    start, stop : float
-        In the time of the recording [s], start before stop; they may lie outside of it. Default to
-        the end, with its last sample.
-
-    Raises
-    ------
-    DataError
-        If the recording has no time, or fewer than two samples are left.
-    """
-    step = sample_time_of(recording, "be cut by time", "use Recording.slice, which counts samples")
-    first, last = (
-        int(np.clip(np.ceil((limit - recording.start_time) / step - 1e-6), 0, len(recording)))
-        for limit in (start, stop)
-    )
-    if last - first < 2:
-        raise DataError(
-            f"there are {max(last - first, 0)} samples from {start:g} to {stop:g} s",
-            file=recording.source,
-            remedy=f"stay within {recording.time[0]:g} and {recording.time[-1]:g} s",
-        )
-    return recording.slice(first, last)
+    """Return the samples within a time; see `Recording.between`."""
+    return recording.between(start, stop)
 
 
 def resample(recording: Recording, sample_time: float) -> Recording:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Unpack
 
 from mckibben.blocks.equations import quantities
-from mckibben.system.atomic import Numbers, plain
+from mckibben.files.memory import Data
+from mckibben.keywords import SimulateKeywords
+from mckibben.registry import load
+from mckibben.system.atomic import plain
+from mckibben.system.showing import Result
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
@@ -16,6 +21,7 @@ if TYPE_CHECKING:
     from mckibben.control.connecting import Kind, Plant
     from mckibben.estimators.core.estimator import Estimator
     from mckibben.recording import Recording
+    from mckibben.studying.simulating import Simulation
 
 
 class Price(NamedTuple):
@@ -25,8 +31,8 @@ class Price(NamedTuple):
     force_rmse_unlimited: float
 
 
-@dataclass(frozen=True)
-class Fit(Numbers):
+@dataclass(frozen=True, repr=False)
+class Fit(Result):
     """A fitted model.
 
     Parameters
@@ -50,6 +56,31 @@ class Fit(Numbers):
     notes: tuple[str, ...] = field(default=(), repr=False)
     file: Path | None = None
     price: Price | None = None
+
+    face: ClassVar[str] = "fit"
+
+    @property
+    def drawn(self) -> Block:
+        """What a plot of it draws."""
+        return self.model
+
+    def simulate(self, data: Data, **options: Unpack[SimulateKeywords]) -> Simulation:
+        """Simulate the model on a recording; see `mckibben.simulate`."""
+        found: Simulation = load("operations", "simulate")(self.model, data, **options)
+        return found
+
+    def to_frame(self) -> Any:
+        """Return the parameters as a data frame: name, value, standard error and unit."""
+        import pandas as pd
+
+        about = self.to_dict()
+        columns = {
+            "parameter": about["parameter_names"],
+            "value": about["parameters"],
+            "standard_error": about["standard_errors"],
+            "unit": about["parameter_units"],
+        }
+        return pd.DataFrame(columns)
 
     def to_dict(self) -> dict[str, Any]:
         """Return errors and parameters, for JSON."""
@@ -75,8 +106,8 @@ class Fit(Numbers):
         }
 
 
-@dataclass(frozen=True)
-class Tracking(Numbers):
+@dataclass(frozen=True, repr=False)
+class Tracking(Result):
     """Tracking of a reference by a controller, and without compensation.
 
     Parameters
@@ -116,6 +147,31 @@ class Tracking(Numbers):
     controller_file: Path | None = None
     learned: Learned | None = field(default=None, repr=False)
 
+    face: ClassVar[str] = "tracking"
+
+    @property
+    def drawn(self) -> Tracked:
+        """What a plot of it draws."""
+        return self.tracked
+
+    @property
+    def recording(self) -> Recording:
+        """The run, as `learn` and `review` take it."""
+        return self.tracked.recording
+
+    def to_frame(self) -> Any:
+        """Return the errors as a data frame: RMSE and largest, by controller and output."""
+        import pandas as pd
+
+        ways = {self.law: self.tracked, "no compensation": self.uncompensated.tracked}
+        rows = [
+            {"controller": way, "output": name, "rmse": rmse, "largest": one.largest[name]}
+            for way, one in ways.items()
+            if one is not None
+            for name, rmse in one.rmse.items()
+        ]
+        return pd.DataFrame(rows)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the errors, for JSON."""
         found, without = self.tracked, self.uncompensated.tracked
@@ -138,13 +194,14 @@ def _errors(found: Tracked) -> dict[str, Any]:
     return {"rmse": dict(found.rmse), "largest": dict(found.largest), "clipped": found.clipped}
 
 
-@dataclass(frozen=True)
-class Inverse(Numbers):
+@dataclass(frozen=True, repr=False)
+class Inverse(Result):
     """A compensator, or a force estimator.
 
     Parameters
     ----------
-    block : Block
+    model : Block
+        The compensator.
     kind : {"inverse", "adaptive", "predictive", "learned", "feedforward", "force", "itself"}
         The inverse of a memory, one that learns, looks ahead, or is a trained network; a force in
         closed form, by the pressure or estimated; a model that gives pressures already.
@@ -157,27 +214,45 @@ class Inverse(Numbers):
         Where it is saved.
     """
 
-    block: Block = field(repr=False)
+    face: ClassVar[str] = "inverse"
+
+    model: Block = field(repr=False)
     kind: str
     reachable: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rmse: Mapping[str, float] = field(default_factory=dict)
     file: Path | None = None
+
+    @property
+    def block(self) -> Block:
+        """Deprecated name of ``model``."""
+        warnings.warn("block is now model", DeprecationWarning, stacklevel=2)
+        return self.model
+
+    @property
+    def drawn(self) -> Block:
+        """What a plot of it draws."""
+        return self.model
+
+    def simulate(self, data: Data, **options: Unpack[SimulateKeywords]) -> Simulation:
+        """Simulate the compensator on a recording; see `mckibben.simulate`."""
+        found: Simulation = load("operations", "simulate")(self.model, data, **options)
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         """Return the kind of inverse and its reachable range, for JSON."""
         return {
             "file": plain(self.file),
             "kind": self.kind,
-            "inputs": [channel.name for channel in self.block.inputs],
-            "outputs": [channel.name for channel in self.block.outputs],
+            "inputs": [channel.name for channel in self.model.inputs],
+            "outputs": [channel.name for channel in self.model.outputs],
             "reachable": plain(self.reachable),
-            "samples_ahead": self.block.samples_ahead,
+            "samples_ahead": self.model.samples_ahead,
             "rmse": dict(self.rmse),
         }
 
 
-@dataclass(frozen=True)
-class Exported(Numbers):
+@dataclass(frozen=True, repr=False)
+class Exported(Result):
     """Exported code.
 
     Parameters
@@ -191,6 +266,8 @@ class Exported(Numbers):
     self_test, emulation : str or None
         What the self-test and the emulated run printed.
     """
+
+    face: ClassVar[str] = "exported"
 
     path: Path
     name: str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands import Banded
@@ -13,13 +13,14 @@ from mckibben.blocks.fields import Channel
 from mckibben.diagnosis.bands import outside
 from mckibben.errors import DataError, ModelError
 from mckibben.metrics import score
+from mckibben.reading import only
 from mckibben.recording import Recording
 from mckibben.studying.recorded_inputs import beyond_known
-from mckibben.system.atomic import Numbers
+from mckibben.system.showing import Result
 
 
-@dataclass(frozen=True)
-class Simulation(Numbers):
+@dataclass(frozen=True, repr=False)
+class Simulation(Result):
     """A model's run over a recording.
 
     Parameters
@@ -43,6 +44,12 @@ class Simulation(Numbers):
     outside: tuple[tuple[Channel, float, Array, tuple[float, float]], ...] = field(
         default=(), repr=False
     )
+
+    face: ClassVar[str] = "simulation"
+
+    def to_frame(self) -> Any:
+        """Return the run as a data frame over time."""
+        return self.recording.to_frame()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the errors, for JSON."""
@@ -77,15 +84,10 @@ def simulated(
     inputs = [channel.name for channel in block.inputs]
     outputs = [channel.name for channel in block.outputs]
     try:
-        recording, *others = read(list(dict.fromkeys((*inputs, *outputs))))
+        runs = read(list(dict.fromkeys((*inputs, *outputs))))
     except DataError:  # nothing was measured, or what lacks is said of the inputs
-        recording, *others = read(inputs)
-    if others:
-        raise DataError(
-            f"it has {1 + len(others)} recordings, or parts between gaps",
-            file=recording.source,
-            remedy="cut it first, or give `gaps=interpolate`",
-        )
+        runs = read(inputs)
+    recording = only(runs)
     modelled = (banded or block).simulate(recording, initial=initial)
     notes = beyond_known(block, recording)
     beyond: tuple[tuple[Channel, float, Array, tuple[float, float]], ...] = ()

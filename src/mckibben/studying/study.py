@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import numpy as np
 
@@ -25,19 +25,21 @@ from mckibben.diagnosis.data_gaps import Gap, data_gaps
 from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.diagnosis.review import Review, review
 from mckibben.errors import DataError, MckibbenError
+from mckibben.files.memory import Data
+from mckibben.keywords import SimulateKeywords
 from mckibben.options import StudyOptions, given_options
 from mckibben.recording import COMMAND, Recording, listed, sample_time_of
 from mckibben.rigs import load_rig
 from mckibben.rigs.rig import Rig, changes, recorded_on
 from mckibben.splits import Split
 from mckibben.studying.inverting import Compensation, compensation
-from mckibben.system.atomic import Numbers, plain
+from mckibben.system.atomic import plain
 from mckibben.system.progress import telling
-from mckibben.system.showing import DrawsItself
+from mckibben.system.showing import Result
 
 
 @dataclass(frozen=True, repr=False)
-class Study(DrawsItself, Numbers):
+class Study(Result):
     """Results of ``mckibben study``.
 
     Parameters
@@ -93,9 +95,6 @@ class Study(DrawsItself, Numbers):
     description: ModelDescription | None = field(default=None, repr=False)
     review: Review | None = None
 
-    def __repr__(self) -> str:
-        return str(self)
-
     @property
     def input(self) -> str:
         """The input channel."""
@@ -105,6 +104,19 @@ class Study(DrawsItself, Numbers):
     def output(self) -> str:
         """The output channel."""
         return self.leaderboard.output
+
+    @property
+    def model(self) -> Block:
+        """The chosen model; see `Leaderboard.model`."""
+        return self.leaderboard.model
+
+    def simulate(self, data: Data, **options: Unpack[SimulateKeywords]) -> Any:
+        """Simulate the chosen model on a recording; see `mckibben.simulate`."""
+        return self.leaderboard.simulate(data, **options)
+
+    def to_frame(self) -> Any:
+        """Return the leaderboard as a data frame."""
+        return self.leaderboard.to_frame()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the results without models and their outputs."""
@@ -161,7 +173,7 @@ def study(
         # the test is not for a refit to see
         ran: Any = {"model": chosen.model, "compensator": chosen.compensator}
         reviewed = review(recordings, seed=seed, **ran)
-        if chosen.inputs is None:
+        if chosen.input is None:
             recordings, channels = [_driven(one) for one in recordings], None
     plan = plan_of(recordings, tests, chosen, validation=validation, channels=channels)
     channels = plan.data.channels

@@ -1,20 +1,40 @@
-"""Base classes of results with display on terminals, in notebooks, and in plots.
+"""Base classes of what is displayed: on terminals, in notebooks, as tables and in plots.
 
 The report defines how each kind is shown. As the report imports these classes, it is looked up by name.
 """
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from mckibben.errors import ModelError, in_terms_of
+from mckibben.hints import absent
 from mckibben.registry import load
+from mckibben.system.atomic import Numbers
 
 
-class ShowsItself:
-    """Prints as at most three lines of 80 columns, and displays as a small card in notebooks."""
+class Hinted:
+    """Names what there is instead of an attribute that it has not."""
+
+    if not TYPE_CHECKING:  # a type checker still finds what is not there
+
+        def __getattr__(self, name: str) -> Any:
+            owner = self.face if hasattr(type(self), "face") else ""
+            known = dict.fromkeys((*dir(type(self)), *type(self).__dataclass_fields__))
+            text = absent(type(self).__name__, name, known, owner)
+            raise AttributeError(text, name=name, obj=self)
+
+
+class DrawsItself:
+    """Prints as at most three lines of 80 columns, displays as a card in notebooks, and has figures."""
 
     face: ClassVar[str]
     """Name of its kind, by which its card and its figures are found."""
+
+    @property
+    def drawn(self) -> Any:
+        """What a plot of it draws: itself, unless it has something else for that."""
+        return self
 
     def __str__(self) -> str:
         found: str = load("faces", "card")(self).text()
@@ -23,10 +43,6 @@ class ShowsItself:
     def _repr_html_(self) -> str:
         found: str = load("faces", "card")(self).html()
         return found
-
-
-class DrawsItself(ShowsItself):
-    """Also has the figures of the reports, by name."""
 
     def plot(self, kind: str | None = None, *, ax: Any = None, **choices: Any) -> Any:
         """Draw it with matplotlib.
@@ -42,7 +58,8 @@ class DrawsItself(ShowsItself):
         ax : Axes or sequence of Axes, optional
             What to draw into, as many as the figure has panels; default a new figure of pyplot.
         **choices
-            What the figure takes: channels as ``input`` and ``output``, a measured ``recording``.
+            What the figure takes: channels as ``input`` and ``output``, a measured ``recording``;
+            ``width=1`` or ``2`` columns of a journal, with its letters.
 
         Returns
         -------
@@ -56,3 +73,23 @@ class DrawsItself(ShowsItself):
             On absent channels, or another number of axes.
         """
         return load("faces", "plot")(self, kind, ax, choices)
+
+
+class Result(Hinted, DrawsItself, Numbers):
+    """Result of an operation: prints as its command does, and has its numbers as a dict and a table."""
+
+    def __str__(self) -> str:
+        return in_terms_of("\n".join(load("faces", "lines")(self)))
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def to_frame(self) -> Any:
+        """Return its table as a data frame of pandas.
+
+        Raises
+        ------
+        ModelError
+            Where it has none.
+        """
+        raise ModelError(f"{type(self).__name__} has no table", remedy="use to_dict()")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mckibben import Block, ModelError
-from mckibben.export import export_c
+from mckibben.exporting import export_c
 from tests.export.building import Precision, build
 from tests.golden.case import Case, Tree
 from tests.golden.models import all_models, inputs_of

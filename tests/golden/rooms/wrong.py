@@ -96,8 +96,8 @@ def _chosen(
     board = mckibben.compare(
         train,
         test,
-        inputs="force",
-        outputs="displacement",
+        input="force",
+        output="displacement",
         models=("state-network", "p2uz"),
         settings={"state-network": {"n_units": n_units, "n_steps": 60, "substeps": 1}},
         jobs=1,

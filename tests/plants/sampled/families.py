@@ -81,7 +81,7 @@ def with_one(kind: str, seed: int, noise_seed: int | None = None) -> Plant:
     return Plant(f"{kind} {seed}", train, tests, rounded(truth))
 
 
-def known_parameters(seed: int, noise: bool = True) -> Plant:
+def known_parameters(seed: int, noise: bool = True, noise_seed: int | None = None) -> Plant:
     """Plants of few parameters, all of them told.
 
     0.1 p (a0 + a1 x + a2 x²) = K x + F0 + Fc sgn(v) + c v + q, with q' = k1 v - q/tau. Pressure does not
@@ -128,12 +128,16 @@ def known_parameters(seed: int, noise: bool = True) -> Plant:
         s_x = s_p = s_f = 0.0
     pace = rng.uniform(1.5, 4)
 
+    sensors = _sensors(noise_seed)
+
     def run(name: str, p: Array) -> Recording:
         x, _ = physics.simulate(rig, p, None, dt)
-        channels = {"pressure": p + s_p * rng.standard_normal(p.size)}
-        channels["displacement"] = x + s_x * rng.standard_normal(p.size)
+        noises = rng.standard_normal((3 if with_force else 2, p.size))  # motions stay the same
+        if sensors is not None:
+            noises = sensors.standard_normal(noises.shape)
+        channels = {"pressure": p + s_p * noises[0], "displacement": x + s_x * noises[1]}
         if with_force:
-            channels["force"] = spring * x + preload + s_f * rng.standard_normal(p.size)
+            channels["force"] = spring * x + preload + s_f * noises[2]
         meta = {"name": name, "rest_length": round(rest, 3)}
         return Recording(channels, sample_time=dt, meta=meta)
 

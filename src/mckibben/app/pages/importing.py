@@ -20,7 +20,7 @@ from mckibben.errors import DataError, MckibbenError
 from mckibben.files.choosing import Seen
 from mckibben.files.formats import READERS
 from mckibben.files.reading import columns_of
-from mckibben.options import constant
+from mckibben.parsers import constant
 from mckibben.recording import Recording
 
 CHANNELS = (
@@ -89,7 +89,7 @@ class Form:
         except MckibbenError as error:
             self.error = error
             with suppress(DataError):
-                columns = columns_of(self.path, **self.reading.options() | {"channels": None})
+                columns = columns_of(self.path, self.reading.read_options())
         if self.columns and [c.seen.header for c in self.columns] == [c.header for c in columns]:
             return False
         units, lines = self.reading.units, self.reading.calibration

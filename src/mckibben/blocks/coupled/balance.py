@@ -157,7 +157,8 @@ class Balance(Invertible):
     bladders : sequence of n float
         Spring of every muscle's own, which goes slack with it [N/mm], not negative. Default none.
     pushes : sequence of n float
-        Force at which each goes slack [N], not negative. Default none does.
+        Resistance at which each goes slack [N], negative where it pulls by itself without pressure.
+        Default none does.
     tare : bool
         Whether coordinates count from where the muscles rested, without pressure, at the start.
     settled : bool
@@ -207,10 +208,7 @@ class Balance(Invertible):
         *("damping", "lines", "walls", "friction_growth", "bladders", "pushes", "mass"),
         *("asymmetry", "friction_slopes", "obstacles"),
     )
-    formulas = (
-        r"A_k(y) = \sum_i a_{ki} (y / L)^i,\quad E_k(y) = b_k y + \sum_{i \ge 2} e_{ki} "
-        "(y / L)^i",
-    )
+    formulas = (r"A_k(y) = \sum_i a_{ki} (y / L)^i",)
 
     springs: Annotated[Rows, TABLE["springs"].notation]
     elasticity: Annotated[Rows, TABLE["elasticity"].notation]
@@ -344,13 +342,18 @@ class Balance(Invertible):
 
     def equations(self) -> tuple[str, ...]:
         """Return the force balance with the terms of this model, then area and elasticity."""
-        springs = r"S_{k0} + \sum_j S_{kj} y_j"
-        if self.n_schedules > 0:
-            springs = r"\sum_q x^q \left(S_{kq0} + \sum_j S_{kqj} y_j\right)"
-        written = {"springs": springs, "elasticity": TABLE["elasticity"].equation}
-        for name in self.parameters:
-            if np.any(getattr(self, name) or 0.0):
-                written.setdefault(name, TABLE[name].equation)
+        has = {name: bool(np.any(getattr(self, name) or 0.0)) for name in self.parameters}
+        has["elasticity"] |= has["bladders"]
+        written = {name: TABLE[name].equation for name in self.parameters if has[name]}
+        written["springs"] = r"S_{k0} + \sum_j S_{kj} y_j"
+        powers = [rf"x{i}{p}" for i in self._numbered() for p in self._powers()]
+        if powers:
+            written["springs"] = r"\sum_q X_q \left(S_{kq0} + \sum_j S_{kqj} y_j\right)"
+        if powers and has["obstacles"]:
+            stiffness = "".join(rf" + o_{{kn{i + 1}}} x{x}" for i, x in enumerate(self._numbered()))
+            written["obstacles"] = written["obstacles"].replace(
+                "o_{kn}", rf"(o_{{kn0}}{stiffness})"
+            )
         outer, inner = (
             " + ".join(
                 written[name]
@@ -359,21 +362,65 @@ class Balance(Invertible):
             )
             for owner in ("coordinate", "muscle")
         )
-        balance: tuple[str, ...] = (f"p_k A_k(y_k) = {outer} + {inner}",)
+        balance: tuple[str, ...] = (rf"p_k A_k(y_k) = {outer}{' + ' * bool(inner)}{inner}",)
         if self.directions:
-            outer = outer.replace("y_", "q_").replace("_k", "_j")
-            pulls = rf"\sum_k W_{{kj}} \left(p_k A_k(y_k) - R_k\right) = {outer}"
-            balance = (pulls, rf"R_k = {inner},\quad y_k = \sum_j W_{{kj}} q_j")
-        growth = r" + \lambda p_k / P" + r" + \sum_i g_i x_i" * any(self.friction_slopes)
-        limit = rf"r_m (1 - \lambda{growth})"
-        down = rf", \text{{down to }} -\rho {limit}"
-        ends = rf"\pm {limit}" if self.asymmetry is None else limit + down
+            outer = outer.replace("_{k", "_{i").replace("y_k", "y_i").replace("y_", "q_")
+            pulls = rf"\sum_k W_{{ki}} \left(p_k A_k(y_k) - R_k\right) = {outer}"
+            balance = (pulls, rf"R_k = {inner or 0},\quad y_k = \sum_i W_{{ki}} q_i")
+            near = r"D_{k1} + \sum_{i \ge 2} D_{ki} v_i" if self.drive else "p_s"
+            balance += (rf"p_k \text{{: of all solutions that nearest to }} {near}",)
+        if powers:
+            listed = r",\; ".join(["1", *powers])
+            balance += (rf"(X_0,\; \ldots) = ({listed})",)
+        elastic = [r"b_k y"] * has["bladders"] + [r"\sum_{i \ge 2} e_{ki} (y / L)^i"] * any(
+            map(any, self.elasticity)
+        )
+        parts = [*self.formulas, *([f"E_k(y) = {' + '.join(elastic)}"] if elastic else [])]
+        growth = r"1 - \lambda + \lambda p_k / P"
+        if has["friction_slopes"]:
+            growth += "".join(rf" + g_{i + 1} x{x}" for i, x in enumerate(self._numbered()))
+        limit = f"r_m ({growth})"
+        ends = rf"\pm {limit}"
+        if self.asymmetry is not None:
+            ends = rf"{limit}, \text{{ down to }} -\rho {limit}"
+        stretch = "y_k + w_k p_k" if has["walls"] else "y_k"
         memory = {
-            rf"s_{{km}} \text{{ follows }} y_k + w_k p_k \text{{ up to }} {ends}": self.limits,
-            r"\dot{q}_{kl} = \dot{y}_k - q_{kl} / \tau_l": self.lags,
+            rf"s_{{km}} \text{{ follows }} {stretch} \text{{ up to }} {ends}": self.limits,
+            r"\dot{z}_{kl} = \dot{y}_k - z_{kl} / \tau_l": self.lags,
+            r"\text{muscle } k \text{ is slack where it would push with more than } Q_k": self.pushes,
         }
         remembered = r",\quad ".join(line for line, numbers in memory.items() if numbers)
-        return tuple(line for line in (*balance, *self.formulas, remembered) if line)
+        return tuple(line for line in (*balance, r",\quad ".join(parts), remembered) if line)
+
+    def _numbered(self) -> list[str]:
+        """Return the indices of what schedules: none of a single one."""
+        n = self.n_schedules
+        return [""] if n == 1 else [f"_{i + 1}" for i in range(n)]
+
+    def _powers(self) -> list[str]:
+        """Return the exponents of what schedules."""
+        return [f"^{power}" if power > 1 else "" for power in range(1, self.degree + 1)]
+
+    def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return the symbol of a number: its muscle or coordinate, then what schedules, then where."""
+        if field == "springs":
+            power, to = divmod(index[-1], 1 + len(self.driven))
+            places = [index[0] + 1, *([power] if self.n_schedules > 0 else []), to]
+            return f"S_{{{','.join(map(str, places))}}}"
+        if field == "obstacles":
+            number, place = divmod(index[-1], self.sizes.obstacle)
+            letter = (r"\sigma", r"\xi", "o")[min(place, at.STIFFNESS)]
+            places = [index[0] + 1, number + 1]
+            if place >= at.STIFFNESS and self.n_schedules > 0:
+                places.append(place - at.STIFFNESS)
+            return f"{letter}_{{{','.join(map(str, places))}}}"
+        return super().symbol_of(field, index)
+
+    def letter_of(self, field: str, place: int) -> str:
+        """Return the letter of a channel: loads are behind what schedules."""
+        if field == "scheduled":
+            return "x_i" if place < self.n_schedules else "F_l"
+        return "q_i" if field == "driven" and self.directions else super().letter_of(field, place)
 
     @property
     def n_loads(self) -> int:
@@ -565,16 +612,16 @@ class Balance(Invertible):
         term, place, power = TABLE[field], index[-1] if index else 0, 0
         whose = "coordinate" if self.directions and term.of == "coordinate" else "muscle"
         of = f" of {whose} {index[0] + 1}" if self.sizes.of(term.of) > 1 else ""
-        name, unit = f"{term.label}{of}", term.unit
+        units = term.units(self.sizes)
+        name, unit = f"{term.label}{of}", units[place % len(units)]
         if field == "springs":
             power, to = divmod(place, 1 + len(self.driven))
             name = name if to else f"constant force{of}"
             name += f" to {whose} {to}" if to not in (0, index[0] + 1) else ""
-            unit = unit if to else "N"
         elif field == "obstacles":
             number, place = divmod(place, self.sizes.obstacle)
             power = max(place - at.STIFFNESS, 0)
-            what, unit = (("side", ""), ("place", "mm"), ("stiffness", unit))[place - power]
+            what = ("side", "place", "stiffness")[place - power]
             name = f"{what} of obstacle {number + 1}{of}"
         elif field == "loads":
             load = self.scheduled[place - self.n_loads]

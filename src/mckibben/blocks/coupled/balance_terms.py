@@ -50,6 +50,18 @@ class Kind(NamedTuple):
         Whether the prior of a muscle determines it.
     doubtful : bool
         Whether it is none, give or take its natural scale, unless data say otherwise.
+    alike : bool
+        Whether all muscles have the same of it where they are identified.
+    needs : {"", "time", "stops", "hold"}
+        What it has no effect without: sample times, stops, or what holds a muscle against its pull.
+    phenomenon : str
+        What it shows: data have to demand it, and one form of it at most; empty if it acts smoothly.
+    begins : tuple of float
+        Where a phenomenon is tried, as shares of its natural size.
+    excludes : str
+        The phenomenon that it cannot be there beside.
+    like_friction : bool
+        Whether it resembles friction: then it is tried before all others, and else only after them.
     """
 
     name: str
@@ -67,17 +79,32 @@ class Kind(NamedTuple):
     log: bool = False
     prior: bool = False
     doubtful: bool = True
+    alike: bool = False
+    needs: Literal["", "time", "stops", "hold"] = ""
+    phenomenon: str = ""
+    begins: tuple[float, ...] = ()
+    excludes: str = ""
+    like_friction: bool = False
 
     @property
     def notation(self) -> str:
         """Symbol and unit, as in the annotation of a field; see `mckibben.blocks.notation`."""
         return f"{self.symbol} [{self.unit}]"
 
+    def units(self, sizes: Sizes) -> tuple[str, ...]:
+        """Return the units of the numbers that a coordinate or muscle has of it, or all have."""
+        if self.name == "springs":
+            return sizes.powers * ("N", *sizes.coordinates * (self.unit,))
+        if self.name == "obstacles":
+            return sizes.obstacles * ("", "mm", *(1 + sizes.schedules) * (self.unit,))
+        return sizes.number(self.width) * (self.unit,)
 
-TWICE = log(5.0)
-"""Largest logarithm of a ratio of two directions."""
 
-_OBSTACLE = r"\sum_i o_{ki3} \left[y_k - o_{ki2}\right]_{o_{ki1}}"
+MOST_RATIO = log(5.0)
+"""Largest logarithm of the ratio of a parameter on the way down to that on the way up."""
+
+_PLACES = (0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95)
+_OBSTACLE = r"\sum_n o_{kn} \left[y_k - \xi_{kn}\right]_{\sigma_{kn}}"
 _LINE = r"l_k \left(\frac{A_k}{a_{k0}}\right)^2 \dot{y}_k"
 
 # fmt: off
@@ -85,40 +112,51 @@ TABLE = {kind.name: kind for kind in (
     Kind("loads", "coordinate", "loads", "N", "C_{kl}", "share", "",
          r"\sum_l C_{kl} F_l", doubtful=False),
     Kind("springs", "coordinate", "springs", "N/mm", "S_{ki}", "spring", "springs"),
-    Kind("obstacles", "coordinate", "met", "N/mm", "o_{ki}", "obstacle", "obstacle", _OBSTACLE, 0.0),
+    Kind("obstacles", "coordinate", "met", "N/mm", "o_{kn}", "obstacle", "obstacle", _OBSTACLE, 0.0,
+         phenomenon="obstacle"),
     Kind("elasticity", "muscle", "elastic", "N", "e_{ki} from 2", "elasticity", "elasticity",
          "E_k(y_k)", prior=True),
     Kind("areas", "muscle", "area", "N/bar", "a_{ki} from 0", "area", "areas", prior=True),
     Kind("friction", "muscle", "stops", "N/mm", "h_{km}", "stop", "",
          r"\sum_m h_{km} s_{km}", 0.0, prior=True),
     Kind("relaxation", "muscle", "lags", "N/mm", r"\kappa_{kl}", "relaxation", "relaxation",
-         r"\sum_l \kappa_{kl} q_{kl}", 0.0, prior=True),
-    Kind("damping", "muscle", "one", "N s/mm", "d_k", "damping", "", r"d_k \dot{y}_k", 0.0),
-    Kind("lines", "muscle", "one", "N s/mm", "l_k", "resistance of the line", "line", _LINE, 0.0),
-    Kind("mass", "muscle", "one", "N s^2/mm", "m_k", "mass", "mass", r"m_k \ddot{y}_k", 0.0),
+         r"\sum_l \kappa_{kl} z_{kl}", 0.0, prior=True),
+    Kind("damping", "muscle", "one", "N s/mm", "d_k", "damping", "", r"d_k \dot{y}_k", 0.0,
+         needs="time"),
+    Kind("lines", "muscle", "one", "N s/mm", "l_k", "resistance of the line", "line", _LINE, 0.0,
+         alike=True, needs="time"),
+    Kind("mass", "muscle", "one", "N s^2/mm", "m_k", "mass", "mass", r"m_k \ddot{y}_k", 0.0,
+         alike=True, needs="time", phenomenon="mass", begins=(0.0,), excludes="slack"),
     Kind("bladders", "muscle", "one", "N/mm", "b_k", "spring of the bladder", "", "", 0.0),
     Kind("friction_growth", "all", "one", "", r"\lambda", "friction growth", "", "", 0.0, 1.0,
-         linear=False),
+         linear=False, needs="stops"),
     Kind("friction_slopes", "all", "schedules", "", "g_i", "friction growth",
-         "friction_slopes", "", 0.0, 4.0, linear=False),
-    Kind("asymmetry", "all", "one", "", r"\rho", "asymmetry", "asymmetry", "", -TWICE, TWICE,
-         linear=False, log=True),
+         "friction_slopes", "", 0.0, 4.0, linear=False, needs="stops"),
+    Kind("asymmetry", "all", "one", "", r"\rho", "asymmetry", "asymmetry", "", -MOST_RATIO, MOST_RATIO,
+         linear=False, log=True, needs="stops", phenomenon="asymmetry", begins=(0.0,),
+         like_friction=True),
     Kind("lags", "all", "lags", "s", r"\tau_l", "lag", "relaxation", "", linear=False, log=True),
     Kind("walls", "muscle", "one", "mm/bar", "w_k", "stretch of the wall", "walls", "", 0.0, 1.0,
-         0.2, linear=False),
-    Kind("pushes", "muscle", "one", "N", "P_k", "force of slackening", "slack", "", 0.0,
-         linear=False, doubtful=False),
+         0.2, linear=False, alike=True, needs="stops", like_friction=True),
+    Kind("pushes", "muscle", "one", "N", "Q_k", "force of slackening", "slack", "",
+         linear=False, doubtful=False, needs="hold", phenomenon="slack", begins=(0.5, 0.95),
+         excludes="mass"),
     Kind("places", "coordinate", "obstacles", "mm", "", "place", "obstacle", "", scale=0.2,
-         linear=False),
-    Kind("filling", "front", "one", "s", "", "filling", "filling", "", 0.0, 2.0, linear=False),
-    Kind("venting", "front", "one", "", "", "venting", "venting", "", -TWICE, TWICE, linear=False,
-         log=True),
-    Kind("dead", "front", "one", "bar", "", "dead zone", "dead", "", 0.0, 0.5, 0.1, linear=False),
+         linear=False, phenomenon="obstacle", begins=_PLACES),
+    Kind("filling", "front", "one", "s", "", "filling", "filling", "", 0.0, 2.0, linear=False,
+         needs="time"),
+    Kind("venting", "front", "one", "", "", "venting", "venting", "", -MOST_RATIO, MOST_RATIO,
+         linear=False, log=True, needs="time"),
+    Kind("dead", "front", "one", "bar", "", "dead zone", "dead", "", 0.0, 0.5, 0.1, linear=False,
+         phenomenon="dead zone", begins=(0.1, 0.2, 0.35)),
     Kind("contact", "front", "one", "bar", "", "contact", "contact", "", 0.0, 0.5, 0.1,
-         linear=False),
+         linear=False, phenomenon="dead zone", begins=(0.2,)),
 )}
 # fmt: on
 """All terms, by name."""
+
+PHENOMENA = tuple(dict.fromkeys(kind.option for kind in TABLE.values() if kind.phenomenon))
+"""Options whose terms data have to demand."""
 
 ORDER = {
     "all": {
@@ -208,9 +246,14 @@ class Sizes(NamedTuple):
     moves: int = 0
 
     @property
+    def powers(self) -> int:
+        """The constant, and all powers of what schedules."""
+        return 1 + self.schedules * self.degree
+
+    @property
     def springs(self) -> int:
         """A constant and springs to all coordinates, by every power of what schedules."""
-        return (1 + self.schedules * self.degree) * (1 + self.coordinates)
+        return self.powers * (1 + self.coordinates)
 
     @property
     def obstacle(self) -> int:

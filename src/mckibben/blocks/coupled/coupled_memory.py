@@ -120,8 +120,8 @@ class CoupledMemory(Block):
     instead = "invert balance or sdchm, or close a loop"
     formulas = (
         r"\tau_l \dot{x}_{li} = u_i - x_{li},\quad z_{lik} = F_{r_{ik}}[x_{li}]",
-        r"y_j = R_j \cdot \left(1,\; x,\; z,\; x_{1i} x_{1k},\; x_{1i} x_{1k} x_{1q},\; "
-        r"x_{1i} x_{lk},\; x_{1i} z_{lkm}\right)",
+        r"y_j = \sum_k R_{jk} \phi_k,\quad \phi = \left(1,\; x,\; z,\; x_{1i} x_{1k},\; "
+        r"x_{1i} x_{1k} x_{1q},\; x_{1i} x_{lk},\; x_{1i} z_{lkm}\right)",
     )
 
     lags: Annotated[Vector, r"\tau_l [s]"]
@@ -129,7 +129,7 @@ class CoupledMemory(Block):
     readout: Annotated[Rows, "R_{jk}"]
     degree: Annotated[int, Interval(ge=1, le=3)]
     driven: Annotated[Channels, "u_i"]
-    scheduled: Channels
+    scheduled: Annotated[Channels, "u_i"]
     given: Annotated[Channels, "y_j"]
     crossed: bool = False
 

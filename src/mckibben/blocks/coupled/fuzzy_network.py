@@ -310,18 +310,34 @@ class FuzzyNetwork(Invertible):
     of_local_rules = True
     parameters = ("centres", "widths", "consequents")
     formulas = (
-        r"y_k = \frac{\sum_r \omega_r\, (P_{rk} \cdot x + c_{rk})}{\sum_r \omega_r},\quad "
-        r"\omega_r = \prod_i \exp\left(-\frac{(x_i - m_{ir})^2}{2 \sigma_{ir}^2}\right)",
+        r"y_k = \frac{\sum_r \omega_r\, (\sum_i P_{rki} x_i + c_{rk})}{\sum_r \omega_r},\quad "
+        r"\omega_r = \prod_i \exp\left(-\frac{(x_i - m_{ij})^2}{2 \sigma_{ij}^2}\right)",
+        r"j \text{: the set of } x_i \text{ in rule } r",
     )
 
     centres: Annotated[Rows, "m_{ij} [{in0}]"]
     widths: Annotated[PositiveRows, r"\sigma_{ij} [{in0}]"]
-    consequents: Annotated[Vector, "P_i"]
+    consequents: Annotated[Vector, "P_{rki}"]
     driven: Annotated[Channels, "x_i"]
     given: Annotated[Channels, "y_k"]
-    scheduled: Channels = ()
+    scheduled: Annotated[Channels, "x_i"] = ()
     constants: bool = False
     limits: Rows | None = None
+
+    def equations(self) -> tuple[str, ...]:
+        """Return the equations, with the constants of consequents if there are any."""
+        first, *others = self.formulas
+        return (first if self.constants else first.replace(" + c_{rk}", ""), *others)
+
+    def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return the symbol of a number: consequents have rule, output, and input."""
+        if field != "consequents":
+            return super().symbol_of(field, index)
+        whole, place = divmod(index[0], len(self.inputs) + self.constants)
+        rule, output = divmod(whole, len(self.given))
+        if place < len(self.inputs):
+            return f"P_{{{rule + 1},{output + 1},{place + 1}}}"
+        return f"c_{{{rule + 1},{output + 1}}}"
 
     def __post_init__(self) -> None:
         self.check_channels()

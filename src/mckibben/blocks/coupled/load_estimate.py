@@ -123,7 +123,7 @@ class LoadEstimate(Block):
     typical = (Balance.example(),)
     _of_model = same_as("forward")
     formulas = (
-        r"F = C^{+} \left(p A(y) - \text{springs} - \text{elasticity} - \text{friction} - "
+        r"F = C^{+} \left(p A(y) - \text{springs}(x) - \text{elasticity} - \text{friction} - "
         r"\text{relaxation} - \text{damping} - \text{inertia}\right)",
     )
 

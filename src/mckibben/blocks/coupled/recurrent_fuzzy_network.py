@@ -157,17 +157,17 @@ class RecurrentFuzzyNetwork(Block):
     instead = "invert balance, or close a loop"
     parameters = ("centres", "widths", "feedbacks", "consequents")
     formulas = (
-        r"y_t = \frac{\sum_r \omega_r\, (P_r \cdot x_t + c_r)}{\sum_r \omega_r},\quad "
-        r"\omega_r = \prod_i O_{ir,t}",
+        r"y_t = \frac{\sum_r \omega_r\, (\sum_i P_{ri} x_{i,t} + c_r)}{\sum_r \omega_r},\quad "
+        r"\omega_r = \prod_i O_{ij,t},\quad j \text{: the set of } x_i \text{ in rule } r",
         r"O_{ij,t} = \exp\left(-\frac{(x_{i,t} - m_{ij} + \theta_{ij} O_{ij,t-1})^2}{2 "
         r"\sigma_{ij}^2}\right)",
-        r"x_t = (y_{t-1}, \ldots,\; u_t, \ldots,\; s_t, \ldots)",
+        r"x_t = (y_{t-1}, \ldots,\; u_t, \ldots,\; s_t, \ldots),\quad t \text{ counts samples of } T",
     )
 
     centres: Annotated[Rows, "m_{ij}"]
     widths: Annotated[PositiveRows, r"\sigma_{ij}"]
     feedbacks: Annotated[Rows, r"\theta_{ij}"]
-    consequents: Annotated[Vector, "P_i"]
+    consequents: Annotated[Vector, "P_{ri}"]
     own_time: Annotated[Positive, "T [s]"]
     driven: Annotated[Channels, "u"]
     scheduled: Annotated[Channels, "s_i"]
@@ -176,6 +176,19 @@ class RecurrentFuzzyNetwork(Block):
     input_lags: Lag = 0
     scheduling_lags: Lag = 0
     constants: bool = True
+
+    def equations(self) -> tuple[str, ...]:
+        """Return the equations, with the constants of consequents if there are any."""
+        first, *others = self.formulas
+        return (first if self.constants else first.replace(" + c_r", ""), *others)
+
+    def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return the symbol of a number: consequents have rule and input."""
+        if field != "consequents":
+            return super().symbol_of(field, index)
+        rule, place = divmod(index[0], self.n_regressors + self.constants)
+        constant = place == self.n_regressors
+        return f"c_{{{rule + 1}}}" if constant else f"P_{{{rule + 1},{place + 1}}}"
 
     def __post_init__(self) -> None:
         self.check_channels()

@@ -171,7 +171,7 @@ class Air(fields.WithMemory, Invertible):
         r"\begin{cases} T_f \dot{x} = g_f - x & \text{filling, } g_f = K (u - u_0 - h/2) "
         r"> x \\ T_v \dot{x} = g_v - x & \text{venting, } g_v = K (u - u_0 + h/2) < x "
         r"\end{cases}",
-        "y(t) = x(t - T_d)",
+        r"y(t) = x(t - T_d),\quad p_{\min} \le g_f, g_v \le p_{\max}",
     )
 
     gain: Annotated[fields.Positive, "K [{y}/{u}]"]

@@ -51,7 +51,8 @@ Lags = Annotated[int, Interval(ge=0, le=50)]
 REGRESSORS = (
     r"x_t = (\bar{y}_{t-1}, \ldots, \bar{y}_{t-n},\, \bar{u}_{t-d}, \ldots, "
     r"\bar{u}_{t-d-m+1},\, F_{r_1}[\bar{u}]_t, \ldots)",
-    r"\bar{u} = (u - u_1) / u_2,\quad \bar{y} = (y - y_1) / y_2",
+    r"\bar{u} = (u - u_1) / u_2,\quad \bar{y} = (y - y_1) / y_2,\quad "
+    r"t \text{ counts samples of } T",
 )
 
 
@@ -336,11 +337,14 @@ class NarxNetwork(Narx):
     kind = "narx-network"
     kernel, start_kernel = narx_kernels(network)
     parameters = ("bias", "linear", "hidden")
-    formulas = (r"\bar{y}_t = b + l^\top x_t + \sum_h o_h\, a(w_h^\top x_t + s_h)", *REGRESSORS)
+    formulas = (
+        r"\bar{y}_t = b + \sum_i l_i x_{i,t} + \sum_h o_h\, a\left(\sum_i w_{hi} x_{i,t} + s_h\right)",
+        *REGRESSORS,
+    )
 
     bias: Annotated[FiniteFloat, "b"]
     linear: Annotated[fields.Vector, "l_i"]
-    hidden: Annotated[fields.Vector, "h_i"]
+    hidden: Annotated[fields.Vector, "w_i"]
     activation: Literal["tanh", "wavelet"] = "tanh"
 
     def __post_init__(self) -> None:
@@ -356,6 +360,16 @@ class NarxNetwork(Narx):
         units = len(self.hidden) // (len(self.linear) + 2)
         shape = [len(self.linear), units, float(self.activation == "wavelet")]
         return np.array([*self.head(sample_time), *shape, *self.places, *self.pack()])
+
+    def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return the symbol of a number: those of hidden units have the unit first."""
+        if field != "hidden":
+            return super().symbol_of(field, index)
+        n = len(self.linear)
+        unit, place = divmod(index[0], n + 2)
+        if place < n:
+            return f"w_{{{unit + 1},{place + 1}}}"
+        return f"{'so'[place - n]}_{{{unit + 1}}}"
 
     def slopes(self, regressors: Array) -> tuple[Array, Array]:
         """Return the derivatives by bias, linear and hidden weights, and past outputs, for tanh."""

@@ -95,8 +95,8 @@ class TransferFunction(fields.WithMemory, Block):
     )
     typical = ((0.9, -0.85, 0.018), (-1.2, 0.21), 0.01, 1.0, 2.0)
     formulas = (
-        r"y_t - y_0 = \frac{B(q)}{F(q)} (u_t - u_0) + \frac{C(q)}{D(q)} e_t",
-        r"B(q) = \sum_k b_k q^{-k},\quad F(q) = 1 + \sum_k f_k q^{-k}",
+        r"y_t - y_0 = \frac{B(q)}{F(q)} (u_t - u_0)",
+        r"B(q) = \sum_k b_k q^{-k},\quad F(q) = 1 + \sum_k f_k q^{-k},\quad q^{-1} \text{ delays by } T",
     )
 
     numerator: Annotated[fields.PolynomialField, "b_k from 0 [{y}/{u}]"]
@@ -108,6 +108,14 @@ class TransferFunction(fields.WithMemory, Block):
     noise_denominator: Annotated[fields.Coefficients, "d_k"] = ()
     noise_deviation: Annotated[fields.NotNegative | None, r"\sigma_e [{y}]"] = None
     input_range: fields.InputRange | None = None
+
+    def equations(self) -> tuple[str, ...]:
+        """Return the equations, with those of the noise if that is modelled."""
+        first, second = self.formulas
+        if not (self.noise_numerator or self.noise_denominator):
+            return self.formulas
+        noise = r"C(q) = 1 + \sum_k c_k q^{-k},\quad D(q) = 1 + \sum_k d_k q^{-k}"
+        return (rf"{first} + \frac{{C(q)}}{{D(q)}} e_t", second, noise)
 
     @property
     def n_states(self) -> int:

@@ -23,6 +23,9 @@ from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.sample_times import needs_sample_time, rate_filter
 from mckibben.errors import ModelError
 
+FILTERED = r"\dot{\epsilon} \text{ is filtered with the time constant } T"
+"""What all equations of these models end with."""
+
 
 @dataclass(frozen=True, kw_only=True, config=fields.STRICT)
 class Activation(Block):
@@ -146,14 +149,15 @@ class ActivationPressure(Activation):
     n_states = 2  # previous contraction and filtered rate
     formulas = (
         r"p = \sum_{k=0}^{3} b_k(F)\, \epsilon^k + \gamma\, \phi(F)\, \dot{\epsilon}",
-        r"\text{the cubic goes through } (\epsilon_j(F),\, y_j(F)),\; j = 1, \ldots, 4,\; "
-        r"\text{each coordinate a cubic of } F",
+        r"\text{the cubic goes through } (\epsilon_j(F),\, y_j(F)),\; j = 1, \ldots, 4",
+        r"\epsilon_j(F) = \sum_{k=0}^{3} e_{jk} F^k,\quad y_j(F) = \sum_{k=0}^{3} h_{jk} F^k",
         r"\gamma = \gamma_1 \nu + \gamma_2,\quad \phi(F) = \phi_1 F^3 + \phi_2 F^2 + "
         r"\phi_3 F + \phi_4",
+        FILTERED,
     )
 
-    contractions: Annotated[fields.Vector, r"\epsilon_k [1/N^3|1/N^2|1/N|1]"]
-    pressures: Annotated[fields.Vector, "y_k [bar/N^3|bar/N^2|bar/N|bar]"]
+    contractions: Annotated[fields.Vector, "e_{jk} [1/N^3|1/N^2|1/N|1]"]
+    pressures: Annotated[fields.Vector, "h_{jk} [bar/N^3|bar/N^2|bar/N|bar]"]
     phi: Annotated[fields.Vector, r"\phi_k [bar s/N^3|bar s/N^2|bar s/N|bar s]"]
     gamma: Annotated[tuple[FiniteFloat, FiniteFloat], r"\gamma_k [1/Hz|1]"]
     frequency: Annotated[fields.NotNegative, r"\nu [Hz]"]
@@ -166,6 +170,14 @@ class ActivationPressure(Activation):
                 f"{self.kind!r} has {sizes} coefficients of contractions, pressures and phi",
                 remedy=f"give {4 * POINTS}, {4 * POINTS} and 4",
             )
+
+    def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return the symbol of a number: cubics have their point and the power of the force."""
+        if field in ("contractions", "pressures"):
+            letter = {"contractions": "e", "pressures": "h"}[field]
+            point, place = divmod(index[0], POINTS)
+            return f"{letter}_{{{point + 1},{3 - place}}}"
+        return super().symbol_of(field, index)
 
     def coefficients(self, sample_time: float | None) -> Array:
         step = needs_sample_time(self.kind, sample_time)
@@ -273,6 +285,7 @@ class ActivationMemory(Activation):
         r"f) \dot{\epsilon} + \sum_m (g_m + h_m f)(x_m - x)",
         r"x = (\epsilon - \epsilon_1) / \epsilon_2,\quad f = (F - F_1) / F_2,\quad "
         r"S_k[\epsilon] = \epsilon - F_{r_k}[\epsilon],\quad \tau_m \dot{x}_m = x - x_m",
+        FILTERED,
     )
 
     surface: Annotated[fields.Vector, "c_k [bar]"]
@@ -301,6 +314,17 @@ class ActivationMemory(Activation):
                 f"time constants {self.time_constants}",
                 remedy="give two to every time constant",
             )
+
+    def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return the symbol of a number: fields of two letters have all of one, then the other."""
+        halves = {"friction": "ab", "relaxation": "gh"}
+        if field in halves:
+            second, place = divmod(index[0], len(getattr(self, field)) // 2)
+            return f"{halves[field][second]}_{{{place + 1}}}"
+        if field == "surface":
+            power, of_force = divmod(index[0], self.force_degree + 1)
+            return f"c_{{{power},{of_force}}}"
+        return super().symbol_of(field, index)
 
     @property
     def n_states(self) -> int:

@@ -185,12 +185,13 @@ class MultistateFriction(ForceByLength, Block):
         r"f = \left(1 + g_p (p - p_r)\right) \sum_i \operatorname{sat}(F_{c,i},\, k_i x_i "
         r"+ \sigma_i \dot{l})",
         r"\dot{x}_i = \frac{\operatorname{sat}(F_{c,i},\, k_i x_i + \sigma_i \dot{l}) - "
-        r"k_i x_i}{\sigma_i},\quad k_i, \sigma_i, F_{c,i} \text{ switch with the sign of "
-        r"} \dot{l}",
+        r"k_i x_i}{\sigma_i},\quad k_i, \sigma_i, F_{c,i} = \begin{cases} k_i^{+}, "
+        r"\sigma_i^{+}, F_{c,i}^{+} & \dot{l} > 0 \\ k_i^{-}, \sigma_i^{-}, F_{c,i}^{-} & \dot{l} "
+        r"\le 0 \end{cases}",
     )
 
     elements: Annotated[tuple[Direction, ...], BeforeValidator(fields.plain_sequence)]
-    values: fields.PositiveVector
+    values: Annotated[fields.PositiveVector, "k_i"]
     pressure_gain: Annotated[FiniteFloat, "g_p [1/bar]"] = 0.0
     reference_pressure: Annotated[FiniteFloat, "p_r [bar]"] = 0.0
     initial: fields.StoredInitial = Field(default="first_sample", kw_only=True)
@@ -212,13 +213,33 @@ class MultistateFriction(ForceByLength, Block):
     @property
     def parameter_names(self) -> tuple[str, ...]:
         """Element, direction, quantity and unit of every value."""
-        names = []
-        for number, element in enumerate(self.elements, start=1):
-            for place in PLACES[element]:
-                both = element == "shared" and place == 0
-                way = "" if both else f", {WAYS[place // 3]}"
-                names.append(f"element {number}{way}: {QUANTITIES[place % 3]}")
+        names = [
+            f"element {number}{f', {WAYS[way]}' if way >= 0 else ''}: {QUANTITIES[place]}"
+            for number, way, place in self._values()
+        ]
         return (*names, "pressure gain [1/bar]") if self.pressure_gain != 0 else tuple(names)
+
+    def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return the symbol of a number: a value has its element, and its direction if it has one."""
+        if field != "values":
+            return super().symbol_of(field, index)
+        number, way, place = self._values()[index[0]]
+        letter = (f"k_{{{number}}}", rf"\sigma_{{{number}}}", f"F_{{c,{number}}}")[place]
+        return letter + ("", "^{+}", "^{-}")[way + 1]
+
+    def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
+        """Return the unit of a number."""
+        if field != "values":
+            return super().unit_of(field, index)
+        return QUANTITIES[self._values()[index[0]][2]].partition("[")[2].rstrip("]")
+
+    def _values(self) -> list[tuple[int, int, int]]:
+        """Return element, direction (-1 for both) and quantity of every value."""
+        return [
+            (number, -1 if element == "shared" and place == 0 else place // 3, place % 3)
+            for number, element in enumerate(self.elements, start=1)
+            for place in PLACES[element]
+        ]
 
     def table(self) -> Array:
         """Return k, sigma and F_c lengthening and shortening, shape (n, 6), F_c 0 where inactive."""

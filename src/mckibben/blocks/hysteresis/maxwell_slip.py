@@ -168,9 +168,9 @@ class MaxwellSlip(fields.WithMemory, Invertible):
     n_states = one_per("breakaways", 1)  # deflections and the previous input
     n_scratch = one_per("breakaways")  # what single precision loses of the deflections
     formulas = (
-        r"y = \sum_k c_k x^k + \sum_i w_i s_i,\quad x = \frac{u - m}{s}",
-        r"s_{i,t} = \begin{cases} \min(s_{i,t-1} + \Delta u,\, r_i) & u \text{ rises} \\ "
-        r"\max(s_{i,t-1} + \kappa \Delta u,\, -\lambda r_i) & u \text{ falls} \end{cases}",
+        r"y = \sum_k c_k x^k + \sum_i w_i z_i,\quad x = \frac{u - m}{s}",
+        r"z_{i,t} = \begin{cases} \min(z_{i,t-1} + \Delta u,\, r_i) & u \text{ rises} \\ "
+        r"\max(z_{i,t-1} + \kappa \Delta u,\, -\lambda r_i) & u \text{ falls} \end{cases}",
     )
 
     breakaways: Annotated[fields.PositiveVector, MinLen(1), "r_i [{u}]"]

@@ -58,8 +58,15 @@ class Triangle(fields.WithMemory, Parametrised):
     parameters = ("weights", "offset")
 
     levels: Annotated[fields.Knots, "a_i [{u}]"]
-    weights: Annotated[fields.Vector, "w_k [{y}]"]
+    weights: Annotated[fields.Vector, "w_{ij} [{y}]"]
     offset: Annotated[FiniteFloat, "y_0 [{y}]"] = 0.0
+
+    def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return the symbol of a number: a cell has its rising and its falling threshold."""
+        if field != "weights":
+            return super().symbol_of(field, index)
+        rows, columns = np.tril_indices(len(self.levels) - 1)
+        return f"w_{{{rows[index[0]] + 1},{columns[index[0]] + 1}}}"
 
     def __post_init__(self) -> None:
         n = len(self.levels) - 1
@@ -278,8 +285,8 @@ class Preisach(Triangle, Invertible):
     n_states = CLIPPED
     formulas = (
         r"y = y_0 + \sum_{j \le i} w_{ij} \left(1 + R_{ij}[u]\right)",
-        r"R_{ij}[u] = +1 \text{ once } u \text{ rose through cell } i,\; -1 \text{ once "
-        "it fell through cell } j",
+        r"R_{ij}[u] = +1 \text{ once } u \text{ rose from } a_i \text{ to } a_{i+1},\; "
+        r"-1 \text{ once it fell from } a_{j+1} \text{ to } a_j",
     )
 
     def table(self) -> Array:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.parameters import Argument, command
-from mckibben.options import Option
+from mckibben.cli.parameters import command
+from mckibben.options import Argument, Option
 
 
 @command

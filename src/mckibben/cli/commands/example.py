@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Annotated
 
 from mckibben.cli.output import say
-from mckibben.cli.parameters import Argument, Force, command
+from mckibben.cli.parameters import Force, command
+from mckibben.options import Argument
 
 
 @command

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 import click
 
 from mckibben.cli.output import show
-from mckibben.cli.parameters import Argument, Json, command
-from mckibben.options import COptions, ExportOptions, FMUOptions, MJCFOptions, Option
+from mckibben.cli.parameters import Json, command
+from mckibben.options import Argument, COptions, ExportOptions, FMUOptions, MJCFOptions, Option
 
 Model = Annotated[Path, Argument("MODEL", "Model, inverse or controller (JSON).")]
 Folder = Annotated[Path, Option("Folder to write.", "DIR", "-o")]

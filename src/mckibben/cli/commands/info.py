@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from mckibben.cli.output import show
-from mckibben.cli.parameters import Argument, Json, command
-from mckibben.options import Inputs, Option, Outputs, ReadOptions
+from mckibben.cli.parameters import Json, command
+from mckibben.options import Argument, Inputs, Option, Outputs, ReadOptions
 
 
 @command
@@ -17,16 +17,14 @@ def info(
         tuple[Path, ...], Argument("[FILES]...", "Recordings, or a model saved as JSON.")
     ] = (),
     models: Annotated[bool, Option("List the models and settings.")] = False,
-    inputs: Inputs = None,
-    outputs: Outputs = None,
+    input: Inputs = None,  # noqa: A002
+    output: Outputs = None,
     as_json: Json = False,
 ) -> None:
-    from mckibben import registry
+    from mckibben import workflow
     from mckibben.blocks.saving import load
     from mckibben.blocks.setting import summary
-    from mckibben.errors import DataError
     from mckibben.estimators.catalogue import described
-    from mckibben.reading import look
     from mckibben.report import results, text
     from mckibben.version import versions
 
@@ -38,15 +36,9 @@ def info(
         installed = versions()
         show(installed, lambda: text.lines(results.versions(installed)), as_json)
         return
-    known = {*registry.names("estimators"), *registry.names("blocks")}
-    if named := [str(one) for one in files if str(one) in known and not one.exists()]:
-        raise DataError(
-            f"{named[0]!r} is a model, and there is no file of that name",
-            remedy="list the models with `models`, or give a file",
-        )
     if len(files) == 1 and files[0].suffix.lower() == ".json":
         about = summary(load(files[0]))
         show(about, lambda: text.lines(results.model(about)), as_json)
         return
-    found = look(files, reading, inputs, outputs)
-    show(found, lambda: text.lines(results.contents(found)), as_json)
+    found = workflow.info(files, reading=reading, input=input, output=output)
+    show(found, lambda: text.shown(found), as_json)

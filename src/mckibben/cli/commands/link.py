@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Annotated
 
 from mckibben.cli.output import show
-from mckibben.cli.parameters import Argument, Json, command
-from mckibben.options import Option
+from mckibben.cli.parameters import Json, command
+from mckibben.options import Argument, Option
 
 
 @command

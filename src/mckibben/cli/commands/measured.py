@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from mckibben.cli.output import say, show
-from mckibben.cli.parameters import Argument, Force, Json, Quick, chosen_models, command, repeated
+from mckibben.cli.parameters import Force, Json, Quick, chosen_models, command, repeated
 from mckibben.cli.stopping import stoppable
-from mckibben.options import Jobs, Option, Seed, names
+from mckibben.options import Argument, Jobs, Option, Seed
+from mckibben.parsers import names
 from mckibben.system.progress import telling
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from typing import Annotated
 import click
 
 from mckibben.cli.output import say, show
-from mckibben.cli.parameters import Argument, Json, command
+from mckibben.cli.parameters import Json, command
+from mckibben.options import Argument
 
 
 @command

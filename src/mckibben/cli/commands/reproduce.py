@@ -9,36 +9,30 @@ from pathlib import Path
 from typing import Annotated
 
 from mckibben.cli.output import show
-from mckibben.cli.parameters import Argument, Force, Json, command
+from mckibben.cli.parameters import Force, Json, command
 from mckibben.cli.stopping import stoppable
-from mckibben.options import Jobs, Option, ReadOptions, Seed
-from mckibben.system.progress import telling
+from mckibben.options import Argument, Option, ReadOptions, ReproduceOptions
 
 
 @command
 def reproduce(
+    options: ReproduceOptions,
     reading: ReadOptions,
     name: Annotated[str | None, Argument("[PAPER]", "Short name; see --list.")] = None,
     listed: Annotated[bool, Option("List the papers.", flag="--list")] = False,
-    quick: Annotated[bool, Option("Skip the slow parts.")] = False,
     data: Annotated[
         Path | None, Option("Recordings of the protocol, instead of the rig's.", "FOLDER")
-    ] = None,
-    rig: Annotated[
-        str | None, Option("Rig to record, and to close loops on. Default: the paper's.", "RIG")
     ] = None,
     out: Annotated[
         Path | None, Option("Folder for report.html and tables.json.", "DIR", "-o")
     ] = None,
-    seed: Seed = 0,
-    jobs: Jobs = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
+    from mckibben import workflow
     from mckibben.errors import DataError
     from mckibben.papers.paper import papers
-    from mckibben.report import reproduction, results, text
-    from mckibben.report.rerun import rerun
+    from mckibben.report import results, text
 
     if listed:
         every = papers()
@@ -47,10 +41,9 @@ def reproduce(
         return
     if name is None:
         raise DataError("there is no paper to run again", remedy="name one, or give `listed`")
-    with stoppable(out), telling(True, name, lines=True) as tell:
-        found = rerun(
-            name, data, reading, rig=rig, out=out, quick=quick, seed=seed, jobs=jobs, force=force,
-            progress=tell,
-        )  # fmt: skip
+    with stoppable(out):
+        found = workflow.reproduce(
+            name, options, data=data, reading=reading, out=out, force=force, progress=True
+        )
     written = [out / "report.html", out / "tables.json"] if out else []
-    show(found, lambda: text.lines(reproduction.items(found)), as_json, found.notes, written)
+    show(found, lambda: text.shown(found), as_json, found.notes, written)

@@ -8,9 +8,10 @@ from typing import Annotated, Any
 import click
 
 from mckibben.cli.output import say, show
-from mckibben.cli.parameters import Argument, Force, Json, command
+from mckibben.cli.parameters import Force, Json, command
 from mckibben.cli.stopping import stoppable
-from mckibben.options import Jobs, Option, Seed, setting
+from mckibben.options import Argument, Jobs, Option, Seed
+from mckibben.parsers import setting
 from mckibben.system.progress import telling
 
 Name = Annotated[str, Argument("RIG", "Name of a rig, or its file (.toml).")]

@@ -13,7 +13,6 @@ Ctrl-C stops; the same command resumes.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,9 +21,7 @@ from mckibben.cli.parameters import (
     Files,
     Force,
     Json,
-    Quick,
     Test,
-    chosen_models,
     command,
     repeated,
 )
@@ -41,7 +38,6 @@ def study(
     options: StudyOptions,
     reading: ReadOptions,
     test: Test = (),
-    quick: Quick = False,
     out: Annotated[Path, Option("Folder for the results.", "DIR", "-o")] = Path("study"),
     force: Force = False,
     as_json: Json = False,
@@ -62,7 +58,7 @@ def study(
         found = workflow.study(
             files,
             test,
-            replace(options, models=chosen_models(options.models, quick)),
+            options,
             reading=reading,
             out=out,
             force=force,
@@ -70,12 +66,12 @@ def study(
             progress=True,
             found=begun,
         )
-        stop_short(found.leaderboard, out)
+        stop_short(found, out)
     about = {"folder": str(out)} | found.to_dict()
     about["notes"] = notes_by_file([*found.train, *found.test])
     show(
         about if as_json else found,
-        lambda: text.lines(results.study(found)),
+        lambda: text.shown(found),
         as_json,
         found.leaderboard.notes,
         written=[out / "report.html"],

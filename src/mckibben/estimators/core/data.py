@@ -31,7 +31,8 @@ and the time constant are not determined separately.
 class TrainingData:
     """All runs for identification, and their common channels.
 
-    ``spans`` are ranges of the outputs that are known otherwise, for where they do not move.
+    ``spans`` are ranges of the outputs that are known otherwise, for where they do not move;
+    ``n_recordings`` the number of recordings, also of those of which no run is left.
     """
 
     runs: tuple[Run, ...]
@@ -39,6 +40,7 @@ class TrainingData:
     outputs: tuple[Channel, ...]
     scheduled: tuple[Channel, ...] = ()
     spans: tuple[float, ...] | None = None
+    n_recordings: int = 0
     _latest: dict[Hashable, tuple[Array, Any]] = field(default_factory=dict, init=False, repr=False)
 
     def latest(self, key: Hashable, theta: Array, compute: Callable[[], Made]) -> Made:
@@ -230,7 +232,14 @@ def training_data(
     def channels(names: Sequence[str]) -> tuple[Channel, ...]:
         return tuple(Channel(name, first.units[name]) for name in names)
 
-    data = TrainingData(runs, channels(driven), channels(given), channels(scheduling), spans=spans)
+    data = TrainingData(
+        runs,
+        channels(driven),
+        channels(given),
+        channels(scheduling),
+        spans=spans,
+        n_recordings=len(runs),
+    )
     counting = data.scored(lambda run: run.outputs)
     if len(counting) < FEWEST_SAMPLES:
         raise DataError(
@@ -275,41 +284,3 @@ def _check(recording: Recording, first: Recording, names: Sequence[str]) -> None
 def _is_absolute(recording: Recording, channel: str) -> bool:
     references = recording.meta.get("pressure_reference")
     return isinstance(references, Mapping) and references.get(channel) == "absolute"
-
-
-def recorded(
-    given: Any,
-    inputs: Sequence[str] | None,
-    y: Any,
-    outputs: Sequence[str] | None,
-    sample_time: float | None,
-) -> list[Recording]:
-    """Return recordings as a list, or arrays of inputs and outputs as one of the named channels."""
-    if y is None:
-        return listed(given)
-    columns = by_channel(given, inputs, "pressure") | by_channel(y, outputs, "displacement")
-    return [Recording(columns, sample_time)]
-
-
-def by_channel(given: Any, names: Sequence[str] | None, quantity: str) -> dict[str, Array]:
-    """Return an array, shape (n,) or (n, channels), by channel; without names those of a quantity.
-
-    Raises
-    ------
-    ValueError
-        On what `sklearn.utils.check_array` refuses, such as complex, sparse and infinite values.
-    DataError
-        If there are other than as many columns as channels.
-    """
-    from sklearn.utils import check_array
-
-    columns = check_array(given, dtype=float, ensure_2d=False)
-    columns = columns.reshape(len(columns), -1)
-    n = columns.shape[1]
-    usual = [f"{quantity}_{k + 1}" for k in range(n)] if n > 1 else [quantity]
-    if n != len(names or usual):
-        raise DataError(
-            f"arrays of shape {columns.shape} are not the channels {', '.join(names or usual)}",
-            remedy="name the columns: mckibben.Recording({'pressure_1': ...}, sample_time)",
-        )
-    return dict(zip(names or usual, columns.T, strict=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 import warnings
 from abc import ABC, abstractmethod
@@ -23,7 +24,15 @@ from mckibben.blocks.fields import Channel
 from mckibben.blocks.free_runs import FreeRuns, as_it_is
 from mckibben.channels import Channels, Names, channels_of, quantity
 from mckibben.errors import MckibbenError, ModelError, ModelWarning
-from mckibben.estimators.core.data import TrainingData, by_channel, recorded, training_data
+from mckibben.estimators.core.arguments import (
+    Outputs,
+    is_array,
+    recorded,
+    require_outputs,
+    squeezed,
+    timed,
+)
+from mckibben.estimators.core.data import TrainingData, training_data
 from mckibben.estimators.core.leaving_out import stepped
 from mckibben.estimators.core.uncertainty import covariance_of, unknown, vanishing
 from mckibben.numerics.tracker import Progress, Tracker
@@ -113,7 +122,8 @@ class Diagnostics:
     def covariance(self) -> Array:
         """Covariance of the parameters for autocorrelated residuals, shape (n_parameters, n_parameters).
 
-        NaN for parameters at bounds or that the data do not determine.
+        NaN for parameters at bounds or that the data do not determine, unless the estimator expects them
+        to be of some scale.
         """
         return self._uncertainty[1]
 
@@ -234,11 +244,22 @@ class Estimator(ABC):
         return f"{type(self).__name__}({', '.join(changed)})"
 
     def __sklearn_tags__(self) -> Any:
-        from sklearn.base import BaseEstimator  # scikit-learn alone asks, so it is there already
+        # scikit-learn alone asks, so it is there already
+        from sklearn.base import BaseEstimator, RegressorMixin
 
-        tags = BaseEstimator().__sklearn_tags__()
+        tags = type("Regressor", (RegressorMixin, BaseEstimator), {})().__sklearn_tags__()
         tags.input_tags.one_d_array = isinstance(self.input, str) and not self._further_inputs()
+        # it is of data of ten columns, of which one matters
+        tags.regressor_tags.poor_score = self.input is not None
+        single = isinstance(self.output, str) or (self.output is not None and len(self.output) == 1)
+        tags.target_tags.multi_output = not single
+        tags.target_tags.single_output = single or self.output is None
         return tags
+
+    @property
+    def n_features_in_(self) -> int:
+        """Number of columns of an array of its inputs."""
+        return len(self.fitted.inputs)
 
     @classmethod
     def _names(cls) -> list[str]:
@@ -380,8 +401,8 @@ class Estimator(ABC):
         recordings : Recording, data frame, or sequence of these; or array, shape (n,) or (n, inputs)
             Training data; every recording starts with its own memory. With ``y``, an array of the
             inputs, in the package's units: of `input`, then what settings name besides.
-        y : array, shape (n,) or (n, outputs), optional
-            The outputs.
+        y : array, shape (n,) or (n, outputs), or list of these, optional
+            The outputs: of the array, or in place of those of the recordings.
         sample_time : float, optional
             Between samples of arrays [s].
         rows : sequence of bool arrays, optional
@@ -401,15 +422,20 @@ class Estimator(ABC):
         ModelError
             On settings out of range, or if the model found is no better than the mean of the output.
         """
+        owner = type(self).__name__
+        require_outputs(recordings, y, owner)
         inputs, outputs = ((a,) if isinstance(a, str) else a for a in (self.input, self.output))
         if inputs is not None:
             scheduling = self.get_params().get("scheduling") or ()
             inputs = (*inputs, *self._further_inputs(), *scheduling)
-        every = recorded(recordings, inputs, y, outputs, sample_time)
+        if y is not None and outputs is None and not is_array(recordings):
+            outputs = self._outputs(listed(recordings))
+        every = recorded(recordings, inputs, y, outputs, sample_time, owner)
         fitted = copy(self)  # a fit that fails or is interrupted leaves no traces
         with one_blas_thread(), telling(progress, "fitting") as tell:
             fitted._fit(every, rows, tell)
         vars(self).update(vars(fitted))
+        self.sample_time_ = sample_time
         return self
 
     def _fit(
@@ -493,22 +519,45 @@ class Estimator(ABC):
         ----------
         recordings : Recording, data frame, or array of inputs; or sequence of recordings
         sample_time : float, optional
-            Between samples of an array [s].
+            Between samples of arrays and of frames without time [s]; default as given to `fit`.
 
         Returns
         -------
         array, shape (n,), or (n, m) of a model of m outputs
-            Of one recording; a list of these of a sequence.
+            Of one recording; `Outputs`, a sequence of these, of several.
         """
+        every, outputs = self._of_model(recordings, None, sample_time)
+        modelled = (self.fitted.simulate(one).matrix(outputs) for one in every)
+        found = Outputs(tuple(map(squeezed, modelled)))
+        one = isinstance(recordings, Recording) or is_frame(recordings) or is_array(recordings)
+        return found[0] if one else found
+
+    def _of_model(
+        self, given: Any, y: Any, sample_time: float | None
+    ) -> tuple[list[Recording], list[str]]:
+        """Return recordings with the channels of the model, and its outputs."""
         block = self.fitted
-        if isinstance(recordings, np.ndarray):
-            columns = by_channel(recordings, [channel.name for channel in block.inputs], "")
-            recordings = Recording(columns, sample_time)
-        if isinstance(recordings, Recording) or is_frame(recordings):
-            return self.predict(listed(recordings))[0]
-        given = [channel.name for channel in block.outputs]
-        found = [block.simulate(recording).matrix(given) for recording in listed(recordings)]
-        return [outputs[:, 0] for outputs in found] if len(given) == 1 else found
+        inputs, outputs = ([c.name for c in side] for side in (block.inputs, block.outputs))
+        every = recorded(given, inputs, y, outputs, sample_time, type(self).__name__)
+        usual = self.sample_time_
+        every = [timed(one, usual) if one.sample_time is None else one for one in every]
+        return every, outputs
+
+    def measured(self, recordings: Recording | Sequence[Recording]) -> Outputs:
+        """Return the measured outputs, as `predict` returns those of the model.
+
+        They are the ``y`` for scorers of scikit-learn, as ``"neg_mean_absolute_error"``, on recordings.
+        """
+        every = listed(recordings)
+        outputs = self._outputs(every)
+        return Outputs(tuple(squeezed(one.matrix(outputs)) for one in every))
+
+    def _outputs(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
+        """Return the channels of the outputs: as named, or found."""
+        if self.output is None:
+            scheduling = self.get_params().get("scheduling")
+            return self.resolved(recordings, self.input, None, scheduling).outputs
+        return (self.output,) if isinstance(self.output, str) else self.output
 
     def score(
         self,
@@ -518,12 +567,10 @@ class Estimator(ABC):
         sample_time: float | None = None,
     ) -> float:
         """Return R² of `predict` over all recordings, or arrays as of `fit`, averaged over outputs."""
-        inputs, given = (
-            [c.name for c in side] for side in (self.fitted.inputs, self.fitted.outputs)
-        )
-        every = recorded(recordings, inputs, y, given, sample_time)
+        require_outputs(recordings, y, type(self).__name__)
+        every, outputs = self._of_model(recordings, y, sample_time)
         predicted = np.concatenate(self.predict(every))
-        measured = np.concatenate([recording.matrix(given) for recording in every])
+        measured = np.concatenate([recording.matrix(outputs) for recording in every])
         residual = measured - predicted.reshape(measured.shape)
         around = measured - measured.mean(axis=0)
         unexplained = (residual**2).sum(axis=0) / (around**2).sum(axis=0)
@@ -536,12 +583,13 @@ class Estimator(ABC):
         Raises
         ------
         sklearn.exceptions.NotFittedError
-            Before `fit`.
+            Before `fit`; an AttributeError without scikit-learn.
         """
         if not hasattr(self, "model_"):
-            from sklearn.exceptions import NotFittedError
-
-            raise NotFittedError(f"{type(self).__name__} is not fitted yet: call fit first")
+            # whoever expects the class of scikit-learn has imported it
+            known = sys.modules.get("sklearn.exceptions")
+            kind = AttributeError if known is None else known.NotFittedError
+            raise kind(f"{type(self).__name__} is not fitted yet: call fit first")
         block: Block = self.model_
         return block
 

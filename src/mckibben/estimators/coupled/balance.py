@@ -20,7 +20,7 @@ from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance, balance_in
-from mckibben.blocks.coupled.balance_terms import TABLE
+from mckibben.blocks.coupled.balance_terms import TABLE, Kind
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import rows, vector
 from mckibben.blocks.free_runs import FreeRuns
@@ -30,20 +30,20 @@ from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.coupled.balance_bench import (
-    bench_of,
     check_numbers,
-    directions,
-    drive_of,
-    from_zero,
     in_one_order,
+    of_coordinates,
     one_speed,
-    only_forces,
+    recorded_drive,
+    scheduled_by,
+    set_up,
+    unmeasured_in,
     varying,
     with_loads,
     without_held,
-    without_load,
 )
-from mckibben.estimators.coupled.balance_choice import PHENOMENA, chosen, demanded, pruned
+from mckibben.estimators.coupled.balance_choice import choose, is_demanded, prune
+from mckibben.estimators.coupled.balance_errors import covariance_of_balance
 from mckibben.estimators.coupled.balance_prior import (
     PriorErrors,
     PriorLike,
@@ -51,11 +51,12 @@ from mckibben.estimators.coupled.balance_prior import (
     check_single_muscle,
     with_prior,
 )
-from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
+from mckibben.estimators.coupled.balance_problem import front, problem_of
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
-from mckibben.estimators.coupled.base import CoupledEstimator
+from mckibben.estimators.coupled.base import CoupledEstimator, taken
 from mckibben.muscles.scaling import resized
+from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import TRAVELS
 from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording, listed
@@ -82,17 +83,13 @@ STRETCHES = (0.0, 1.0)
 STEPS_BETWEEN, LAST_STEPS = 12, 8
 """Steps before and between choices, and final steps on all samples."""
 
-RUBBING = ("asymmetry", "walls")
-"""Terms that resemble friction."""
+LIKE_FRICTION = tuple(kind.name for kind in TABLE.values() if kind.like_friction)
+"""Kinds of terms that may take the place of friction."""
 
-DIFFER = ("areas", "elasticity", "bladders", "friction", "relaxation", "damping")
-"""Terms in which muscles may differ."""
-
-FINEST, LONGEST = 0.003, 0.5
-"""Shortest and longest break-away distances of stops, relative to the stroke."""
-
-PLACES = (0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95)
-"""Places where obstacles begin, as shares of the range; for lowering, from its end."""
+DRY, FINEST, LONGEST = 0.0003, 0.003, 0.5
+"""Break-away distances of stops, by the stroke: of dry friction, and the shortest and longest of
+those that yield before they slide.
+"""
 
 FIRST_GROWTH, TOWARDS, REFINED = 0.9, 60, 3
 """First share of friction that grows with pressure, of the prior; maximum number of steps from there;
@@ -124,7 +121,8 @@ class BalanceEstimator(CoupledEstimator):
     friction : {"pressure", "constant"}
         Whether the forces at which stops break away grow with pressure.
     n_stops : int
-        Stops, which break away after travels from 0.3 to 50 % of the stroke at the highest pressure.
+        Stops, which break away after travels from 0.3 to 50 % of the stroke at the highest pressure,
+        beside one for dry friction, at 0.03 %.
     n_lags : int
         Time constants that may be, each within its part of what the recordings can tell; 0 for muscles
         without time.
@@ -233,23 +231,25 @@ class BalanceEstimator(CoupledEstimator):
                 )
         return known
 
-    def completed(self, recordings: list[Recording], scheduling: Sequence[str]) -> list[Recording]:
+    def completed(
+        self, recordings: Sequence[Recording], rows: Sequence[Mask] | None, names: Sequence[str]
+    ) -> list[Recording]:
         """Return recordings with the loads that others have, unless all are to have one."""
-        return recordings if self.unknown_load is False else with_loads(recordings, scheduling)
+        every = listed(recordings)
+        return every if self.unknown_load is False else with_loads(every, names, rows)
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
         """Return the training data; recordings may lack a load that others have."""
         every = listed(recordings)
-        data = super().data(every, rows)
-        scheduled = [channel.name for channel in data.scheduled]
+        names = taken(self.resolved(every, self.input, self.output, self.scheduling))
+        data = super().data(self.completed(every, rows, names), rows)
 
         def unmeasured(run: Run) -> tuple[str, ...]:
-            return tuple(name for name in scheduled if name not in every[run.index])
+            return tuple(name for name in names if name not in every[run.index])
 
-        runs = tuple(replace(run, unmeasured=unmeasured(run)) for run in data.runs)
-        return replace(data, runs=runs)
+        return data.changed(lambda run: replace(run, unmeasured=unmeasured(run)))
 
     @property
     def spans(self) -> tuple[float, ...] | None:
@@ -257,75 +257,77 @@ class BalanceEstimator(CoupledEstimator):
         return None if self.prior is None else (as_prior(self.prior).sheet.stroke,)
 
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
-        """Return the block identified from all informative runs."""
-        data, names = without_held(data)
-        tracker.notes += [
-            f"in {name} nothing moves and no force was measured: it is left out: record the force"
-            for name in names
-        ]
-        return self.identify(data, tracker)
-
-    def find_again(self, data: TrainingData, tracker: Tracker) -> Block:
-        """Return the block with the same terms, from where they were."""
-        return self.identify(without_held(data)[0], tracker, again=True)
-
-    def _fit(self, *given: Any) -> None:
-        super()._fit(*given)
-        del self._last  # needed for `find_again` only
-
-    def identify(self, data: TrainingData, tracker: Tracker, *, again: bool = False) -> Block:
         """Return the balance, solved for coordinates, after the air and dead zone."""
         if unknown := {*(self.terms or ())} - {*TERMS}:
             raise ModelError(
                 f"terms names {', '.join(sorted(unknown))}",
                 remedy=f"choose from {', '.join(TERMS)}",
             )
-        data, names = varying(in_one_order(data))
+        if self.tare and self.unknown_load:
+            raise ModelError(
+                "displacements from rest under the load do not show a constant load",
+                parameter="unknown_load",
+                remedy="give one of tare and unknown_load",
+            )
+        data, held_runs = without_held(data)
+        data, constant = varying(in_one_order(data))
+        tracker.notes += [
+            f"in {name} nothing moves and no force was measured: it is left out: record the force"
+            for name in held_runs
+        ]
         tracker.notes += [
             f"{name} is about the same in all recordings, and is left out: record at other "
             "values too"
-            for name in names
+            for name in constant
         ]
         check_numbers(data)
         if self.prior is not None:
             check_single_muscle(data)
-        of_force = self.of_force or only_forces(data)
-        data, behind, ways = from_zero(data, np.eye(1) if of_force else directions(data))
-        bench = replace(bench_of(data, ways, tare=self.tare), of_force=of_force)
-        if not bench.tare:
-            lacking = without_load(data, every=bool(self.unknown_load))
-            bench = replace(bench, unmeasured=lacking)
+        data, bench = set_up(
+            data, of_force=self.of_force, tare=self.tare, unknown_load=self.unknown_load
+        )
         prior_errors = None
         if self.prior is not None:
             bench, prior_errors = with_prior(bench, self.prior)
-        still = self.prior is None and one_speed(data)
-        if still and self.n_lags and self.lags is None:
+        timed = self.lags is not None or self.prior is not None or not one_speed(data)
+        if not timed and self.n_lags:
             tracker.notes.append(
                 "all motion is at about one speed: relaxation and friction cannot be distinguished, and "
                 "relaxation is left out: record at other speeds too, or give lags"
             )
-        if again:
-            search, z = self._refined(*self._last, data, tracker)
-        else:
-            structure = self.widest(bench, timed=not still or self.lags is not None)
-            search, z = self._found(data, structure, prior_errors, tracker)
-        structure = search.structure
-        values = structure.expanded(z)
-        balance = in_newtons(structure.block(values, final=True))
-        self._keep_loads(search, z, data, balance.areas[0][0])
-        fronts = [front(structure, values, channel) for channel in data.inputs]
+        search = self._found(data, self.widest(bench, timed=timed), prior_errors, tracker)
+        return self._model(search, data, tracker)
+
+    def find_again(self, data: TrainingData, tracker: Tracker) -> Block:
+        """Return the block with the same terms, from where they were."""
+        bench = self._search.structure.bench
+        data = scheduled_by(in_one_order(without_held(data)[0]), [*bench.scheduled, *bench.loaded])
+        return self._model(self._search, of_coordinates(data, bench.sensors), tracker)
+
+    def _fit(self, *given: Any) -> None:
+        super()._fit(*given)
+        del self._search  # needed for `find_again` only
+
+    def _model(self, search: Search, data: TrainingData, tracker: Tracker) -> Block:
+        """Return the model after a last descent on all samples."""
+        of_force = search.structure.bench.of_force
+        problem = problem_of(data, MOST_SAMPLES, MOST, of_force=of_force)
+        search = replace(search, problem=problem)
+        for _ in range(1 if search.prior is None else REFINED):
+            search = search.weighed()
+            search = search.descend(min(self.steps, LAST_STEPS), tracker.part(0.7, 0.9))
+        self._search, structure = search, search.structure
+        balance = in_newtons(structure.block(search.values, final=True))
+        self.loads_ = np.zeros((data.n_recordings, structure.m))
+        own = search.z[len(structure.terms) :].reshape(-1, structure.m)
+        self.loads_[list(structure.bench.unmeasured)] = own * balance.areas[0][0]
+        fronts = [front(structure, search.values, channel) for channel in data.inputs]
         balance, before = self._limited(balance, fronts, data)
+        sensors, behind = structure.bench.sensors, list[Block]()
+        if any(sensor.offset or sensor.gain != 1.0 for sensor in sensors):
+            behind.append(sensors[0] if len(sensors) == 1 else PerChannel(sensors))
         parts = [*before, balance.inverse(), *behind]
         return parts[0] if len(parts) == 1 else Series(tuple(parts))
-
-    def _keep_loads(self, search: Search, z: Array, data: TrainingData, area: float) -> None:
-        """Set the constant loads of recordings, in the unit of forces that an area sets."""
-        structure = search.structure
-        self.loads_ = np.zeros((1 + max(run.index for run in data.runs), structure.m))
-        for run in data.runs:
-            place = search.problem.loads_at(structure, run)
-            if place.stop > place.start:
-                self.loads_[run.index] = z[place] * area
 
     def _limited(
         self, balance: Balance, fronts: list[list[Block]], data: TrainingData
@@ -346,21 +348,26 @@ class BalanceEstimator(CoupledEstimator):
         n, m = balance.moves.shape
         if n > m and self.drive == "recorded":
             pressures = [acting_in_muscles(given) for given in data.stacked("driven").T]
-            drive = drive_of(np.column_stack(pressures))
+            drive = recorded_drive(np.column_stack(pressures))
             if m < drive.shape[1] <= n:  # not any, and enough to balance along
                 balance = replace(balance, drive=rows(drive))
         names = [channel.name for channel in data.scheduled]
         x = data.stacked("scheduled")[:, [names.index(name) for name in balance.scheduling]]
         balance = replace(balance, known=rows(np.column_stack([x.min(axis=0), x.max(axis=0)])))
         stages = (
-            tuple(_within(given_range, b) for b in stage) for stage in zip(*fronts, strict=True)
+            tuple(
+                replace(block, input_range=given_range) if isinstance(block, Air) else block
+                for block in stage
+            )
+            for stage in zip(*fronts, strict=True)
         )
         return balance, [stage[0] if len(stage) == 1 else PerChannel(stage) for stage in stages]
 
     def widest(self, bench: Bench, *, timed: bool) -> Structure:
         """Return the structure with all candidate terms."""
         longest = LONGEST if self.prior is None else TRAVELS[-1]
-        travels = np.geomspace(FINEST, longest, self.n_stops) * bench.stroke
+        yielding = np.geomspace(FINEST, longest, self.n_stops)
+        travels = bench.stroke * (np.append(DRY, yielding) if self.n_stops else yielding)
         shortest, longest = bench.lag_range
         lags = np.geomspace(shortest, longest, self.n_lags + 1)[1:] if bench.step and timed else ()
         if self.lags is not None:
@@ -372,7 +379,8 @@ class BalanceEstimator(CoupledEstimator):
                     remedy="give fewer lags, in order, each twice the last or more, from "
                     f"{shortest:.3g} to {longest:.3g} s",
                 )
-        sides = [(1, place) for place in PLACES] + [(-1, 1.0 - place) for place in PLACES]
+        places = TABLE["places"].begins
+        sides = [(1, place) for place in places] + [(-1, 1.0 - place) for place in places]
         return Structure(
             bench,
             n_elastic=self.elasticity - 1,
@@ -401,21 +409,26 @@ class BalanceEstimator(CoupledEstimator):
             return which < 2
         return not TABLE[kind].option
 
+    def _possible(self, structure: Structure, kind: Kind) -> bool:
+        """Return whether what a kind of term acts on is there."""
+        there = {
+            "time": structure.bench.step > 0.0,
+            "stops": bool(structure.limits),
+            "hold": structure.n > 1 or structure.bench.some_held,
+        }
+        grows = kind.name in ("friction_growth", "friction_slopes")
+        return there.get(kind.needs, True) and not (grows and self.friction == "constant")
+
     def _first(self, structure: Structure) -> Mask:
         """Return which terms are free from the start: all that act smoothly."""
-        lacking = {"friction_slopes"} if self.friction == "constant" else set()
-        if self.friction == "constant" or not structure.limits:
-            lacking |= {"friction_growth"}
-        if not structure.bench.step:
-            lacking |= {"filling", "venting", "lines", "damping"}
 
         def there(term: Term) -> bool:
-            kind, option = term.kind, TABLE[term.kind].option
-            if kind in lacking or kind == "places" or option in PHENOMENA:
+            kind = TABLE[term.kind]
+            if kind.phenomenon or not self._possible(structure, kind):
                 return False
             if term.muscle is not None:
-                return kind in DIFFER and self.may("muscles")
-            return self._always(structure, term) or self.may(option)
+                return not kind.alike and self.may("muscles")
+            return self._always(structure, term) or self.may(kind.option)
 
         return np.array([there(term) for term in structure.terms])
 
@@ -425,130 +438,112 @@ class BalanceEstimator(CoupledEstimator):
         structure: Structure,
         prior_errors: PriorErrors | None,
         tracker: Tracker,
-    ) -> tuple[Search, Array]:
-        """Return the search with the selected terms, and their values."""
+    ) -> Search:
+        """Return the search with the selected terms."""
         of_force, first = structure.bench.of_force, self._first(structure)
-        few = compared(coarser(data, FEW), FEW, of_force=of_force)
-        search = Search(few, structure, first, prior_errors)
-        z = self._balanced(search, tracker)
+        few = problem_of(data, FEW, FEW, of_force=of_force)
+        begun = np.append(structure.none, np.zeros(few.size(structure) - first.size))
+        search = self._linear_start(Search(few, structure, first, begun, prior_errors), tracker)
         if prior_errors is not None:
-            starts = (search.descend(one, TOWARDS, Tracker()) for one in (z, self._likely(search)))
-            z = min(starts, key=search.cost)
+            starts = (search, self._from_prior(search, prior_errors.prior.sheet))
+            search = min((one.descend(TOWARDS) for one in starts), key=lambda one: one.cost)
         steps = min(self.steps, STEPS_BETWEEN)
-        rubbing = {kind for kind in RUBBING if self.may(kind) and structure.limits}
-        search, z = self._rubbing(search, z, rubbing, tracker.part(0.0, 0.1))
+        may = {
+            name
+            for name, kind in TABLE.items()
+            if self.may(kind.option) and self._possible(structure, kind)
+        }
+        search = self._with_friction_like(search, may, tracker.part(0.0, 0.1))
         if not search.problem.all_at_rest:
-            search, z = self._long_held(search, z)
-        search = search.weighed(z)
-        z = search.descended(z, steps, tracker.part(0.1, 0.2))
-        search = search.weighed(z)
-        tried = {
-            kind for kind in PHENOMENA if self.may(kind)
-            and (kind != "slack" or structure.n > 1 or any(held(data, run) for run in data.runs))
-            and (kind != "mass" or structure.bench.step)
-            and (kind != "asymmetry" or structure.limits)
-        }  # fmt: skip
-        search, z = chosen(search, z, tried, tracker.part(0.2, 0.4))
+            search = self._settled_if_better(search)
+        search = search.weighed().descend(steps, tracker.part(0.1, 0.2)).weighed()
+        tried = {TABLE[name].option for name in may if TABLE[name].phenomenon}
+        search = choose(search, tried, tracker.part(0.2, 0.4))
         if structure.n == 1 and self.unknown_load is None:
-            search, z = self._own_loads(search, z, data)
-        walls = (structure.kinds == "walls") & first
-        search = replace(search, active=search.active | walls)
-        z = search.descended(z, steps, tracker.part(0.4, 0.5))
-        search, z = pruned(search, z)
-        there = compress(structure.terms, search.active)
-        more = [term for term in there if not self._always(structure, term)]
-        names = ("muscles" if term.muscle is not None else TABLE[term.kind].option for term in more)
-        self.terms_ = tuple(dict.fromkeys(names))
-        search, z = search.narrowed(z)
-        z = search.descend(z, self.steps, tracker.part(0.5, 0.7))
-        return self._refined(search, z, data, tracker)
-
-    def _refined(
-        self, search: Search, z: Array, data: TrainingData, tracker: Tracker
-    ) -> tuple[Search, Array]:
-        """Return the search on all samples, and its values after a descent."""
-        whole = compared(
-            coarser(data, MOST_SAMPLES), MOST, of_force=search.structure.bench.of_force
+            search = self._with_own_loads(search, data)
+        late = np.isin(structure.kinds, LIKE_FRICTION) & first
+        search = replace(search, active=search.active | late)
+        always = {
+            key
+            for key, term in zip(structure.keys, structure.terms, strict=True)
+            if self._always(structure, term)
+        }
+        search = prune(search.descend(steps, tracker.part(0.4, 0.5))).narrowed()
+        there = [key for key in compress(search.structure.keys, search.active) if key not in always]
+        names = (
+            "muscles" if muscle is not None else TABLE[kind].option for kind, _, muscle in there
         )
-        search = replace(search, problem=whole)
-        for _ in range(1 if search.prior is None else REFINED):
-            search = search.weighed(z)
-            z = search.descend(z, min(self.steps, LAST_STEPS), tracker.part(0.7, 0.9))
-        self._last = search, z
-        return search, z
+        self.terms_ = tuple(dict.fromkeys(names))
+        return search.descend(self.steps, tracker.part(0.5, 0.7))
 
-    def _rubbing(
-        self, search: Search, z: Array, more: set[str], tracker: Tracker
-    ) -> tuple[Search, Array]:
-        """Return the search after a descent, with those of ``more`` terms that data demand already.
+    def _with_friction_like(self, search: Search, may: set[str], tracker: Tracker) -> Search:
+        """Return the search after a descent, with what resembles friction if data demand it already.
 
-        Asymmetry and stretch resemble friction, and may take its place where that is not yet known.
+        It may take the place of friction where that is not yet known.
         """
-        kinds = search.structure.kinds
-        steps, begun = min(self.steps, STEPS_BETWEEN), z
-        search = replace(search, active=search.active & ~np.isin(kinds, RUBBING))
-        z = search.descended(begun, steps, tracker)
-        for kind in RUBBING:
-            if kind in more:
-                other = replace(search, active=search.active | (kinds == kind))
-                after = other.descended(begun, steps, tracker)
-                search, z = (other, after) if demanded(search, z, other, after) else (search, z)
-        return search, z
+        steps, terms = min(self.steps, STEPS_BETWEEN), search.structure.kinds
+        begun = replace(search, active=search.active & ~np.isin(terms, LIKE_FRICTION))
+        search = begun.descend(steps, tracker)
+        for kind in [kind for kind in LIKE_FRICTION if kind in may]:
+            more = replace(begun, active=search.active | (terms == kind)).descend(steps, tracker)
+            search = more if is_demanded(search, more) else search
+        return search
 
-    def _long_held(self, search: Search, z: Array) -> tuple[Search, Array]:
+    def _settled_if_better(self, search: Search) -> Search:
         """Return the search with settled starts, if that explains the runs better."""
         settled = replace(search, structure=replace(search.structure, settled=True))
-        found = settled.descended(z, STEPS_BETWEEN, Tracker())
-        return (settled, found) if settled.cost(found) < search.cost(z) else (search, z)
+        both = (one.descend(STEPS_BETWEEN) for one in (search, settled))
+        return min(both, key=lambda one: one.cost)
 
-    def _balanced(self, search: Search, tracker: Tracker) -> Array:
+    def _linear_start(self, search: Search, tracker: Tracker) -> Search:
         """Return the best linear force balance at measured positions, over several starts.
 
         Where a muscle is held, stops move by the stretch of its wall alone: without it their friction is
         no different from a constant force, and no slope leads from there to a stretch.
         """
-        structure, problem, starts = search.structure, search.problem, []
+        structure, starts = search.structure, list[Search]()
         growths = GROWTHS[self.friction if structure.limits else "constant"]
         stretches = STRETCHES if structure.bench.of_force and self.may("walls") else (0.0,)
+        filling = structure.positions("filling")
         for growth, stretch in product(growths, stretches):
-            z = np.zeros(problem.size(structure))
-            z[: len(structure.terms)] = structure.initial(growth, stretch)
-            filling = structure.free("filling")
+            z = search.none.copy()
+            z[: search.active.size] = structure.initial(growth, stretch)
             z[filling] = np.where(search.active[filling], FILLED * structure.bench.step, 0.0)
-            z = problem.balanced(structure, z, search.active)
-            starts.append((search.cost(z), z))
-            tracker.update(z, starts[-1][0])
-        return min(starts, key=lambda start: start[0])[1]
+            z = search.problem.balanced(structure, z, search.active)
+            starts.append(replace(search, z=z))
+            tracker.update(z, starts[-1].cost)
+        return min(starts, key=lambda one: one.cost)
 
-    def _likely(self, search: Search) -> Array:
-        """Return the most probable model of the prior."""
-        structure, prior_errors, problem = search.structure, search.prior, search.problem
-        assert prior_errors is not None
-        z = np.zeros(problem.size(structure))
-        growing = search.active[structure.free("friction_growth")].all()
-        z[: len(structure.terms)] = structure.initial(FIRST_GROWTH if growing else 0.0)
+    def _from_prior(self, search: Search, sheet: Sheet) -> Search:
+        """Return the search from the most probable model of its prior."""
+        structure, z = search.structure, search.none.copy()
+        growing = search.active[structure.positions("friction_growth")].all()
+        z[: search.active.size] = structure.initial(FIRST_GROWTH if growing else 0.0)
         for place, term in enumerate(structure.terms):
             if term.kind == "loads":
-                z[place] = 1.0 / prior_errors.prior.sheet.area
+                z[place] = 1.0 / sheet.area
             elif term[:2] == ("areas", 0):
-                z[place] = prior_errors.prior.sheet.area
-        alone = replace(search, problem=replace(problem, data=replace(problem.data, runs=())))
-        return alone.descend(z, TOWARDS, Tracker())
+                z[place] = sheet.area
+        none = replace(search.problem, data=replace(search.problem.data, runs=()))
+        return replace(search, z=replace(search, problem=none, z=z).descend(TOWARDS).z)
 
-    def _own_loads(self, search: Search, z: Array, data: TrainingData) -> tuple[Search, Array]:
+    def _with_own_loads(self, search: Search, data: TrainingData) -> Search:
         """Return the search with constant loads per recording, if data demand them."""
-        bench, every = search.structure.bench, without_load(data, every=True)
+        bench, every = search.structure.bench, unmeasured_in(data, every=True)
         if bench.loaded or bench.unmeasured or bench.tare or not every:
-            return search, z
-        own = replace(
-            search, structure=replace(search.structure, bench=replace(bench, unmeasured=every))
-        )
-        started = np.append(z, np.zeros(own.problem.size(own.structure) - z.size))
-        found = own.descended(started, STEPS_BETWEEN, Tracker())
-        return (own, found) if demanded(search, z, own, found) else (search, z)
+            return search
+        structure = replace(search.structure, bench=replace(bench, unmeasured=every))
+        z = np.append(search.z, np.zeros(len(every) * structure.m))
+        own = replace(search, structure=structure, z=z).descend(STEPS_BETWEEN)
+        return own if is_demanded(search, own) else search
 
     def fixed(self, block: Block) -> tuple[int, ...]:
         return fixed_in(block)
+
+    def uncertainty(self, runs: FreeRuns, at_bounds: Sequence[int]) -> tuple[float, Array]:
+        """Return condition and mean squares of the parameters; those at bounds are as unsure."""
+        del at_bounds
+        return covariance_of_balance(runs, self.fixed(runs.block))
 
     def free_runs(
         self,
@@ -557,14 +552,11 @@ class BalanceEstimator(CoupledEstimator):
         rows: Sequence[Mask] | None = None,
     ) -> FreeRuns:
         """Return the free runs of a block, each under its own load where one was found."""
-        every = self.completed(listed(recordings), block.scheduling)
+        every = self.completed(recordings, rows, block.scheduling)
         runs = super().free_runs(block, every, rows)
-        return replace(runs, changed=partial(_loaded, self.loads_)) if self.loads_.any() else runs
-
-
-def _within(given_range: tuple[float, float] | None, block: Block) -> Block:
-    """Return a front block whose inverse stays within a pressure range."""
-    return replace(block, input_range=given_range) if isinstance(block, Air) else block
+        return (
+            replace(runs, changed=partial(under_load, self.loads_)) if self.loads_.any() else runs
+        )
 
 
 def fixed_in(block: Block) -> tuple[int, ...]:
@@ -576,18 +568,12 @@ def fixed_in(block: Block) -> tuple[int, ...]:
     )
 
 
-def _loaded(loads: Array, model: Block, place: int) -> Block:
-    """Return a model under the load of a recording, by its index."""
-    # a recording behind the last one that was fitted has none
-    return under_load(model, loads[place]) if place < len(loads) else model
-
-
-def under_load(model: Block, load: Array) -> Block:
-    """Return a model of a balance under a constant load on every coordinate, in its unit of forces."""
+def under_load(loads: Array, model: Block, index: int) -> Block:
+    """Return a model of a balance under the constant load of a recording, in its unit of forces."""
     placed = balance_in(model)
     assert placed is not None
     springs = np.array(placed.balance.springs)
-    springs[:, 0] += load
+    springs[:, 0] += loads[index]
     balance = replace(placed.balance, springs=rows(springs))
     parts = (*placed.before, balance.inverse(), *placed.behind)
     return Series(parts) if len(parts) > 1 else parts[0]

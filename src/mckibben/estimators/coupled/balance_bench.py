@@ -8,9 +8,8 @@ from itertools import compress
 
 import numpy as np
 
-from mckibben.arrays import Array
-from mckibben.blocks.base import Block
-from mckibben.blocks.compose import PerChannel
+from mckibben.arrays import Array, Mask
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Affine
 from mckibben.channels import LOADS
 from mckibben.errors import DataError, ModelError
@@ -19,7 +18,7 @@ from mckibben.estimators.coupled.balance_problem import held
 from mckibben.estimators.coupled.balance_structure import Bench
 from mckibben.recording import Recording
 
-ALIKE = 0.02
+LEAST_VARIED = 0.02
 """Smallest variation of a scheduling or load channel, relative to its largest value."""
 
 BLOCK, NOISE = 25, 0.4
@@ -39,7 +38,7 @@ STILL = 0.005
 LARGEST = 1e12
 """Bound of plausible numbers."""
 
-FAR = 0.5
+OTHER_ORIGIN = 0.5
 """Distance of outputs from zero, relative to their range, above which they have another origin."""
 
 AT_START = 0.02
@@ -51,20 +50,33 @@ channel is at rest.
 """
 
 
-def with_loads(recordings: Sequence[Recording], scheduling: Sequence[str]) -> list[Recording]:
-    """Return recordings that all have every load; what one lacks is what it is in others on average."""
-    means = {}
+def with_loads(
+    recordings: Sequence[Recording], scheduling: Sequence[str], rows: Sequence[Mask] | None = None
+) -> list[Recording]:
+    """Return recordings that all have every load.
+
+    What one lacks is what it is in others on average, over their samples that count.
+    """
+    filled = list(recordings)
+    counting = [~one.bridged for one in recordings]
+    if rows is not None:
+        counting = [mask & own for mask, own in zip(rows, counting, strict=True)]
     for name in scheduling:
-        found = [recording for recording in recordings if name in recording]
-        if found and all(recording.units[name] in LOADS for recording in found):
-            mean = float(np.mean(np.concatenate([recording[name] for recording in found])))
-            means[name] = mean, found[0].units[name]
-    filled = []
-    for recording in recordings:
-        without = {name: one for name, one in means.items() if name not in recording}
-        levels = {name: np.full(len(recording), mean) for name, (mean, _) in without.items()}
-        units = {name: unit for name, (_, unit) in without.items()}
-        filled.append(recording.with_channels(units, **levels))
+        units = {one.units[name] for one in recordings if name in one}
+        if not units or not units <= {*LOADS}:
+            continue
+        pairs = zip(recordings, counting, strict=True)
+        known = np.concatenate([one[name][own] for one, own in pairs if name in one])
+        mean, unit = (
+            float(known.mean()) if known.size else 0.0,
+            min(units),
+        )  # of none it is left out
+        filled = [
+            one
+            if name in one
+            else one.with_channels({name: unit}, **{name: np.full(len(one), mean)})
+            for one in filled
+        ]
     return filled
 
 
@@ -95,8 +107,8 @@ def only_forces(data: TrainingData) -> bool:
 
 def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
     """Return data without constant loads and scheduling inputs, loads last; and those left out."""
-    kept, constant = list[int](), list[int]()
-    for place in range(len(data.scheduled)):
+    kept, constant = list[Channel](), list[Channel]()
+    for place, channel in enumerate(data.scheduled):
         columns = [run.scheduled[:, place] for run in data.runs]
         means = np.concatenate(
             [
@@ -106,13 +118,17 @@ def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
             ]
         )
         whole = np.concatenate(columns)
-        least = max(ALIKE * float(np.abs(whole).max()), NOISE * float(np.ptp(whole)))
-        (kept if np.ptp(means) > least else constant).append(place)
-    kept.sort(key=lambda place: data.scheduled[place].unit in LOADS)
-    runs = tuple(replace(run, scheduled=run.scheduled[:, kept]) for run in data.runs)
-    scheduled = tuple(data.scheduled[place] for place in kept)
-    names = [data.scheduled[place].name for place in constant]
-    return replace(data, runs=runs, scheduled=scheduled), names
+        least = max(LEAST_VARIED * float(np.abs(whole).max()), NOISE * float(np.ptp(whole)))
+        (kept if np.ptp(means) > least else constant).append(channel)
+    kept.sort(key=lambda channel: channel.unit in LOADS)
+    return scheduled_by(data, kept), [channel.name for channel in constant]
+
+
+def scheduled_by(data: TrainingData, channels: Sequence[Channel]) -> TrainingData:
+    """Return data with some of the loads and scheduling inputs."""
+    places = [data.scheduled.index(channel) for channel in channels]
+    runs = tuple(replace(run, scheduled=run.scheduled[:, places]) for run in data.runs)
+    return replace(data, runs=runs, scheduled=tuple(channels))
 
 
 def check_numbers(data: TrainingData) -> None:
@@ -188,7 +204,7 @@ def directions(data: TrainingData) -> Array:
     return ways
 
 
-def drive_of(pressures: Array) -> Array:
+def recorded_drive(pressures: Array) -> Array:
     """Return the middle of pressures, shape (k, n), and their spread along directions, (n, 1 + r).
 
     Directions are principal ones of the pressures over their ranges, spreads standard deviations.
@@ -201,8 +217,8 @@ def drive_of(pressures: Array) -> Array:
     return np.column_stack([middle, spread])
 
 
-def from_zero(data: TrainingData, ways: Array) -> tuple[TrainingData, list[Block], Array]:
-    """Return data with outputs relative to about zero, the offset block, and directions.
+def sensors_of(data: TrainingData, ways: Array) -> tuple[tuple[Affine, ...], Array]:
+    """Return what turns coordinates, which are relative to about zero, into outputs; and directions.
 
     Muscles with a coordinate each shorten by that.
     """
@@ -211,18 +227,20 @@ def from_zero(data: TrainingData, ways: Array) -> tuple[TrainingData, list[Block
     shortened = data.stacked("outputs") * gains
     offsets = []
     for column, gain, span in zip(shortened.T, gains, data.travel.tolist(), strict=True):
-        far = FAR * (np.ptp(column) if data.spans is None else span)
+        far = OTHER_ORIGIN * (np.ptp(column) if data.spans is None else span)
         away = column.min() > far or column.max() < 0.0
         offsets.append(float(gain) * float(column.min()) if away else 0.0)
-    runs = tuple(replace(run, outputs=(run.outputs - offsets) / gains) for run in data.runs)
     sensors = tuple(
         Affine(float(gain), offset, channel, channel)
         for gain, offset, channel in zip(gains, offsets, data.outputs, strict=True)
     )
-    behind: list[Block] = []
-    if any(offsets) or not (gains == 1.0).all():
-        behind.append(sensors[0] if len(sensors) == 1 else PerChannel(sensors))
-    return replace(data, runs=runs), behind, np.eye(*ways.shape) if own else ways
+    return sensors, np.eye(*ways.shape) if own else ways
+
+
+def of_coordinates(data: TrainingData, sensors: Sequence[Affine]) -> TrainingData:
+    """Return data with coordinates instead of outputs."""
+    gains, offsets = np.array([[sensor.gain, sensor.offset] for sensor in sensors]).T
+    return data.changed(lambda run: replace(run, outputs=(run.outputs - offsets) / gains))
 
 
 def one_speed(data: TrainingData) -> bool:
@@ -238,7 +256,7 @@ def one_speed(data: TrainingData) -> bool:
     return bool(fast <= ONE_SPEED * slow)
 
 
-def without_load(data: TrainingData, *, every: bool) -> tuple[int, ...]:
+def unmeasured_in(data: TrainingData, *, every: bool) -> tuple[int, ...]:
     """Return the recordings without a load that others have; or all but the first with it."""
     lacking = {run.index for run in data.runs if run.unmeasured}
     found = sorted({run.index for run in data.runs})
@@ -246,15 +264,24 @@ def without_load(data: TrainingData, *, every: bool) -> tuple[int, ...]:
     return tuple(one for one in found if one in lacking or (every and one != reference))
 
 
-def bench_of(data: TrainingData, ways: Array, *, tare: bool | None) -> Bench:
-    """Return the set-up from recordings, for outputs relative to about zero."""
+def set_up(
+    data: TrainingData, *, of_force: bool, tare: bool | None, unknown_load: bool | None
+) -> tuple[TrainingData, Bench]:
+    """Return data of coordinates, and the bench on which they were recorded.
+
+    By settings of the estimator; ``tare`` is found where it is None.
+    """
+    of_force = of_force or only_forces(data)
+    sensors, ways = sensors_of(data, np.eye(1) if of_force else directions(data))
+    data = of_coordinates(data, sensors)
     loads = [channel.unit in LOADS for channel in data.scheduled]
     n_x = loads.index(True) if any(loads) else len(loads)
     x = data.stacked("scheduled")
     y, span = data.stacked("outputs"), data.travel
     if tare is None:
         first = np.array([run.outputs[0] for run in data.runs])
-        tare = n_x > 0 and bool((np.abs(first) <= AT_START * span).all())
+        at_start = bool((np.abs(first) <= AT_START * span).all())
+        tare = n_x > 0 and at_start and not unknown_load
     short = y @ ways.T
     margin = (0.15 if tare else 0.02) * np.ptp(short, axis=0)
     if data.spans is not None:
@@ -265,11 +292,12 @@ def bench_of(data: TrainingData, ways: Array, *, tare: bool | None) -> Bench:
     heaviest = float(np.abs(x[:, n_x:]).max(initial=0.0)) or 1.0
     ends = np.column_stack([x[:, :n_x].min(axis=0), x[:, :n_x].max(axis=0)])
     tenths = (np.round(v / (0.1 * (float(np.ptp(v)) or 1.0))) for v in x[:, :n_x].T)
-    return Bench(
+    bench = Bench(
         driven=data.outputs,
         scheduled=data.scheduled[:n_x],
         loaded=data.scheduled[n_x:],
         given=data.inputs,
+        sensors=sensors,
         directions=ways,
         hull=np.column_stack([short.min(axis=0) - margin, short.max(axis=0) + margin]),
         lowest=y.min(axis=0),
@@ -281,5 +309,9 @@ def bench_of(data: TrainingData, ways: Array, *, tare: bool | None) -> Bench:
         tare=tare,
         lag_range=(2.0 * (step or 1.0), max(0.5 * longest, 1.0)),
         step=step,
+        of_force=of_force,
         curved=n_x > 0 and all(np.unique(v).size > 2 for v in tenths),
+        some_held=any(held(data, run) for run in data.runs),
+        unmeasured=() if tare else unmeasured_in(data, every=bool(unknown_load)),
     )
+    return data, bench

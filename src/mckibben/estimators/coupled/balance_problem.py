@@ -6,9 +6,9 @@ under an unmeasured load, a constant force on every coordinate.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -23,7 +23,7 @@ from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Contact, PiecewiseLinear
 from mckibben.blocks.runs import Run
 from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.coupled.balance_slopes import run as follow
+from mckibben.estimators.coupled.balance_slopes import run as simulate
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.numerics.descent import differences
 from mckibben.numerics.least_squares import solve_constrained, solve_products
@@ -56,12 +56,6 @@ HELD = 0.02
 def held(data: TrainingData, run: Run) -> bool:
     """Return whether a run has no motion, so that its forces are compared."""
     return bool((np.ptp(run.outputs, axis=0) < HELD * data.travel).all())
-
-
-def at_rest(data: TrainingData, run: Run) -> bool:
-    """Return whether a run begins near the lowest pressures, so that it has no earlier memory."""
-    low, high = data.lowest, data.highest
-    return bool((run.driven[0] - np.minimum(low, 0.0) <= RESTING * (high - low)).all())
 
 
 def front(structure: Structure, values: Array, channel: Channel) -> list[Block]:
@@ -101,15 +95,11 @@ class Problem:
     of_force: bool = False
     _fronts: dict[tuple[object, ...], Array] = field(default_factory=dict, repr=False)
 
-    @property
-    def runs(self) -> Sequence[Run]:
-        return self.data.runs
-
-    def still(self, run: Run) -> bool:
-        """Return whether a run's forces are compared, not its displacements."""
-        return self.of_force or self.data.latest(
-            ("held", run.place), np.empty(0), lambda: held(self.data, run)
-        )
+    @cached_property
+    def still(self) -> frozenset[int]:
+        """Places of the runs whose forces are compared, not their displacements."""
+        runs = self.data.runs
+        return frozenset(run.place for run in runs if self.of_force or held(self.data, run))
 
     def counting(self, run: Run) -> Mask:
         """Return which of the compared samples are scored."""
@@ -127,7 +117,7 @@ class Problem:
             return run.driven
         key = (run.place, *shape)
         if key not in self._fronts:
-            if len(self._fronts) > 4 * len(self.runs):
+            if len(self._fronts) > 4 * len(self.data.runs):
                 self._fronts.clear()
             driven = run.driven
             for block in front(structure, values, Channel("pressure", "bar")):
@@ -153,31 +143,31 @@ class Problem:
 
     # -- following -------------------------------------------------------------------------------
 
-    def followed(
+    def simulated(
         self,
         structure: Structure,
         z: Array,
+        held: Collection[int],
         *,
-        held: Callable[[Run], bool],
         sloped: bool = True,
         air: Sequence[int] = (),
     ) -> Iterator[tuple[Run, Array, Array]]:
-        """Yield every run, its coordinates, or residual forces where it is ``held``, and derivatives.
+        """Yield every run, its coordinates, or lacking forces if it is ``held``, and derivatives.
 
-        Slopes are by linear coefficients and shape as `balance_slopes` has it, the last by the terms of
-        the ``air``.
+        These are by linear coefficients and shape as `balance_slopes` has it, the last by the terms of
+        the ``air``. Runs are held by their places.
         """
         values = structure.expanded(z)
         coefficients = cache(structure.block(values).coefficients)
-        for run in self.runs:
+        for run in self.data.runs:
             c = coefficients(run.sample_time).copy()
             for j, load in enumerate(z[self.loads_at(structure, run)].tolist()):
                 c[coordinate_at(c, j)] += load
             driven = self.acting(run, structure, values)
             by_air = self._by_air(structure, z, run, air) if air else None
-            found, slopes = follow(
+            found, slopes = simulate(
                 c, driven, run.outputs, run.scheduled, by_air,
-                held=held(run), every=self.every, sloped=sloped,
+                held=run.place in held, every=self.every, sloped=sloped,
             )  # fmt: skip
             yield run, found, slopes
 
@@ -192,11 +182,11 @@ class Problem:
         """
         errors, slopes, bench = list[Array](), [np.zeros((0, z.size))], structure.bench
         sloped = wanted is not None
-        first, last = structure.free("filling").start, len(structure.terms)
+        first, last = structure.positions("filling").start, len(structure.terms)
         air = [place for place in range(first, last) if wanted is not None and wanted[place]]
         shape = [*range(structure.mix.shape[1], first), *air]
-        for run, found, by in self.followed(structure, z, held=self.still, sloped=sloped, air=air):
-            still, counts = self.still(run), self.counting(run)[:, np.newaxis]
+        for run, found, by in self.simulated(structure, z, self.still, sloped=sloped, air=air):
+            still, counts = run.place in self.still, self.counting(run)[:, np.newaxis]
             scale = counts / (bench.highest * bench.unit if still else bench.travel)
             target = 0.0 if still else run.outputs[self.places(run)]
             errors.append(((found - target) * scale).ravel())
@@ -220,7 +210,7 @@ class Problem:
     def _by_air(self, structure: Structure, z: Array, run: Run, places: Sequence[int]) -> Array:
         """Return derivatives of acting pressures by front parameters, shape (t, muscles, places)."""
         n, last = structure.mix.shape[1], len(structure.terms)
-        _, high, scales = structure.nonlinear_bounds()
+        _, high, scales = structure.nonlinear_ranges
         steps = np.zeros(z.size)
         steps[n:last] = np.where(z[n:last] + STEP * scales <= high, STEP, -STEP) * scales
         return differences(
@@ -229,19 +219,22 @@ class Problem:
 
     @property
     def all_at_rest(self) -> bool:
-        """Whether all runs with motion begin at rest."""
-        return all(self.still(run) or at_rest(self.data, run) for run in self.runs)
+        """Whether all runs with motion begin near the lowest pressures, and without earlier memory."""
+        low, most = self.data.lowest, RESTING * (self.data.highest - self.data.lowest)
+        begun = (run.driven[0] for run in self.data.runs if run.place not in self.still)
+        return all(bool((p - np.minimum(low, 0.0) <= most).all()) for p in begun)
 
-    def most_resisted(self, structure: Structure, z: Array) -> float:
-        """Return the largest resistance of any muscle at measured positions."""
-        values, most = structure.expanded(z), 0.0
+    def resisted(self, structure: Structure, z: Array) -> tuple[float, float]:
+        """Return the least and largest resistance of any muscle at measured positions."""
+        values, found = structure.expanded(z), list[Array]()
         springs, shares = values[structure.springs], values[structure.at["loads"]]
-        for run in self.runs:
+        for run in self.data.runs:
             x, loads = np.split(run.scheduled, [len(structure.bench.scheduled)], axis=1)
             around = np.column_stack([np.ones(len(x)), run.outputs])
             pulled = np.einsum("tji,ti->tj", springs_at(springs, x.T, structure.degree), around)
-            most = max(most, -float((pulled + loads @ shares.T).min()))
-        return most
+            found.append(-(pulled + loads @ shares.T))
+        whole = np.concatenate(found)
+        return float(whole.min()), float(whole.max())
 
     # -- the linear stage ------------------------------------------------------------------------
 
@@ -299,7 +292,9 @@ class Problem:
         """Return derivatives of forces by linear terms and recordings' loads, and their target."""
         rows, targets = [], []
         linear = np.append(chosen, np.arange(len(structure.terms), self.size(structure)))
-        for run, lacking, slopes in self.followed(structure, start, held=lambda _: True):
+        for run, lacking, slopes in self.simulated(
+            structure, start, [run.place for run in self.data.runs]
+        ):
             counts = self.counting(run)[:, np.newaxis]
             targets.append(-lacking * counts)
             found = self._by_unknowns(structure, run, slopes * counts[..., np.newaxis])[:, linear]
@@ -309,7 +304,7 @@ class Problem:
     def stiffness(self, structure: Structure, z: Array) -> Array:
         """Return the stiffness of every coordinate with stops mostly sliding, shape (k, m)."""
         values, found = structure.expanded(z), []
-        for run in self.runs:
+        for run in self.data.runs:
             places = self.places(run)
             q, p = run.outputs[places], self.acting(run, structure, values)[places]
             x = run.scheduled[places, : len(structure.bench.scheduled)].T
@@ -358,8 +353,9 @@ def solve_stiff(
         sides, bounds = np.vstack([sides, more[0]]), np.append(bounds, more[1])
 
 
-def compared(data: TrainingData, most: int, *, of_force: bool = False) -> Problem:
-    """Return the problem with about so many compared numbers."""
+def problem_of(data: TrainingData, samples: int, most: int, *, of_force: bool) -> Problem:
+    """Return the problem of about so many samples at most, and so many compared numbers."""
+    data = coarser(data, samples)
     total = sum(len(run.outputs) for run in data.runs) * len(data.outputs)
     return Problem(data, max(1, total // most), of_force=of_force)
 

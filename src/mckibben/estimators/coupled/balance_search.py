@@ -8,14 +8,13 @@ nothing depends on the last bit of the data.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask
-from mckibben.blocks.coupled.balance_terms import Indices
 from mckibben.estimators.coupled.balance_prior import PriorErrors
 from mckibben.estimators.coupled.balance_problem import Problem, solve_stiff
 from mckibben.estimators.coupled.balance_structure import Structure
@@ -27,16 +26,16 @@ from mckibben.numerics.tracker import Tracker
 UNKNOWN = 1e-10
 """Effect of a parameter, relative to the largest, that counts as none."""
 
-FAR = 0.5
+LONGEST_STEP = 0.5
 """Largest change of a nonlinear parameter per step, relative to its scale."""
 
 FIRST_NOISE, LEAST_NOISE = 0.01, 1e-5
 """Standard deviation of independent errors at first, and the smallest, relative to ranges."""
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class Search:
-    """Unknowns z: of a structure's terms, and loads of recordings.
+    """A point of a search for the unknowns: of a structure's terms, and loads of recordings.
 
     Parameters
     ----------
@@ -44,6 +43,8 @@ class Search:
     structure : Structure
     active : array of bool
         Which terms are free; others are what they begin with.
+    z : array
+        The unknowns at this point.
     prior : PriorErrors, optional
         Of a data sheet.
     noise : float
@@ -54,96 +55,120 @@ class Search:
     problem: Problem
     structure: Structure
     active: Mask
+    z: Array
     prior: PriorErrors | None = None
     noise: float = FIRST_NOISE
+
+    @cached_property
+    def values(self) -> Array:
+        """All parameters of the balance."""
+        return self.structure.expanded(self.z)
+
+    @cached_property
+    def none(self) -> Array:
+        """The unknowns of a balance in which no term has an effect."""
+        return np.append(self.structure.none, np.zeros(self.z.size - self.active.size))
+
+    @cached_property
+    def free(self) -> NDArray[np.intp]:
+        """Indices of the free unknowns."""
+        rest = np.ones(self.z.size - self.active.size, dtype=bool)
+        return np.flatnonzero(np.append(self.active, rest))
+
+    # -- errors ----------------------------------------------------------------------------------
 
     def errors(self, z: Array, wanted: Mask | None = None) -> tuple[Array, Array]:
         """Return all residuals, and the requested derivatives; last those of what is likely."""
         parts, slopes = self.problem.errors(self.structure, z, wanted)
-        n = len(self.structure.terms)
-        doubts = self.noise * self.structure.doubts(known=self.prior is not None)
-        doubts = np.append(doubts, np.zeros(z.size - n))  # loads of recordings are any
-        far, by = [doubts * (z - self.none(z))], [np.diag(doubts)]
-        if self.prior is not None:
-            of_sheet = self.prior.errors(self.structure, z, wanted)
-            far.append(self.noise * of_sheet[0])
-            by.append(self.noise * np.pad(of_sheet[1], ((0, 0), (0, z.size - n))))
+        far, by = self._prior_errors(z, wanted)
         errors = np.concatenate([*parts, *far])
         if wanted is None:
             return errors, np.zeros((0, z.size))
         return errors, np.concatenate([slopes, *by])
 
-    def none(self, z: Array) -> Array:
-        """Return the unknowns of a balance in which no term has an effect."""
-        return np.append(self.structure.none, np.zeros(z.size - self.active.size))
+    def _prior_errors(
+        self, z: Array, wanted: Mask | None = None
+    ) -> tuple[list[Array], list[Array]]:
+        """Return how far unknowns are from what is likely, and the derivatives."""
+        far, by = [self._doubts * (z - self.none)], [np.diag(self._doubts)]
+        if self.prior is not None:
+            of_sheet = self.prior.errors(self.structure, z, wanted)
+            rest = z.size - self.active.size
+            far.append(self.noise * of_sheet[0])
+            by.append(self.noise * np.pad(of_sheet[1], ((0, 0), (0, rest))))
+        return far, by
 
-    def without(self, z: Array) -> Array:
-        """Return the unknowns with all terms that are not free at none."""
-        free = np.append(self.active, np.ones(z.size - self.active.size, dtype=bool))
-        return np.where(free, z, self.none(z))
+    @cached_property
+    def _doubts(self) -> Array:
+        """How much less likely unknowns are, the further from none; loads of recordings are any."""
+        of_terms = self.noise * self.structure.doubts(known=self.prior is not None)
+        return np.append(of_terms, np.zeros(self.z.size - of_terms.size))
 
-    def weighed(self, z: Array) -> Search:
+    @cached_property
+    def _of_runs(self) -> list[Array]:
+        """Errors of every run."""
+        return self.problem.errors(self.structure, self.z)[0]
+
+    @cached_property
+    def cost(self) -> float:
+        """Root mean square error."""
+        return rms(np.concatenate([*self._of_runs, *self._prior_errors(self.z)[0]]))
+
+    @cached_property
+    def independent(self) -> float:
+        """Number of independent errors of the runs."""
+        count = sum(part.size for part in self._of_runs)
+        return autoregression(self._of_runs).effective_sample_size(count)
+
+    def weighed(self) -> Search:
         """Return the search with the noise of independent errors that the runs show."""
-        variance, count, independent = self.independent(z)
-        noise = float(np.sqrt(variance * count / independent))
+        squares = np.concatenate(self._of_runs) ** 2
+        noise = float(np.sqrt(squares.mean() * squares.size / self.independent))
         return replace(self, noise=max(noise, LEAST_NOISE))
-
-    def independent(self, z: Array) -> tuple[float, int, float]:
-        """Return the variance of the runs' errors, their number, and that of independent ones."""
-        parts = self.problem.errors(self.structure, z)[0]
-        model, count = autoregression(parts), sum(part.size for part in parts)
-        return model.variance, count, model.effective_sample_size(count)
-
-    def cost(self, z: Array) -> float:
-        """Return the root mean square error."""
-        return rms(self.errors(z)[0])
-
-    @property
-    def free(self) -> NDArray[np.intp]:
-        """Indices of the free unknowns."""
-        rest = self.problem.size(self.structure) - self.active.size
-        return np.flatnonzero(np.append(self.active, np.ones(rest, dtype=bool)))
 
     # -- descent ---------------------------------------------------------------------------------
 
-    def narrowed(self, z: Array) -> tuple[Search, Array]:
-        """Return the search restricted to free terms, and the unknowns."""
+    def without(self, terms: Mask) -> Search:
+        """Return the search without terms: they are none, and not free."""
+        gone = np.append(terms, np.zeros(self.z.size - terms.size, dtype=bool))
+        return replace(self, active=self.active & ~terms, z=np.where(gone, self.none, self.z))
+
+    def narrowed(self) -> Search:
+        """Return the search restricted to free terms."""
         structure, n = self.structure, len(self.structure.terms)
         free = set(compress(structure.keys, self.active))
         needed = structure.reduced(list(compress(structure.terms, self.active)))
         active = np.array([key in free for key in needed.keys])
-        moved = np.append(structure.transferred(needed, z[:n]), z[n:])
-        return replace(self, structure=needed, active=active), moved
+        z = np.append(structure.transferred(needed, self.z[:n]), self.z[n:])
+        return replace(self, structure=needed, active=active, z=z)
 
-    def descended(self, z: Array, steps: int, tracker: Tracker) -> Array:
-        """Return the unknowns after a descent in the free terms."""
-        few, narrow = self.narrowed(z)
-        found, n = few.descend(narrow, steps, tracker), len(few.structure.terms)
-        return np.append(few.structure.transferred(self.structure, found[:n], z), found[n:])
-
-    def descend(self, z: Array, steps: int, tracker: Tracker) -> Array:
-        """Descend, report improvements to a tracker, and return the best unknowns."""
+    def descend(self, steps: int, tracker: Tracker | None = None) -> Search:
+        """Return the search after a descent in the free terms alone."""
+        few = self.narrowed()
 
         def errors(z: Array, sloped: bool) -> tuple[Array, Array]:
-            found, slopes = self.errors(z, self.active if sloped else None)
-            return found, slopes[:, self.free]
+            found, slopes = few.errors(z, few.active if sloped else None)
+            return found, slopes[:, few.free]
 
-        return levenberg_marquardt(errors, self.solved, z, steps, tracker.update)
+        improved = (tracker or Tracker()).update
+        z, n = levenberg_marquardt(errors, few.solved, few.z, steps, improved), few.active.size
+        terms = few.structure.transferred(self.structure, z[:n], self.z)
+        return replace(self, z=np.append(terms, z[n:]))
 
-    def triangle(self, z: Array) -> Array:
-        """Return the triangle of the derivatives by what is free, and of the errors."""
-        found, slopes = self.errors(z, self.active)
-        return triangle_of(slopes[:, self.free], found)
+    def linearised(self) -> tuple[Array, int]:
+        """Return the triangle of derivatives by what is free and of errors, and the number of these."""
+        errors, slopes = self.errors(self.z, self.active)
+        return triangle_of(slopes[:, self.free], errors), errors.size
 
-    def ahead(self, z: Array, options: list[Mask]) -> list[float]:
+    def ahead(self, options: list[Mask]) -> list[float]:
         """Return the cost that a linear model expects of every choice of terms."""
         every = replace(self, active=np.any(options, axis=0))
-        triangle, count, expected = every.triangle(z), self.errors(z)[0].size, []
+        (triangle, count), expected = every.linearised(), []
         for active in options:
             one = replace(self, active=active)
             places = np.searchsorted(every.free, one.free)
-            moved = one.solved(triangle[:, np.append(places, -1)], z, FIRST_DAMPING)
-            left = triangle[:, -1] + triangle[:, places] @ (moved - z)[one.free]
+            moved = one.solved(triangle[:, np.append(places, -1)], self.z, FIRST_DAMPING)
+            left = triangle[:, -1] + triangle[:, places] @ (moved - self.z)[one.free]
             expected.append(float(np.sqrt(left @ left / count)))
         return expected
 
@@ -157,7 +182,8 @@ class Search:
         structure, free = self.structure, self.free
         n = structure.mix.shape[1]
         size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
-        known = self._known(free, size)
+        scales = np.append(structure.scales(), np.ones(z.size - self.active.size))[free]
+        known = size * scales > UNKNOWN * (size * scales).max()
         free, reduced = free[known], triangle[:, np.append(known, True)]
         target = reduced[:, :-1] @ z[free] - reduced[:, -1]
         tried, others = z.copy(), np.setdiff1d(np.arange(z.size), free)
@@ -177,19 +203,14 @@ class Search:
         solve_stiff(structure, solve, of_free(*self._conditions(z)), asked, put)
         return tried
 
-    def _known(self, free: Indices, size: Array) -> Mask:
-        """Return which unknowns have an effect, by the sizes of slopes, that is not rounding."""
-        scales = np.append(self.structure.scales(), np.ones(self.free[-1] + 1))[free]
-        return np.asarray(size * scales > UNKNOWN * (size * scales).max())
-
     def _conditions(self, z: Array) -> tuple[Array, Array]:
         """Return linear constraints of all unknowns: sides @ z >= least."""
         structure = self.structure
         n, n_terms = structure.mix.shape[1], len(structure.terms)
         physics = structure.constraints(structure.expanded(z))
         on_all, least = self._of_all(*physics, z.size)
-        low, high, much = structure.nonlinear_bounds()
-        shape, far = z[n:n_terms], FAR * much
+        low, high, much = structure.nonlinear_ranges
+        shape, far = z[n:n_terms], LONGEST_STEP * much
         bounds = np.append(np.maximum(low, shape - far), -np.minimum(high, shape + far))
         one = np.eye(z.size)[n:n_terms]
         return np.concatenate([on_all, one, -one]), np.concatenate([least, bounds])

@@ -37,16 +37,17 @@ from mckibben.blocks.coupled.balance_terms import (
     layout,
 )
 from mckibben.blocks.fields import Channel, rows, vector
+from mckibben.blocks.memoryless import Affine
 
 Item = TypeVar("Item")
 
-LEAST_AREA = 1e-9
+POSITIVE_AREA = 1e-9
 """Smallest area at rest, relative to a muscle's typical area."""
 
 LEAST_STIFF = 1e-3
 """Smallest stiffness, relative to the force at the highest pressure over the stroke."""
 
-ALIKE = 0.1
+DIFFERENCE = 0.1
 """How far muscles differ, relative to the scales of terms."""
 
 MOST_STRETCH = {False: 0.1, True: 1.0}
@@ -64,6 +65,8 @@ class Bench:
     ----------
     driven, scheduled, loaded, given : tuple of Channel
         Coordinates, scheduling inputs, loads, and pressures.
+    sensors : tuple of Affine
+        From coordinates to what is measured.
     directions : array, shape (n, m)
         Shortening of every muscle per unit of every coordinate.
     hull : array, shape (n, 2)
@@ -87,6 +90,8 @@ class Bench:
         of the area.
     curved : bool
         Whether every scheduling input has three levels or more.
+    some_held : bool
+        Whether muscles are held in some recording.
     unmeasured : tuple of int
         Recordings whose unmeasured constant loads are estimated.
     """
@@ -95,6 +100,7 @@ class Bench:
     scheduled: tuple[Channel, ...]
     loaded: tuple[Channel, ...]
     given: tuple[Channel, ...]
+    sensors: tuple[Affine, ...]
     directions: Array
     hull: Array
     lowest: Array
@@ -108,6 +114,7 @@ class Bench:
     step: float
     of_force: bool = False
     curved: bool = True
+    some_held: bool = False
     unmeasured: tuple[int, ...] = ()
 
     @cached_property
@@ -221,9 +228,9 @@ class Structure:
         found = {name: index - first for name, index in places.at.items()}
         end = places.size - first
         for name in NONLINEAR:
-            # all muscles have one stretch of the wall
-            count = 1 if name == "walls" else self.sizes.of(TABLE[name].of)
-            found[name] = end + np.arange(count * self.sizes.number(TABLE[name].width))
+            kind = TABLE[name]
+            count = 1 if kind.alike else self.sizes.of(kind.of)
+            found[name] = end + np.arange(count * self.sizes.number(kind.width))
             end += found[name].size
         return found
 
@@ -305,7 +312,7 @@ class Structure:
             values[self.at["areas"][:, 0]] = 1.0
         return values
 
-    def free(self, name: str) -> slice:
+    def positions(self, name: str) -> slice:
         """Return the positions of a kind of nonlinear parameter among the free ones."""
         shift = self.mix.shape[1] - self.n_linear
         size = self.at[name].size
@@ -330,16 +337,16 @@ class Structure:
         low = self.bench.lowest[:, np.newaxis]
         positions = low + np.outer(self.bench.travel, [position for _, position in self.obstacles])
         free = np.zeros(len(self.terms))
-        free[self.free("friction_growth")] = friction_growth
-        free[self.free("walls")] = stretch * self.bench.most_stretch
-        free[self.free("lags")] = np.log(self.lags)
-        free[self.free("pushes")] = NEVER
-        free[self.free("places")] = positions.ravel()
+        free[self.positions("friction_growth")] = friction_growth
+        free[self.positions("walls")] = stretch * self.bench.most_stretch
+        free[self.positions("lags")] = np.log(self.lags)
+        free[self.positions("pushes")] = NEVER
+        free[self.positions("places")] = positions.ravel()
         return free
 
     def transferred(self, other: Structure, free: Array, default: Array | None = None) -> Array:
         """Return free parameters as those of another structure, ``default`` for its further ones."""
-        result = other.initial(0.0) if default is None else default[: len(other.terms)].copy()
+        result = other.none.copy() if default is None else default[: len(other.terms)].copy()
         by_key: dict[tuple[object, ...], list[float]] = {}
         for key, value in zip(self.keys, free.tolist(), strict=True):
             by_key.setdefault(key, []).append(value)
@@ -349,7 +356,7 @@ class Structure:
         return result
 
     @cached_property
-    def keys(self) -> list[tuple[object, ...]]:
+    def keys(self) -> list[tuple[str, object, int | None]]:
         """Keys of the terms across structures: limits, lags and obstacles by their initial values."""
         by: dict[str, Sequence[object]] = {"friction": self.limits, "relaxation": self.lags}
         powers = [
@@ -365,13 +372,16 @@ class Structure:
     @cached_property
     def _ranges(self) -> Array:
         """Lower and upper bounds of all values, and their scales, shape (3, values)."""
-        bench, force = self.bench, self.bench.natural("N")
+        bench = self.bench
         powers = 1.0 / powers_of(bench.largest, self.degree)
+        springs = [bench.natural(unit) for unit in TABLE["springs"].units(self.sizes)]
         own: dict[str, Any] = {
-            "loads": force / bench.heaviest,
-            "springs": np.outer(powers, [force, *self.m * [bench.natural("N/mm")]]).ravel(),
+            "loads": bench.natural("N") / bench.heaviest,
+            "springs": powers.repeat(1 + self.m) * springs,
             "friction_slopes": 1.0 / bench.largest,
             "places": bench.travel.repeat(len(self.obstacles)),
+            # of the force at which a stop breaks away
+            "friction": bench.natural("N") / np.array(self.limits),
         }
         found = np.zeros((3, self.size))
         found[0] = -np.inf
@@ -386,10 +396,10 @@ class Structure:
         found[2, self.at["filling"]] = max(4.0 * bench.step, 1e-9)
         return found
 
-    def nonlinear_bounds(self) -> tuple[Array, Array, Array]:
-        """Return lower and upper bounds of the nonlinear parameters, and their scales."""
-        lower, upper, scales = self._ranges[:, self.n_linear :]
-        return lower, upper, scales
+    @property
+    def nonlinear_ranges(self) -> Array:
+        """Lower and upper bounds of the nonlinear parameters, and their scales, shape (3, k)."""
+        return self._ranges[:, self.n_linear :]
 
     def scales(self) -> Array:
         """Return the scales of all free parameters, relative to an area at rest of 1."""
@@ -412,7 +422,7 @@ class Structure:
             kind = TABLE[term.kind]
             always = term.which == 0 and kind.name in ("springs", "areas")
             if term.muscle is not None:
-                doubts[place] /= ALIKE
+                doubts[place] /= DIFFERENCE
             elif always or (known and kind.prior) or not kind.doubtful:
                 doubts[place] = 0.0
         return doubts
@@ -432,7 +442,7 @@ class Structure:
                 given[name] = np.maximum(given[name], 0.0)
         if bench.step and not final:  # so that what lines add is known where there are none
             given["lines"] = np.maximum(given["lines"], 1e-12 * bench.natural("N s/mm"))
-        given["areas"][:, 0] = np.maximum(given["areas"][:, 0], LEAST_AREA * bench.unit)
+        given["areas"][:, 0] = np.maximum(given["areas"][:, 0], POSITIVE_AREA * bench.unit)
         shape = {name: self.nonlinear_values(values, name) for name in NONLINEAR}
         taut, ratio = bool((shape["pushes"] >= NEVER).all()), float(shape["asymmetry"][0])
         merged = final and taut and not bench.directed

@@ -111,10 +111,6 @@ class CoupledEstimator(Estimator):
         inputs, outputs = channels.inputs, channels.outputs
         return {"input": inputs, "output": outputs, "scheduling": taken(channels)}
 
-    def completed(self, recordings: list[Recording], scheduling: Sequence[str]) -> list[Recording]:
-        """Return recordings with what they may lack."""
-        return recordings
-
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
@@ -125,7 +121,6 @@ class CoupledEstimator(Estimator):
         first = every[0]
         channels = self.resolved(every, self.input, self.output, self.scheduling)
         inputs, outputs, scheduling = channels.inputs, channels.outputs, taken(channels)
-        every = self.completed(every, scheduling)
         longest = max(map(len, every))
         if longest < FEWEST_IN_A_ROW:  # shorter ones beside a longer one are passed over below
             raise DataError(

@@ -1,0 +1,170 @@
+"""Standard errors of a force balance: how far its parameters may be from those of the muscle.
+
+A parameter is off for three reasons, and the mean squares add up:
+
+- Errors of the fit. They are alike wherever the muscle does the same, and not only from one sample to
+  the next. So nothing is assumed of them within a few long blocks: each is left out in turn, by a step
+  from the fit, and the spread is wider as Student's t is of so few.
+- What was likely before. The fit draws every parameter to none by its natural scale; what that makes of
+  a parameter of natural size is its bias. A parameter that data do not determine is as unsure as its
+  scale. Those at a bound are no better known than others.
+- Noise of the inputs. Stops take the peaks of a noisy pressure for motion. Noise of the same size, added
+  once more, shows how far that moves a fit.
+
+Sources: MacKinnon, Nielsen and Webb, "Cluster-robust inference: A guide to empirical practice", Journal
+of Econometrics 232, 2023 (the jackknife CV3); Ibragimov and Müller, "t-statistic based correlation and
+heterogeneity robust inference", Journal of Business & Economic Statistics 28, 2010 (few long blocks);
+Nychka, "Bayesian confidence intervals for smoothing splines", Journal of the American Statistical
+Association 83, 1988 (mean square with bias); Cook and Stefanski, "Simulation-extrapolation estimation in
+parametric measurement error models", Journal of the American Statistical Association 89, 1994 (noise
+added once more).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mckibben.arrays import Array, Mask
+from mckibben.blocks.base import Block
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance_terms import STIFFNESS, TABLE
+from mckibben.blocks.derivatives import relative_sizes
+from mckibben.blocks.free_runs import FreeRuns
+from mckibben.estimators.core.uncertainty import unknown
+from mckibben.numerics.blocks import blocks_of
+from mckibben.numerics.statistics import NORMAL_95, autoregression, student
+
+BLOCKS = 8
+"""Number of blocks of all recordings together, if each has one (Ibragimov and Müller)."""
+
+ROUNDING = 1e-12
+"""Smallest eigenvalue of what data and scales determine, relative to the largest, that is used."""
+
+LOST = 1e-6
+"""Share of a parameter, squared, in combinations that nothing determines, above which it is unknown."""
+
+MEDIAN = 0.6745
+"""Median of the absolute values of a standard normal distribution."""
+
+
+def covariance_of_balance(runs: FreeRuns, fixed: Sequence[int]) -> tuple[float, Array]:
+    """Return the condition of the free parameters of a balance, and the mean squares of all.
+
+    Shape (parameters, parameters); NaN for those that are ``fixed``. They are such that 1.96 standard
+    errors either way are an interval of 95 %.
+    """
+    block, covariance = runs.block, unknown(runs.block)
+    free = np.setdiff1d(np.arange(block.n_parameters), fixed)
+    if not free.size or not np.isfinite(runs.residual).all():
+        return np.inf, covariance
+    m, values = len(runs.names), block.pack()
+    sizes = relative_sizes(values)[free]
+    errors = runs.residual.reshape(-1, m)
+    weight = 1.0 / np.maximum(np.sqrt(np.mean(errors**2, axis=0)), np.finfo(float).tiny)
+    errors = errors * weight
+    slopes = runs.slopes(free.tolist()).reshape(-1, m, free.size) * weight[:, np.newaxis]
+    usable = np.isfinite(slopes).all(axis=(0, 1))
+    free, sizes, slopes = free[usable], sizes[usable], slopes[..., usable]
+    ends = np.cumsum([int(rows.sum()) for rows in runs.rows])[:-1]
+    pieces = np.split(np.arange(len(errors)), ends)
+    # as much as errors that are independent count, as in the fit
+    model = [autoregression([errors[piece, j] for piece in pieces]) for j in range(m)]
+    fewer = np.mean([len(errors) / one.effective_sample_size(len(errors)) for one in model])
+    likely = fewer * (sizes / natural_scales(block)[free]) ** 2
+    flat = slopes.reshape(-1, free.size)
+    products = flat.T @ flat + np.diag(likely)
+    condition, inverse, lost = _inverted(products)
+    blocks = [block for piece in blocks_of(pieces, BLOCKS) for block in piece if block.size]
+    moved = []
+    for one in blocks:  # what a fit without a block is off by
+        own = slopes[one].reshape(-1, free.size)
+        moved.append(_inverted(products - own.T @ own)[1] @ (errors[one].ravel() @ own))
+    few = max(len(blocks) - 1, 1)
+    wider = (student(few) / NORMAL_95) ** 2 * few / len(blocks)
+    spread = wider * np.transpose(moved) @ np.array(moved)
+    shifted = np.einsum("tj,tjk->k", _shift(runs) * weight, slopes)
+    bias = np.outer(shifted, shifted) + fewer * np.diag(likely)
+    found = spread + inverse @ bias @ inverse
+    found[lost] = found[:, lost] = np.nan
+    covariance[np.ix_(free, free)] = found * np.outer(sizes, sizes)
+    return condition if usable.all() else np.inf, covariance
+
+
+def _inverted(products: Array) -> tuple[float, Array, Mask]:
+    """Return condition of slopes, the inverse of their products (k, k), and what nothing determines."""
+    size = np.sqrt(np.diag(products))
+    size[size == 0.0] = 1.0
+    values, ways = np.linalg.eigh(products / np.outer(size, size))
+    kept = values > ROUNDING * values[-1]
+    inverse = (ways[:, kept] / values[kept]) @ ways[:, kept].T / np.outer(size, size)
+    lowest = float(np.linalg.eigvalsh(products)[0])
+    highest = float(np.linalg.eigvalsh(products)[-1])
+    lost = (ways[:, ~kept] ** 2).sum(axis=1) > LOST
+    return float(np.sqrt(highest / lowest)) if lowest > 0.0 else np.inf, inverse, lost
+
+
+def _shift(runs: FreeRuns) -> Array:
+    """Return by how much outputs move on average, shape (n, m), if noise is added to the inputs."""
+    rng, moved = np.random.default_rng(0), []
+    noises = [noise_of(run.inputs) * rng.standard_normal(run.inputs.shape) for run in runs.runs]
+    for way in (1.0, -1.0):  # so that what is linear in noise is none
+        noisy = [
+            replace(
+                run,
+                driven=run.driven + way * noise[:, : run.driven.shape[1]],
+                scheduled=run.scheduled + way * noise[:, run.driven.shape[1] :],
+            )
+            for run, noise in zip(runs.runs, noises, strict=True)
+        ]
+        moved.append(replace(runs, runs=noisy).residual - runs.residual)
+    return np.nan_to_num(np.mean(moved, axis=0)).reshape(-1, len(runs.names))
+
+
+def noise_of(series: Array) -> Array:
+    """Return the standard deviation of white noise of columns (n, k), by their second differences.
+
+    Source: Gasser, Sroka and Jennen-Steinmetz, "Residual variance and residual pattern in nonlinear
+    regression", Biometrika 73, 1986; of the median, so that jumps do not count.
+    """
+    if len(series) < 3:
+        return np.zeros(series.shape[1])
+    second = series[1:-1] - 0.5 * (series[:-2] + series[2:])
+    return np.asarray(np.sqrt(2.0 / 3.0) * np.median(np.abs(second), axis=0) / MEDIAN)
+
+
+def natural_scales(block: Block) -> Array:
+    """Return the natural scale of every parameter of a model; infinite where any value is as likely."""
+    return np.array([_scale(*number) for number in block.numbers()])
+
+
+def _scale(part: object, field: str, index: tuple[int, ...]) -> float:
+    """Return the natural scale of a parameter of a part of a model."""
+    if not isinstance(part, Balance) or field not in TABLE or not TABLE[field].doubtful:
+        return np.inf
+    kind, which = TABLE[field], index[-1] if index else 0
+    area = abs(part.areas[0][0])
+    force = part.highest_pressure * area
+    stiffness = force / part.scale
+    largest = [max(map(abs, ends)) or 1.0 for ends in part.known]
+    if field == "springs":
+        power, to = divmod(which, 1 + len(part.driven))
+        if not power:
+            return np.inf
+        scheduled, degree = divmod(power - 1, part.degree)
+        by = largest[scheduled] ** (1 + degree) if largest else 1.0
+        return (stiffness if to else force) / by
+    if field == "obstacles":
+        number = which % part.sizes.obstacle
+        return np.inf if number < STIFFNESS else stiffness
+    if field == "areas" and not which:
+        return np.inf
+    if field == "friction":
+        return force / part.limits[which]
+    if kind.log:
+        value = getattr(part, field)
+        return abs(value[which] if index else value) * kind.scale
+    sizes = {"N": force, "N/bar": area, "mm/bar": part.scale / part.highest_pressure, "": 1.0}
+    return kind.scale * sizes.get(kind.unit, stiffness)

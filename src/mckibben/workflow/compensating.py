@@ -1,0 +1,444 @@
+"""Compensation: `invert` a model, `track` a reference, `learn` from repetitions, and `export` code."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Unpack
+
+from mckibben.errors import DataError, ModelError
+from mckibben.files.memory import Data
+from mckibben.keywords import (
+    AnyExportKeywords,
+    InvertKeywords,
+    LearnKeywords,
+    TrackKeywords,
+)
+from mckibben.options import (
+    Argument,
+    COptions,
+    ExportOptions,
+    FMUOptions,
+    InvertOptions,
+    LearnOptions,
+    MJCFOptions,
+    Option,
+    ReadOptions,
+    TrackOptions,
+    given_options,
+)
+from mckibben.reading import files_of, only, read_files
+from mckibben.recording import COMMAND, Recording, sample_time_of
+from mckibben.studying.results import Exported, Inverse, Tracking
+from mckibben.system.progress import Tell, telling
+from mckibben.system.showing import Result
+from mckibben.workflow.operation import (
+    COMPENSATOR,
+    FILES,
+    MODEL,
+    Progress,
+    claimed,
+    operation,
+    options_of,
+    paths,
+    saved,
+    unread,
+)
+
+if TYPE_CHECKING:
+    from mckibben.blocks.base import Block
+    from mckibben.control import Learned
+
+    Model = Block | Result | str | Path
+
+
+@operation(
+    {"model": MODEL},
+    InvertOptions,
+    out=Option("Inverse to write (JSON).", "FILE", "-o"),
+    must_write=True,
+)
+def invert(
+    model: Model,
+    options: InvertOptions | None = None,
+    *,
+    reading: ReadOptions | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    progress: Progress = None,
+    **keywords: Unpack[InvertKeywords],
+) -> Inverse:
+    """Return the inverse of a model, with the desired output as input.
+
+    The inverse of a force model computes the pressure from the desired force and the length. One that is
+    wanted for force estimates it from measured displacements and pressures. An adaptive one also has
+    the measured outputs as inputs, and adapts its parameters while it runs.
+
+    Parameters
+    ----------
+    model : Block, Fit, or file
+    options, reading, out, force, progress
+        See `mckibben.workflow`; options are those of `mckibben.options.InvertOptions`.
+    """
+    chosen, reading = options_of(InvertOptions, options, reading, keywords)
+    chosen.check()
+    file = claimed(out, paths(model, chosen.learned), force)
+    if not chosen.learned:
+        unread(reading, "an inverse is learned from recordings only with `learned`")
+        if chosen.seed:
+            problem = "nothing is random without `learned`"
+            raise ModelError(problem, parameter="seed", remedy="leave it out")
+    found = _inverse(saved(model, chosen.fields), chosen, reading, progress)
+    if file is not None:
+        found.model.save(file)
+    return replace(found, file=file)
+
+
+def _inverse(
+    block: Block, chosen: InvertOptions, reading: ReadOptions | None, progress: Progress
+) -> Inverse:
+    from mckibben.blocks.adaptive import adaptive
+    from mckibben.blocks.coupled.load_estimate import ForceCompensator, load_of
+    from mckibben.blocks.fields import drives
+    from mckibben.blocks.force.feedforward import ForceFeedforward
+    from mckibben.blocks.predictive import Predictive
+    from mckibben.estimators.coupled.sdchm import trained_inverse
+    from mckibben.studying.inverting import made
+
+    if chosen.learned:
+        runs = read_files(chosen.learned, None, reading)
+        with telling(progress, "learning the inverse") as tell:
+            learned, rmse = trained_inverse(block, runs, chosen.seed, tell)
+        return Inverse(learned, "learned", rmse=rmse)
+    if chosen.predictive:
+        return Inverse(Predictive(made(block), **chosen.of_predictive()), "predictive")
+    if chosen.wanted == "force":
+        if all(channel.name.startswith("force") for channel in block.outputs):
+            return Inverse(block, "itself")
+        return Inverse(load_of(block), "force")
+    if not chosen.adaptive:
+        if ForceFeedforward.of(block) or ForceCompensator.of(block):
+            return Inverse(made(block), "feedforward")
+        if not block.inverts and drives(block.outputs[0]) and not drives(block.inputs[0]):
+            return Inverse(block, "itself")
+    kind = "adaptive" if chosen.adaptive else "inverse"
+    time = 60.0 if chosen.time is None else chosen.time
+    tested = made(block)
+    inverse = adaptive(block, time, chosen.noise) if chosen.adaptive else tested
+    ends = [(float(low), float(high)) for low, high in zip(*block.reachable(), strict=True)]
+    known = all(math.isfinite(end) for pair in ends for end in pair)
+    names = [channel.name for channel in block.outputs]
+    return Inverse(inverse, kind, dict(zip(names, ends, strict=True)) if known else {})
+
+
+@operation(
+    {
+        "compensator": COMPENSATOR,
+        "reference": Option("Displacements, or force, to follow.", "FILE"),
+    },
+    TrackOptions,
+    out=Option("Recording of the run to write.", "FILE", "-o"),
+)
+def track(
+    compensator: Model,
+    reference: Data,
+    options: TrackOptions | None = None,
+    *,
+    reading: ReadOptions | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    progress: Progress = None,
+    **keywords: Unpack[TrackKeywords],
+) -> Tracking:
+    """Track a reference with a compensator or a controller on a virtual rig or on a model.
+
+    The result is compared with a static map: pressures read from one slow rise of the same plant.
+
+    Parameters
+    ----------
+    compensator : Block, Inverse, or file
+    reference : Recording, or file
+        Displacements, or force, to follow.
+    options, reading, out, force, progress
+        See `mckibben.workflow`; options are those of `mckibben.options.TrackOptions`.
+    """
+    from mckibben.blocks.base import Block
+    from mckibben.blocks.feedback import FeedforwardFeedback
+    from mckibben.blocks.fields import drives
+    from mckibben.control import (
+        BlockController,
+        before,
+        control_law,
+        learn,
+        preview_time,
+        tune_pid,
+    )
+    from mckibben.control import track as close
+    from mckibben.control.connecting import asked, flatters_feedback, kind_of, offered
+    from mckibben.control.controller import samples_ahead
+    from mckibben.files import write
+    from mckibben.studying.recorded_inputs import beyond_known
+
+    chosen, reading = options_of(TrackOptions, options, reading, keywords)
+    read = paths(compensator, reference, chosen.rig, chosen.plant)
+    file = claimed(out, read, force, recording=True)
+    controller_file = claimed(chosen.controller_out, [*read, *paths(out)], force)
+    block, plant = saved(compensator, chosen.fields), _plant(chosen, reading)
+    if not any(drives(channel) or channel.name.startswith(COMMAND) for channel in block.outputs):
+        gives = ", ".join(channel.name for channel in block.outputs)
+        raise ModelError(
+            f"its outputs are {gives}, but a compensator's are pressures or commands",
+            parameter="compensator",
+            remedy="give the result of `invert()`",
+        )
+    run = only(read_files(reference, None, reading))
+    wanted = asked(plant, run, block)
+    BlockController(block).connect(offered(plant, wanted))  # before anything is tuned
+    step = sample_time_of(wanted, "be a reference")
+    held = {name: float(wanted[name][0]) for name in plant.inputs if name in wanted}
+    # commands are no pressures to be compared with what is measured
+    commanded = any(channel.name.startswith(COMMAND) for channel in block.outputs)
+    copied = ("approach", "settle", "noise", "delay", "slew", "seed")
+    arguments: dict[str, Any] = {name: getattr(chosen, name) for name in copied}
+    arguments["pressure_loop"] = chosen.pressure_loop and not commanded
+    ahead = preview_time(block) if chosen.preview is None else chosen.preview
+    with telling(progress, f"{chosen.controller} on {plant.name}") as tell:
+        taught = None
+        tuned = cache(
+            lambda: tune_pid(plant, sample_time=step, scheduled=held, references=block.inputs)
+        )
+        if chosen.repetitions:
+            numbers = count(chosen.seed)  # noise differs between repetitions
+
+            def repeat(corrected: Block) -> Recording:
+                law = control_law(chosen.controller, corrected, tuned)
+                again = arguments | {"seed": next(numbers)}
+                return close(law, plant, wanted, preview=chosen.preview, **again).recording
+
+            taught = learn(
+                block,
+                repeat,
+                chosen.repetitions,
+                ahead=max(samples_ahead(ahead, step), 1) + block.samples_ahead,
+                settle=round(chosen.approach / step) + round(chosen.settle / step),
+            )
+        law = control_law(chosen.controller, taught.best if taught else block, tuned)
+        if controller_file is not None:
+            further = ahead + block.samples_ahead * step > step
+            if not isinstance(law, Block) or (isinstance(law, FeedforwardFeedback) and further):
+                raise ModelError(
+                    f"{chosen.controller!r} cannot be saved as one block",
+                    parameter="controller_out",
+                    remedy="leave it out; or use feedforward or pid, or both with `preview=0`",
+                )
+        halves = [_half(tell, start) for start in (0.0, 0.5)]
+        tracked = close(law, plant, wanted, preview=chosen.preview, progress=halves[0], **arguments)
+        without = before(block, plant, wanted, progress=halves[1], **arguments)
+    if file is not None:
+        write(without.beside(tracked.recording), file)
+    if controller_file is not None and isinstance(law, Block):
+        law.save(controller_file)
+    return Tracking(
+        tracked=tracked,
+        uncompensated=without,
+        plant=plant,
+        plant_kind=kind_of(plant, block),
+        flatters_feedback=flatters_feedback(plant, chosen.controller),
+        law=chosen.controller,
+        seed=chosen.seed,
+        controller=law,
+        reference=wanted,
+        notes=(*beyond_known(block, wanted), *without.notes),
+        file=file,
+        controller_file=controller_file,
+        learned=taught,
+    )
+
+
+@operation(
+    {"compensator": Argument("COMPENSATOR", "That of the first recording (JSON)."), "runs": FILES},
+    LearnOptions,
+    out=Option("Compensator to run next (JSON).", "FILE", "-o"),
+    must_write=True,
+)
+def learn(
+    compensator: Model,
+    runs: Data,
+    options: LearnOptions | None = None,
+    *,
+    reading: ReadOptions | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    **keywords: Unpack[LearnKeywords],
+) -> Learned:
+    """Learn from repetitions of one motion: correct the reference of a compensator by their errors.
+
+    Record the motion with the compensator, with columns of the reference (reference_displacement) and of
+    the measured output; learn; run what was written; and so on, each time with all recordings, in order.
+    `track` does this on a virtual rig or a model, with ``repetitions``.
+
+    Parameters
+    ----------
+    compensator : Block, Inverse, or file
+        That of the first recording; ``out`` is the one to run next.
+    runs : data
+        All repetitions, in order; see `mckibben.control.learned`.
+    options, reading, out, force
+        See `mckibben.workflow`; options are those of `mckibben.options.LearnOptions`.
+    """
+    from mckibben.control import learned
+
+    chosen, reading = options_of(LearnOptions, options, reading, keywords)
+    file = claimed(out, paths(compensator, *files_of(runs)), force)
+    recordings = read_files(runs, None, reading)
+    found = learned(saved(compensator), recordings, ahead=chosen.ahead, repeats=chosen.repeats)
+    if file is not None:
+        (found.best if chosen.best else found.next).save(file)
+    return found
+
+
+def _half(tell: Tell | None, start: float) -> Callable[[float], None] | None:
+    return None if tell is None else lambda share: tell(start + 0.5 * share, "")
+
+
+def _plant(chosen: TrackOptions, reading: ReadOptions | None) -> Any:
+    """Return the plant of a loop: a rig, or a model as a twin of the user's muscle."""
+    from mckibben.control import Twin
+    from mckibben.rigs import load_rig
+
+    rest_length = None if reading is None else reading.rest_length
+    if (chosen.rig is None) == (chosen.plant is None):
+        raise DataError(
+            "a loop is closed on one plant",
+            remedy="give `plant=model.json`, a model of your own muscle, or `rig=NAME`",
+        )
+    if chosen.rig is not None:
+        for name, value in (("limits", chosen.limits), ("rest_length", rest_length)):
+            if value:
+                raise DataError("a rig has its own", parameter=name, remedy="leave it out")
+        return load_rig(chosen.rig)
+    if isinstance(chosen.plant, Twin):
+        if chosen.limits:
+            raise DataError("a twin has its own", parameter="limits", remedy="leave it out")
+        return chosen.plant
+    if wrong := [name for name, ends in chosen.limits.items() if len(ends) != 2 or None in ends]:
+        remedy = f"write `limits[{wrong[0]}]=LOW:HIGH`; `slew` limits the rate"
+        raise DataError("limits of a plant are two numbers", channel=wrong[0], remedy=remedy)
+    name = next((path.stem for path in paths(chosen.plant)), "plant")
+    limits: Any = dict(chosen.limits)
+    return Twin(saved(chosen.plant), limits=limits, name=name, rest_length=rest_length)
+
+
+def export(
+    model: Model,
+    out: str | Path,
+    target: Literal["c", "fmu", "ros2", "mjcf"] = "c",
+    options: ExportOptions | MJCFOptions | None = None,
+    **keywords: Unpack[AnyExportKeywords],
+) -> Exported:
+    """Write a model as code: C99, an FMU, a ROS 2 package, or MJCF for MuJoCo.
+
+    Parameters
+    ----------
+    model : Block, or file
+    out : path
+        Folder, or for an FMU and MJCF the file, to write.
+    target : {"c", "fmu", "ros2", "mjcf"}
+        Of that target: `COptions`, `FMUOptions`, `MJCFOptions`, or for ROS 2 `ExportOptions`.
+    """
+    from mckibben.exporting import export_c, export_fmu, export_ros2
+    from mckibben.exporting.c.emulation import emulate
+    from mckibben.exporting.naming import name_from
+    from mckibben.exporting.programs import self_test
+    from mckibben.outputs import refuse_inputs
+    from mckibben.studying.inverting import made
+
+    kinds = {"c": COptions, "fmu": FMUOptions, "ros2": ExportOptions, "mjcf": MJCFOptions}
+    if target not in kinds:
+        problem = f"there is no target {target!r:.60}"
+        raise ModelError(problem, parameter="target", remedy="use c, fmu, ros2 or mjcf")
+    chosen: Any = given_options(kinds[target], options, keywords)
+    out = Path(out)
+    fitting = {".fmu": "fmu", ".xml": "mjcf", ".c": "c", ".h": "c"}.get(out.suffix.casefold())
+    if target in ("c", "ros2") and fitting is not None:
+        remedy = (
+            f"name a folder, or give `target={fitting}`" if fitting != target else "name a folder"
+        )
+        raise DataError("a folder is written", file=out, remedy=remedy)
+    refuse_inputs(out, paths(model))
+    if target == "mjcf":
+        return _export_mjcf(saved(model), out, chosen)
+    block = saved(model, chosen.fields)
+    block = made(block, chosen.sample_time) if chosen.inverse else block
+    name = chosen.name or next(map(name_from, paths(model)), "model")
+    common = {"sample_time": chosen.sample_time, "force": chosen.force}
+    tests: list[str | None] = [None, None]
+    if target == "c":
+        serving = _serving(chosen)
+        export_c(block, out, name=name, single=chosen.single, serving=serving, **common)
+        tests = [
+            self_test(out, name) if chosen.check else None,
+            str(emulate(block, sample_time=chosen.sample_time)) if chosen.emulate else None,
+        ]
+    elif target == "fmu":
+        export_fmu(block, out, name=name, library=chosen.library, **common)
+    else:
+        name = chosen.name or name.lower()
+        export_ros2(block, out, name=name, **common)
+    return Exported(out, name, tuple(_contents(out)), *tests)
+
+
+def _export_mjcf(model: Any, out: Path, chosen: MJCFOptions) -> Exported:
+    """Write a muscle as MJCF."""
+    from mckibben.exporting.mjcf import Sites, export_mjcf
+    from mckibben.exporting.naming import name_from
+
+    ends = chosen.site_from, chosen.site_to
+    if chosen.rest_length is None:
+        raise ModelError("it is needed", parameter="rest_length", remedy="give it, in mm")
+    if None not in ends and chosen.example != "hanging":
+        problem = "a muscle between sites of your own model has no example"
+        raise ModelError(problem, parameter="example", remedy="leave it out, or the sites")
+    if sum(end is None for end in ends) == 1:
+        remedy = "give both, or neither"
+        raise ModelError("one site is missing", parameter="site_from", remedy=remedy)
+    name = chosen.name or name_from(out)
+    export_mjcf(
+        model,
+        out,
+        rest_length=chosen.rest_length,
+        name=name,
+        sites=None if None in ends else Sites(*map(str, ends)),
+        example=chosen.example,
+        lag=chosen.lag,
+        force=chosen.force,
+    )
+    return Exported(out, name, (out.name,))
+
+
+def _contents(path: Path) -> list[str]:
+    """Return the files in a folder or a zip."""
+    if path.is_dir():
+        return sorted(p.relative_to(path).as_posix() for p in path.rglob("*") if p.is_file())
+    with zipfile.ZipFile(path) as archive:
+        return archive.namelist()
+
+
+def _serving(chosen: COptions) -> Any:
+    """Return the settings of the serial server of exported code, if it has one."""
+    from mckibben.exporting.c.serving import Serving
+
+    if not chosen.link:
+        for name in ("limits", "safe", "watchdog"):
+            if getattr(chosen, name):
+                raise ModelError(
+                    "it applies to code with a serial link", parameter=name, remedy="add `link`"
+                )
+        return None
+    watchdog = 0.5 if chosen.watchdog is None else chosen.watchdog
+    return Serving(chosen.limits, chosen.safe, watchdog)

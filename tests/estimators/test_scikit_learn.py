@@ -70,7 +70,10 @@ def check(estimator: Any, expected: dict[str, str]) -> list[dict[str, Any]]:
     return list(found)
 
 
-@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize(
+    "name",
+    [name if name == "gpi" else pytest.param(name, marks=pytest.mark.long) for name in REFUSED],
+)
 @pytest.mark.filterwarnings("ignore")
 def test_checks_of_scikit_learn_hold_on_its_inputs(
     name: str, monkeypatch: pytest.MonkeyPatch

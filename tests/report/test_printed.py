@@ -132,7 +132,7 @@ def distinct(legend: Any) -> bool:
     return bool(np.all(np.diff(grey) > 5)) and (few or len(looks) == len(series))
 
 
-@pytest.mark.parametrize("columns", [1, 2])
+@pytest.mark.parametrize("columns", [1, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.parametrize("case", CASES)
 def test_a_figure_fits_its_columns_and_is_legible(case: str, columns: Literal[1, 2]) -> None:
     with made(drawing(case), columns) as figure:

@@ -362,7 +362,7 @@ def export(
     if target not in kinds:
         problem = f"there is no target {target!r:.60}"
         raise ModelError(problem, parameter="target", remedy="use c, fmu, ros2 or mjcf")
-    chosen: Any = given_options(kinds[target], options, keywords)
+    chosen: Any = given_options(kinds[target], options, keywords, ["target"])
     out = Path(out)
     fitting = {".fmu": "fmu", ".xml": "mjcf", ".c": "c", ".h": "c"}.get(out.suffix.casefold())
     if target in ("c", "ros2") and fitting is not None:

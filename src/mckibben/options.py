@@ -56,11 +56,21 @@ class Option:
 
 @dataclass(frozen=True)
 class Argument:
-    """Declaration of a positional argument: its placeholder in a help text, and what it is."""
+    """Declaration of a positional argument: its placeholder in a help text, and what it is.
+
+    ``kind`` is the type of one word.
+    """
 
     metavar: str
     help: str
     several: bool = False
+    kind: type = Path
+
+
+MODEL = Argument("MODEL", "Saved model (JSON).")
+COMPENSATOR = Argument("COMPENSATOR", "Compensator, from mckibben invert (JSON).")
+FILES = Argument("FILES...", "Recordings: CSV, TSV, Parquet, MAT, HDF5, TDMS, bags.", several=True)
+TEST = Option("Recording to test on; repeatable.", "FILE")
 
 
 def given_options(

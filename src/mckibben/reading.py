@@ -163,11 +163,11 @@ class Contents(Result):
                 "recording": one.name,
                 "channel": name,
                 "unit": one.units[name],
-                "min": float(samples.min()),
-                "max": float(samples.max()),
+                "min": low,
+                "max": high,
             }
             for one in self.recordings
-            for name, samples in one.channels.items()
+            for name, (low, high) in one.ranges.items()
         ]
         return pd.DataFrame(rows)
 
@@ -182,12 +182,8 @@ class Contents(Result):
                 "sample_time": one.sample_time,
                 "start_time": one.start_time,
                 "channels": {
-                    name: {
-                        "unit": one.units[name],
-                        "min": float(samples.min()),
-                        "max": float(samples.max()),
-                    }
-                    for name, samples in one.channels.items()
+                    name: {"unit": one.units[name], "min": low, "max": high}
+                    for name, (low, high) in one.ranges.items()
                 },
                 "meta": dict(one.meta),
             }

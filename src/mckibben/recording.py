@@ -316,6 +316,11 @@ class Recording(Hinted, DrawsItself):
         return next(iter(self.channels.values())).size
 
     @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Lowest and highest sample of every channel."""
+        return {name: (float(x.min()), float(x.max())) for name, x in self.channels.items()}
+
+    @property
     def step(self) -> float:
         """From one value of `time` to the next: the sample time [s], or 1 where samples are numbered."""
         return 1.0 if self.sample_time is None else self.sample_time
@@ -418,17 +423,11 @@ class Recording(Hinted, DrawsItself):
         DataError
             On times that are not uniform, and samples that are none.
         """
-        known = frame.attrs.get(OWN, {})
-        if not is_own(frame):
-            read = load("readers", "table")
-            options = {"sample_time": sample_time, "units": units or {}}
-            found, *more = read(frame, informative=False, **options)
-            if more:
-                raise DataError("it has several recordings", remedy="use `mckibben.read`")
-            return cls(**vars(found) | {"meta": {**found.meta, **meta}})
-        channels = {str(name): frame[name].to_numpy() for name in frame}
-        step, start = known["grid"] or (None, 0.0)
-        return cls(channels, step, known["units"], start, known["meta"] | meta)
+        options = {"sample_time": sample_time, "units": units or {}}
+        found, *more = load("readers", "table")(frame, informative=False, **options)
+        if more:
+            raise DataError("it has several recordings", remedy="use `mckibben.read`")
+        return cls(**vars(found) | {"meta": {**found.meta, **meta}})
 
     def to_frame(self) -> Any:
         """Return the channels as a data frame of pandas over time [s]; the inverse of `from_frame`."""
@@ -619,10 +618,14 @@ def _grid(time: Array, step: float = 0.0, start: float = 0.0) -> tuple[float, fl
     return float(steps.mean()), float(time[0])
 
 
-def is_own(frame: Any) -> bool:
-    """Return whether a data frame is unchanged since `Recording.to_frame` returned it."""
+def restored(frame: Any) -> Recording | None:
+    """Return the recording that a data frame was, or None if it was none or was changed since."""
     known = frame.attrs.get(OWN)
-    return known is not None and known["digest"] == _frame_digest(frame)
+    if known is None or known["digest"] != _frame_digest(frame):
+        return None
+    channels = {str(name): frame[name].to_numpy() for name in frame}
+    step, start = known["grid"] or (None, 0.0)
+    return Recording(channels, step, known["units"], start, known["meta"])
 
 
 def _frame_digest(frame: Any) -> str:

@@ -20,7 +20,7 @@ from mckibben.report import text
 from mckibben.report.builder import Table
 from mckibben.report.columns import columns_of_board
 from mckibben.report.results import FACES, board_table
-from mckibben.studying.simulating import Simulation
+from mckibben.simulation import Simulation
 from tests.workflow.calls import prepare
 
 

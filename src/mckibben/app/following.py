@@ -26,7 +26,7 @@ from mckibben.errors import DataError, MckibbenError, ModelError
 from mckibben.recording import REFERENCE, Recording
 
 if TYPE_CHECKING:
-    from mckibben.studying.simulating import Simulation
+    from mckibben.simulation import Simulation
 
 Points = list[tuple[float, float]]
 """Time [s] and value, times rising."""

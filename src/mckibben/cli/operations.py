@@ -25,7 +25,7 @@ def operation_command(name: str) -> click.Command:
     taken: dict[str, tuple[Any, Any]] = {}
     for key, about in operation.arguments.items():
         default = parameters[key].default
-        single = str if key == "model" and name == "fit" else Path
+        single: Any = about.kind if isinstance(about, Argument) else Path
         many = about.several if isinstance(about, Argument) else default == ()
         taken[key] = (Annotated[tuple[Path, ...] if many else single, about], default)
     if operation.options is not None:

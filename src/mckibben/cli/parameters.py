@@ -14,23 +14,12 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 import click
 
 from mckibben.errors import DataError, in_terms_of, python_operation, python_parameter
-from mckibben.options import Argument, Option, is_mapping, parsed
+from mckibben.options import FILES, TEST, Argument, Option, is_mapping, parsed
 
 COMMANDS = (
     *("study", "characterize", "fit", "compare", "check", "calibrate", "simulate", "invert"),
-    *(
-        "track",
-        "learn",
-        "review",
-        "plan",
-        "plot",
-        "reproduce",
-        "measured",
-        "info",
-        "link",
-        "example",
-    ),
-    *("export", "rig", "muscles", "app"),
+    *("track", "learn", "review", "plan", "plot", "reproduce", "measured", "info"),
+    *("link", "example", "export", "rig", "muscles", "app"),
 )
 """Commands: operations of `mckibben.workflow`, or modules of `mckibben.cli.commands` of that name."""
 
@@ -78,10 +67,8 @@ def plainly(text: str) -> str:
     return in_terms_of(" ".join(text.split()), as_flag, as_command)
 
 
-Files = Annotated[
-    tuple[Path, ...], Argument("FILES...", "Recordings: CSV, TSV, Parquet, MAT, HDF5, TDMS, bags.")
-]
-Test = Annotated[tuple[Path, ...], Option("Recording to test on; repeatable.", "FILE")]
+Files = Annotated[tuple[Path, ...], FILES]
+Test = Annotated[tuple[Path, ...], TEST]
 Quick = Annotated[bool, Option("Models that take seconds; same as --models quick.")]
 Force = Annotated[bool, Option("Replace files that mckibben did not write, except inputs.")]
 Json = Annotated[bool, Option("Print the result as JSON on standard output.", flag="--json")]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Unpack
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -16,11 +16,9 @@ from mckibben.blocks.inverse import Inverse
 from mckibben.diagnosis.bands import TestedBand
 from mckibben.diagnosis.branch_gaps import Memory
 from mckibben.errors import MckibbenError, ModelError
-from mckibben.files.memory import Data
-from mckibben.keywords import SimulateKeywords
 from mckibben.metrics import Scores
 from mckibben.numerics.statistics import half_interval
-from mckibben.registry import load
+from mckibben.simulation import Simulates
 from mckibben.splits import Span
 from mckibben.system.atomic import Numbers, plain
 from mckibben.system.showing import Result
@@ -329,7 +327,7 @@ class Doubt(Numbers):
 
 
 @dataclass(frozen=True, repr=False)
-class Leaderboard(Result):
+class Leaderboard(Simulates, Result):
     """Models chosen on training data, and their errors on independent test data.
 
     Parameters
@@ -430,10 +428,6 @@ class Leaderboard(Result):
             problem = "no model is recommended"
             raise ModelError(problem, remedy="see the rows, each with its error and its block")
         return best.block
-
-    def simulate(self, data: Data, **options: Unpack[SimulateKeywords]) -> Any:
-        """Simulate the chosen model on a recording; see `mckibben.simulate`."""
-        return load("operations", "simulate")(self.model, data, **options)
 
     @property
     def failed(self) -> bool:

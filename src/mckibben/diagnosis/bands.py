@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Unpack
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,14 +23,13 @@ from mckibben.blocks.free_runs import free_run
 from mckibben.blocks.inverse import commands
 from mckibben.blocks.runs import FreeRun
 from mckibben.errors import DataError, ModelError
-from mckibben.keywords import SimulateKeywords
 from mckibben.numerals import numeral
 from mckibben.numerics.blocks import block_length
 from mckibben.numerics.statistics import correlation_length
 from mckibben.recording import Recording, check_sample_times, listed
-from mckibben.registry import load
 from mckibben.signals.reversals import reversals
 from mckibben.signals.shared_rows import check_shared
+from mckibben.simulation import Simulates
 from mckibben.system.atomic import Numbers
 from mckibben.system.progress import Tell, one_by_one, telling
 from mckibben.system.showing import Result
@@ -76,7 +75,7 @@ SHARES = 0.8, 0.97
 
 
 @dataclass(frozen=True, repr=False)
-class Calibration(Result):
+class Calibration(Simulates, Result):
     """A model with a band, and the band's width.
 
     Parameters
@@ -107,10 +106,6 @@ class Calibration(Result):
     def at(self, level: float) -> Banded:
         """Return the model with the band of another level."""
         return self.model.at(level)
-
-    def simulate(self, data: Any, **options: Unpack[SimulateKeywords]) -> Any:
-        """Simulate the model on a recording; see `mckibben.simulate`."""
-        return load("operations", "simulate")(self.model, data, **options)
 
     @property
     def drawn(self) -> Block:

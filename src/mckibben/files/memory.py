@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from mckibben.errors import DataError
 from mckibben.files.table import Column, Table, column
-from mckibben.recording import OWN, Frame, Recording, is_frame, is_own, standard_unit
+from mckibben.recording import OWN, Frame, Recording, is_frame, restored, standard_unit
 from mckibben.registry import names
 
 InMemory = Recording | Frame | Mapping[str, ArrayLike]
@@ -47,7 +47,7 @@ def _items(one: Any) -> list[Any]:
             raise DataError(problem, remedy="name models with `models`, or give a file")
         path = Path(one)
         return sorted(path.parent.glob(path.name)) or [path]
-    return [Recording.from_frame(one) if is_frame(one) and is_own(one) else one]
+    return [(restored(one) or one) if is_frame(one) else one]
 
 
 def table_of(data: InMemory) -> tuple[Table, Path]:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from mckibben.diagnosis.check import Validation
     from mckibben.diagnosis.review import Review
     from mckibben.rigs.rig import Rig
-    from mckibben.studying.simulating import Simulation
+    from mckibben.simulation import Simulation
     from mckibben.studying.study import Study
 
 T = TypeVar("T")

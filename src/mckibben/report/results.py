@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from mckibben.reading import Contents
     from mckibben.recording import Recording
     from mckibben.rigs.rig import Rig
+    from mckibben.simulation import Simulation
     from mckibben.studying.results import Exported, Fit, Inverse, Tracking
-    from mckibben.studying.simulating import Simulation
     from mckibben.studying.study import Study
 
 STARTS_MATTER = 0.05
@@ -53,12 +53,8 @@ UNFOLDED = 30
 def recording(found: Recording) -> list[Item]:
     """Return the ranges of channels, and notes."""
     rows = [
-        [
-            name,
-            found.units[name] or "–",
-            *(f"{end + 0.0:.6g}" for end in (samples.min(), samples.max())),
-        ]
-        for name, samples in found.channels.items()
+        [name, found.units[name] or "–", *(f"{end + 0.0:.6g}" for end in ends)]
+        for name, ends in found.ranges.items()
     ]
     notes = reading_notes([found])
     return [
@@ -410,9 +406,8 @@ def tracked(found: Tracked) -> list[Item]:
 
 def tracking(found: Tracking) -> list[Item]:
     """Return tracking errors with and without compensation."""
-    ways = {found.law: found.tracked, "no compensation": found.uncompensated.tracked}
     items: list[Item] = [Text(found.notes, "note", listed=True) if found.notes else None]
-    items += loops({name: one for name, one in ways.items() if one is not None})
+    items += loops(found.loops)
     items += [] if found.learned is None else learned(found.learned)
     return [*items, Text(words.tracked(found))]
 

@@ -6,12 +6,10 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from mckibben.blocks.equations import quantities
-from mckibben.files.memory import Data
-from mckibben.keywords import SimulateKeywords
-from mckibben.registry import load
+from mckibben.simulation import Simulates
 from mckibben.system.atomic import plain
 from mckibben.system.showing import Result
 
@@ -21,7 +19,6 @@ if TYPE_CHECKING:
     from mckibben.control.connecting import Kind, Plant
     from mckibben.estimators.core.estimator import Estimator
     from mckibben.recording import Recording
-    from mckibben.studying.simulating import Simulation
 
 
 class Price(NamedTuple):
@@ -32,7 +29,7 @@ class Price(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class Fit(Result):
+class Fit(Simulates, Result):
     """A fitted model.
 
     Parameters
@@ -63,11 +60,6 @@ class Fit(Result):
     def drawn(self) -> Block:
         """What a plot of it draws."""
         return self.model
-
-    def simulate(self, data: Data, **options: Unpack[SimulateKeywords]) -> Simulation:
-        """Simulate the model on a recording; see `mckibben.simulate`."""
-        found: Simulation = load("operations", "simulate")(self.model, data, **options)
-        return found
 
     def to_frame(self) -> Any:
         """Return the parameters as a data frame: name, value, standard error and unit."""
@@ -155,6 +147,12 @@ class Tracking(Result):
         return self.tracked
 
     @property
+    def loops(self) -> dict[str, Tracked]:
+        """The loop of the controller, and that without compensation, if there is one."""
+        ways = {self.law: self.tracked, "no compensation": self.uncompensated.tracked}
+        return {way: one for way, one in ways.items() if one is not None}
+
+    @property
     def recording(self) -> Recording:
         """The run, as `learn` and `review` take it."""
         return self.tracked.recording
@@ -163,11 +161,9 @@ class Tracking(Result):
         """Return the errors as a data frame: RMSE and largest, by controller and output."""
         import pandas as pd
 
-        ways = {self.law: self.tracked, "no compensation": self.uncompensated.tracked}
         rows = [
             {"controller": way, "output": name, "rmse": rmse, "largest": one.largest[name]}
-            for way, one in ways.items()
-            if one is not None
+            for way, one in self.loops.items()
             for name, rmse in one.rmse.items()
         ]
         return pd.DataFrame(rows)
@@ -195,7 +191,7 @@ def _errors(found: Tracked) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, repr=False)
-class Inverse(Result):
+class Inverse(Simulates, Result):
     """A compensator, or a force estimator.
 
     Parameters
@@ -232,11 +228,6 @@ class Inverse(Result):
     def drawn(self) -> Block:
         """What a plot of it draws."""
         return self.model
-
-    def simulate(self, data: Data, **options: Unpack[SimulateKeywords]) -> Simulation:
-        """Simulate the compensator on a recording; see `mckibben.simulate`."""
-        found: Simulation = load("operations", "simulate")(self.model, data, **options)
-        return found
 
     def to_dict(self) -> dict[str, Any]:
         """Return the kind of inverse and its reachable range, for JSON."""

@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar, Unpack
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -25,12 +25,11 @@ from mckibben.diagnosis.data_gaps import Gap, data_gaps
 from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.diagnosis.review import Review, review
 from mckibben.errors import DataError, MckibbenError
-from mckibben.files.memory import Data
-from mckibben.keywords import SimulateKeywords
 from mckibben.options import StudyOptions, given_options
 from mckibben.recording import COMMAND, Recording, listed, sample_time_of
 from mckibben.rigs import load_rig
 from mckibben.rigs.rig import Rig, changes, recorded_on
+from mckibben.simulation import Simulates
 from mckibben.splits import Split
 from mckibben.studying.inverting import Compensation, compensation
 from mckibben.system.atomic import plain
@@ -39,7 +38,7 @@ from mckibben.system.showing import Result
 
 
 @dataclass(frozen=True, repr=False)
-class Study(Result):
+class Study(Simulates, Result):
     """Results of ``mckibben study``.
 
     Parameters
@@ -109,10 +108,6 @@ class Study(Result):
     def model(self) -> Block:
         """The chosen model; see `Leaderboard.model`."""
         return self.leaderboard.model
-
-    def simulate(self, data: Data, **options: Unpack[SimulateKeywords]) -> Any:
-        """Simulate the chosen model on a recording; see `mckibben.simulate`."""
-        return self.leaderboard.simulate(data, **options)
 
     def to_frame(self) -> Any:
         """Return the leaderboard as a data frame."""

@@ -20,6 +20,9 @@ from mckibben.keywords import (
     TrackKeywords,
 )
 from mckibben.options import (
+    COMPENSATOR,
+    FILES,
+    MODEL,
     Argument,
     COptions,
     ExportOptions,
@@ -36,11 +39,7 @@ from mckibben.reading import files_of, only, read_files
 from mckibben.recording import COMMAND, Recording, sample_time_of
 from mckibben.studying.results import Exported, Inverse, Tracking
 from mckibben.system.progress import Tell, telling
-from mckibben.system.showing import Result
 from mckibben.workflow.operation import (
-    COMPENSATOR,
-    FILES,
-    MODEL,
     Progress,
     claimed,
     operation,
@@ -53,8 +52,7 @@ from mckibben.workflow.operation import (
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
     from mckibben.control import Learned
-
-    Model = Block | Result | str | Path
+    from mckibben.workflow.operation import Model
 
 
 @operation(

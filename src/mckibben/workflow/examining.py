@@ -20,6 +20,8 @@ from mckibben.keywords import (
     SimulateKeywords,
 )
 from mckibben.options import (
+    FILES,
+    MODEL,
     Argument,
     CalibrateOptions,
     ChannelOptions,
@@ -36,10 +38,7 @@ from mckibben.options import (
 from mckibben.reading import files_of, loaded, read_files, read_loop, read_sides
 from mckibben.recording import Recording, reading_notes
 from mckibben.system.progress import telling
-from mckibben.system.showing import Result
 from mckibben.workflow.operation import (
-    FILES,
-    MODEL,
     Progress,
     claimed,
     operation,
@@ -50,7 +49,6 @@ from mckibben.workflow.operation import (
 )
 
 if TYPE_CHECKING:
-    from mckibben.blocks.base import Block
     from mckibben.diagnosis.bands import Calibration
     from mckibben.diagnosis.characterization import Characterization
     from mckibben.diagnosis.check import Validation
@@ -59,9 +57,8 @@ if TYPE_CHECKING:
     from mckibben.papers.experiment import Reproduction
     from mckibben.planning.planner import Plan
     from mckibben.reading import Contents
-    from mckibben.studying.simulating import Simulation
-
-    Model = Block | Result | str | Path
+    from mckibben.simulation import Simulation
+    from mckibben.workflow.operation import Model
 
 
 def info(

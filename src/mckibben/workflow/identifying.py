@@ -15,6 +15,8 @@ from mckibben.errors import DataError, ModelError
 from mckibben.files.memory import Data, items
 from mckibben.keywords import CompareKeywords, FitKeywords, StudyKeywords
 from mckibben.options import (
+    FILES,
+    TEST,
     Argument,
     CompareOptions,
     FitOptions,
@@ -27,7 +29,6 @@ from mckibben.recording import Recording
 from mckibben.studying.results import Fit, Price
 from mckibben.system.progress import telling
 from mckibben.workflow.operation import (
-    FILES,
     Progress,
     claimed,
     operation,
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
 
 
 @operation(
-    {"model": Argument("MODEL", "Short name; see info --models."), "data": FILES},
+    {"model": Argument("MODEL", "Short name; see info --models.", kind=str), "data": FILES},
     FitOptions,
     out=Option("Model file to write (JSON).", "FILE", "-o"),
     must_write=True,
@@ -162,7 +163,7 @@ def _residuals(base: Block, estimator: Any, runs: list[Recording]) -> list[Recor
 
 
 @operation(
-    {"train": FILES, "test": Option("Recording to test on; repeatable.", "FILE")},
+    {"train": FILES, "test": TEST},
     CompareOptions,
     out=Option("Folder for leaderboard.json and .csv.", "DIR", "-o"),
     writes=("leaderboard.json", "leaderboard.csv"),

@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
 
 from mckibben.errors import ModelError
 from mckibben.options import Argument, Option, Options, ReadOptions, given_options
 from mckibben.system.progress import Tell
 from mckibben.system.showing import Result
+
+if TYPE_CHECKING:
+    from mckibben.blocks.base import Block
+
+    Model = Block | Result | str | Path
 
 Progress = bool | Tell | None
 
@@ -66,10 +71,6 @@ def operation(
 
 ARGUMENTS = ("out", "force", "progress")
 """Parameters of operations beside data and options."""
-
-MODEL = Argument("MODEL", "Saved model (JSON).")
-COMPENSATOR = Argument("COMPENSATOR", "Compensator, from mckibben invert (JSON).")
-FILES = Argument("FILES...", "Recordings: CSV, TSV, Parquet, MAT, HDF5, TDMS, bags.", several=True)
 
 
 def options_of(

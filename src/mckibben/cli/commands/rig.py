@@ -108,8 +108,7 @@ def run(
         given = given.select([one for one in rig.inputs if one in given])
     recording = at_first_commands(rig, given).run(given, seed, ideal=ideal)
     write(recording.with_meta(name=out.stem), out)
-    spans = {k: [float(v.min()), float(v.max())] for k, v in recording.channels.items()}
-    about = {"file": str(out), "n_samples": len(recording), "ranges": spans}
+    about = {"file": str(out), "n_samples": len(recording), "ranges": recording.ranges}
     about["saturated"] = dict(recording.meta.get("saturated", {}))
     show(about, lambda: text.lines(results.recording(recording)), as_json, written=[out])
 

@@ -76,12 +76,13 @@ def covariance_of_balance(runs: FreeRuns, fixed: Sequence[int]) -> tuple[float, 
     likely = fewer * (sizes / natural_scales(block)[free]) ** 2
     flat = slopes.reshape(-1, free.size)
     products = flat.T @ flat + np.diag(likely)
-    condition, inverse, lost = _inverted(products)
+    lowest, highest = np.linalg.eigvalsh(products)[[0, -1]]
+    inverse, lost = _inverted(products)
     blocks = [block for piece in blocks_of(pieces, BLOCKS) for block in piece if block.size]
     moved = []
     for one in blocks:  # what a fit without a block is off by
         own = slopes[one].reshape(-1, free.size)
-        moved.append(_inverted(products - own.T @ own)[1] @ (errors[one].ravel() @ own))
+        moved.append(_inverted(products - own.T @ own)[0] @ (errors[one].ravel() @ own))
     few = max(len(blocks) - 1, 1)
     wider = (student(few) / NORMAL_95) ** 2 * few / len(blocks)
     spread = wider * np.transpose(moved) @ np.array(moved)
@@ -90,20 +91,18 @@ def covariance_of_balance(runs: FreeRuns, fixed: Sequence[int]) -> tuple[float, 
     found = spread + inverse @ bias @ inverse
     found[lost] = found[:, lost] = np.nan
     covariance[np.ix_(free, free)] = found * np.outer(sizes, sizes)
-    return condition if usable.all() else np.inf, covariance
+    known = usable.all() and lowest > 0.0
+    return float(np.sqrt(highest / lowest)) if known else np.inf, covariance
 
 
-def _inverted(products: Array) -> tuple[float, Array, Mask]:
-    """Return condition of slopes, the inverse of their products (k, k), and what nothing determines."""
+def _inverted(products: Array) -> tuple[Array, Mask]:
+    """Return the inverse of products of slopes (k, k), and what nothing determines."""
     size = np.sqrt(np.diag(products))
     size[size == 0.0] = 1.0
     values, ways = np.linalg.eigh(products / np.outer(size, size))
     kept = values > ROUNDING * values[-1]
     inverse = (ways[:, kept] / values[kept]) @ ways[:, kept].T / np.outer(size, size)
-    lowest = float(np.linalg.eigvalsh(products)[0])
-    highest = float(np.linalg.eigvalsh(products)[-1])
-    lost = (ways[:, ~kept] ** 2).sum(axis=1) > LOST
-    return float(np.sqrt(highest / lowest)) if lowest > 0.0 else np.inf, inverse, lost
+    return inverse, (ways[:, ~kept] ** 2).sum(axis=1) > LOST
 
 
 def _shift(runs: FreeRuns) -> Array:

@@ -16,7 +16,7 @@ track()                 track()                  mckibben track
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,9 @@ class MckibbenError(Exception):
     remedy : str
         What to do about it, as a phrase without a final stop. Parameters and operations are in
         backquotes, see `mckibben.errors`.
+    options : sequence of mapping, optional
+        Arguments of which any one set is a remedy too, the best first, such as ``{"gaps": "split"}`` or
+        ``{"units": {"pressure": "kPa"}}``; None leaves an argument out. The remedy begins with them.
     file : path, optional
         The file it was found in.
     channel : str, optional
@@ -53,13 +56,15 @@ class MckibbenError(Exception):
         problem: str,
         *,
         remedy: str = "",
+        options: Sequence[Mapping[str, Any]] = (),
         file: str | Path | None = None,
         channel: str | None = None,
         row: int | None = None,
         parameter: str | None = None,
     ) -> None:
         self.problem = problem
-        self.remedy = remedy
+        self.otherwise = remedy
+        self.options = tuple(options)
         self.file = None if file is None else Path(file)
         self.channel = channel
         self.row = row
@@ -69,6 +74,12 @@ class MckibbenError(Exception):
     def __reduce__(self) -> tuple[Any, ...]:
         """Return how to recreate it in another process."""
         return type(self), (self.problem,), self.__dict__
+
+    @property
+    def remedy(self) -> str:
+        """What to do about it: any one set of options, or what is to be done otherwise."""
+        use = " or ".join(map(_argument_words, self.options))
+        return ", or ".join(filter(None, (use and f"use {use}", self.otherwise)))
 
     def __str__(self) -> str:
         return rendered(self)
@@ -132,6 +143,27 @@ def rendered(
     problem = in_terms_of(_short(error.problem), parameter, operation)
     stop = "" if problem.endswith("?") else "."
     return f"{place}{problem}" + (f"{stop} Remedy: {remedy}." if remedy else "")
+
+
+def _argument_words(options: Mapping[str, Any]) -> str:
+    """Return arguments in backquotes.
+
+    >>> _argument_words({"units": {"time": "ms"}, "gaps": "split", "raw": True, "rate": None})
+    '`units[time]=ms` with `gaps=split` with `raw` without `rate`'
+    """
+    words: list[str] = []
+    for name, given in options.items():
+        pairs = given.items() if isinstance(given, Mapping) else [(None, given)]
+        for key, value in pairs:
+            argument = name if key is None else f"{name}[{key}]"
+            joint = "" if not words else " with "
+            if value is None:
+                words.append(f"{' ' * bool(words)}without `{argument}`")
+            else:
+                words.append(
+                    f"{joint}`{argument}`" if value is True else f"{joint}`{argument}={value}`"
+                )
+    return "".join(words)
 
 
 def _short(given: object, most: int = 1000) -> str:

@@ -67,7 +67,7 @@ PLAUSIBLE = {
     "N*m": Plausible(-1e5, 1e5),
     "s": Plausible(-1e11, 1e11, 1.7e9),  # since 1970
     "rad": Plausible(-1e4, 1e4, 1.0, 0.0, 7.0),
-    "V": Plausible(-1e3, 1e3, 5.0),
+    "V": Plausible(-2e4, 2e4, 5.0),
     "mm/s": Plausible(-1e5, 1e5, 100.0),
     "degC": Plausible(-100.0, 1e3),
     "": Plausible(-1e4, 1e4, 0.2, 0.0, 1.5),

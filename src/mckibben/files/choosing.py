@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 
 import numpy as np
 
@@ -52,6 +53,12 @@ def seen(source: Source) -> list[Seen]:
         )
         for column in source.table.columns
     ]
+
+
+def named_in(source: Source) -> dict[str, str]:
+    """Return the channel of every column by its header; on an error, channels by header."""
+    named = _by_identity(source)
+    return {one.header: named[id(one)] for one in source.table.columns if id(one) in named}
 
 
 def _by_identity(source: Source) -> dict[int, str]:
@@ -106,13 +113,10 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
         elif channel in fixed:
             left_out[column.header] = f"{channel} is read from another column"
         elif channel in named:
-            first = named[channel].header
-            raise source.error(
-                f"columns {first!r} and {column.header!r} both hold it",
-                f"name one, with `columns[{channel}]={first}`; the columns of a file need different "
-                "headers",
-                channel,
-            )
+            both = [named[channel].header, column.header]
+            problem = f"columns {both[0]!r} and {both[1]!r} both hold it"
+            options = [{"columns": {channel: header}} for header in both]
+            raise source.error(problem, "give them different headers", channel, options=options)
         else:
             named[channel] = column
     places = {id(column): place for place, column in enumerate(source.table.columns)}
@@ -152,8 +156,9 @@ def find_column(wanted: str, channel: str, source: Source) -> Column:
         if len(matches) > 1:
             headers = [column.header for column in matches]
             differ = len(set(headers)) == len(headers)
-            remedy = f"name one of {listed(headers)}" if differ else "give them different headers"
-            raise source.error(f"{len(matches)} columns are named {wanted!r}", remedy, channel)
+            options = [{"columns": {channel: header}} for header in headers if differ]
+            problem = f"{len(matches)} columns are named {wanted!r}: {listed(headers)}"
+            raise source.error(problem, "give them different headers", channel, options=options)
         if matches:
             return matches[0]
     for place, why in table.unread.items():
@@ -161,7 +166,10 @@ def find_column(wanted: str, channel: str, source: Source) -> Column:
             remedy = "save it as one vector of numbers"
             raise source.error(f"{place!r} cannot be read: {why}", remedy, channel)
     problem = f"there is no column {wanted!r}; there are {_headers(table)}"
-    raise source.error(problem, f"name one of them with `columns[{channel}]=COLUMN`", channel)
+    near = get_close_matches(wanted, [column.header for column in table.columns], 1)
+    options = [{"columns": {channel: header}} for header in near]
+    remedy = f"name one of them with `columns[{channel}]=COLUMN`"
+    raise source.error(problem, remedy, channel, options=options)
 
 
 def _of_one_length(source: Source, fixed: Mapping[str, Column]) -> tuple[Source, dict[str, str]]:
@@ -209,7 +217,7 @@ def _described(source: Source) -> dict[str, Column]:
                 continue
             if time.sample_time is None if channel == "time" else request.asks_for(channel):
                 remedy = f"correct its column in {NAME}, or use `columns[{channel}]=COLUMN`"
-                raise source.error(error.problem, remedy, channel) from None
+                raise source.error(error.problem, remedy, channel, options=error.options) from None
             source.warn(f"channel {channel!r} is left out: {error.problem}")
     return found
 

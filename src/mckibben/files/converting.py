@@ -17,8 +17,9 @@ from mckibben.files.headers import is_clock, parse, snake_case, time_unit, unit_
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.table import Column
+from mckibben.files.timebase import Times
 from mckibben.files.units import COUNTS, Unit, convert, find, weight
-from mckibben.recording import COMMAND, PLAUSIBLE, REST_LENGTH, conversion, standard_unit
+from mckibben.recording import COMMAND, REST_LENGTH, conversion, standard_unit
 
 ASSUMED = "no unit is given, so these are assumed: "
 """Beginning of a note on assumed units."""
@@ -37,23 +38,6 @@ class Signal:
     read_in: Unit
     assumed: bool
     calibration: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Times:
-    """Times in their original unit, with the recorded digits.
-
-    The unit is ``certain`` where it was requested or is not the second.
-    """
-
-    values: Array
-    unit: str = "s"
-    certain: bool = True
-    assumed: bool = False
-
-    def seconds(self, duration: float) -> float:
-        """Return a time or duration in this unit in seconds."""
-        return float(convert(np.array([duration]), self.unit, "s")[0])
 
 
 def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, dict[str, Any]]:
@@ -100,7 +84,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         "calibration": {name: one.calibration for name, one in each if one.calibration},
     }
     assumed = ["time in s"] if times is not None and times.assumed else []
-    assumed += [f"{name} in {one.unit}" for name, one in each if one.assumed]
+    assumed += [f"{name} in {one.unit}" for name, one in each if one.assumed and one.unit]
     if assumed:
         text = f"{ASSUMED}{listed(assumed)}; use `units[CHANNEL]=UNIT` where that is wrong"
         source.warn(text, quiet=source.in_memory)  # names in a program are its author's
@@ -163,18 +147,19 @@ def times_of(column: Column, source: Source) -> Times:
     values = _numbers("time", column, source)
     found, assumed = _unit("time", column, values, source)
     unit = found.name
-    quality.refuse_impossible("time", convert(values, unit, "s"), unit, source)
-    asked = "time" in source.request.units or source.request.described.time.unit is not None
-    return Times(values, unit, asked or unit != "s", assumed)
+    stated = _is_stated("time", column, source)
+    if not stated:
+        seconds = convert(values, unit, "s")
+        quality.question_size("time", column, seconds, unit, source, assumed=assumed)
+    return Times(values, unit, stated or unit != "s", assumed)
 
 
 def _signal(channel: str, column: Column, source: Source) -> Signal:
     """Return a channel in the package's unit, NaN for missing samples."""
     raw = _numbers(channel, column, source)
     calibration = _calibration(channel, column, source)
-    calibrated = "gain" in calibration
     values = raw
-    if calibrated:
+    if "gain" in calibration:
         with np.errstate(over="ignore"):
             values = calibration["gain"] * raw + calibration["offset"]
     read_in, assumed = _unit(channel, column, values, source)
@@ -186,9 +171,17 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
         if not channel.startswith(("voltage", COMMAND)):  # a sawtooth can be commanded
             quality.refuse_wraps(channel, raw, source)
         samples = quality.without_codes(channel, samples, raw, source)
-    if not own or channel in source.request.units or calibrated:
-        quality.refuse_impossible(channel, samples, read_in.name, source)
+    if not own and not _is_stated(channel, column, source):
+        quality.question_size(channel, column, samples, read_in.name, source, assumed=assumed)
     return Signal(samples, unit, read_in, assumed, calibration)
+
+
+def _is_stated(channel: str, column: Column, source: Source) -> bool:
+    """Return whether the user states a unit or a calibration of a channel, here or in the folder."""
+    request = source.request
+    given = request.described.time if channel == "time" else request.described.channels.get(channel)
+    described = given is not None and given.unit is not None and _describes(given, column)
+    return channel in request.units or described or bool(_calibration(channel, column, source))
 
 
 def _numbers(channel: str, column: Column, source: Source) -> Array:
@@ -231,41 +224,50 @@ def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[
         by_size = timebase.unit_by_size(values, source) if channel == "time" else None
         if by_size:
             return Unit(by_size, "s"), False
-        return _assumed(channel, column, values, source), bool(expected)
+        return _assumed(channel, column, values, source), expected is not None
     if source.table.own and asked is None and expected in (None, text):
         return Unit(text, expected), False
     unit = find(text)
     if unit is None and asked is None and expected is None:
         return Unit(text, None), False
     if unit is None:
-        remedy = f"name it, as in `units[{channel}]={expected or 'UNIT'}`"
-        raise source.error(f"the unit {text[:40]!r} is unknown", remedy, channel)
+        raise _unknown(channel, f"the unit {text[:40]!r} is unknown", column, values, source)
     if expected is None or unit.target == expected:
         return unit, False
+    options: list[dict[str, Any]] = []
+    remedy = f"name its unit with `units[{channel}]=UNIT`, or name another column"
     if unit.target in ("V", "A") or text.casefold() in COUNTS:
-        remedy = f"calibrate it, as in {_option(channel, column, expected)}, or in {NAME}"
+        remedy = _to_calibrate(channel, column, expected)
     elif expected == "" and unit.target == "mm":
-        remedy = _in_mm(column)
-    elif weight(text) != text:
-        remedy = f"where it is the weight of that mass, use `units[{channel}]={weight(text)}`"
-    else:
-        remedy = (
-            f"correct the unit with `units[{channel}]={expected or '%'}`, or name another column with "
-            f"`columns[{channel}]=COLUMN`"
-        )
+        options, remedy = [quality.in_mm(channel, column, source)], f"state {REST_LENGTH} besides"
+    elif weight(text) != text:  # of a mass
+        options = [{"units": {channel: weight(text)}}]
     problem = f"in {text!r}, which does not convert to" if text else "without a unit: it is in"
     problem = f"it cannot be {problem} {expected or 'a pure number'}"
-    raise source.error(problem, remedy, channel)
+    raise source.error(problem, remedy, channel, options=options)
 
 
-def _in_mm(column: Column) -> str:
-    """Return the remedy for a contraction in millimetres."""
-    read = f"`columns[displacement]={column.header}` and `units[displacement]=mm`"
-    return f"read it by {read}, and state {REST_LENGTH}"
+def _unknown(
+    channel: str, problem: str, column: Column, values: Array, source: Source
+) -> DataError:
+    """Return the error for an unknown unit, with those that suit the size of the values."""
+    expected = unit_of(channel)
+    if expected is None:
+        return source.error(problem, f"name it with `units[{channel}]=UNIT`", channel)
+    if channel == "time":
+        units = timebase.plausible_units(values[np.isfinite(values)])
+    else:
+        largest = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+        units = quality.fitting_units(largest, expected, expected)
+    options = [{"units": {channel: unit or "1"}} for unit in units]
+    return source.error(problem, _to_calibrate(channel, column, expected), channel, options=options)
 
 
-def _option(channel: str, column: Column, unit: str) -> str:
-    return f"`calibration[{channel}]={column.header}:GAIN:OFFSET:{unit}`"
+def _to_calibrate(channel: str, column: Column, unit: str) -> str:
+    """Return how to state gain and offset, from the unit of the column to that of a channel."""
+    of = column.unit or parse(column.label).unit
+    option = f"`calibration[{channel}]={column.header}:GAIN:OFFSET:{unit}`"
+    return f"calibrate it with {option}, the gain in {unit or 1} per {of or 'unit of the column'}"
 
 
 def _stated(channel: str, column: Column, source: Source) -> str | None:
@@ -287,38 +289,20 @@ def _stated(channel: str, column: Column, source: Source) -> str | None:
     units = {place: unit for place, text in texts.items() if (unit := find(text))}
     if units:
         texts = {place: texts[place] for place in units}
-    last = next(reversed(texts.values()), None)
     if len({(unit.name, unit.reference) for unit in units.values()}) > 1:
         differing = ", ".join(f"{text!r} in {place}" for place, text in texts.items())
-        remedy = f"name the right one, as in `units[{channel}]={last}`"
-        raise source.error(f"its unit is contradicted: {differing}", remedy, channel)
-    return last
+        options = [{"units": {channel: text}} for text in dict.fromkeys(reversed(texts.values()))]
+        problem = f"its unit is contradicted: {differing}"
+        raise source.error(problem, "correct the file", channel, options=options)
+    return next(reversed(texts.values()), None)
 
 
 def _assumed(channel: str, column: Column, values: Array, source: Source) -> Unit:
-    """Return the package's unit; raise a `DataError` if the header or the values contradict it."""
+    """Return the package's unit; raise a `DataError` if the header may have another."""
     expected = unit_of(channel)
     if expected is None:
         return Unit("", "")
     if expected and (ending := unknown_ending(column.label)):
-        raise source.error(
-            f"its unit is not certain: {column.label!r} has {ending!r}",
-            f"name its unit, as in `units[{channel}]={expected}`, or calibrate it, as in "
-            f"{_option(channel, column, expected)}",
-            channel,
-        )
-    largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
-    plausible = PLAUSIBLE[expected]
-    if 0 < largest < plausible.least or largest > plausible.most:
-        units = quality.fitting_units(largest, expected, expected)
-        options = " or ".join(f"`units[{channel}]={unit}`" for unit in units)
-        as_it_is = f"`units[{channel}]={expected or 1}` where that is right"
-        remedy = f"name its unit, as in {options}, or {as_it_is}"
-        if expected == "":
-            remedy += f"; where it is in mm, {_in_mm(column)}"
-        raise source.error(
-            f"it has no unit, and reaches {largest:.3g}: is it in {' or '.join(units)}?",
-            remedy,
-            channel,
-        )
+        problem = f"its unit is not certain: {column.label!r} has {ending!r}"
+        raise _unknown(channel, problem, column, values, source)
     return Unit(expected, expected)

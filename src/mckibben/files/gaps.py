@@ -9,13 +9,16 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array, Mask, true_runs
 from mckibben.files import timebase
-from mckibben.files.converting import Times
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
+from mckibben.files.timebase import Times
 from mckibben.files.units import convert
 from mckibben.recording import FEWEST_SAMPLES
 
 Channels = dict[str, Array]
+
+_BRIDGED = ({"gaps": "interpolate"}, {"gaps": "split"}, {"raw": True})
+"""Remedies of missing samples and of gaps."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,8 @@ def pieces(
         size, jitter = timebase.common_step(time, spans if split else stretches)
         step = _judged_step(size, jitter, times, source)
         if cuts.size and (time[-1] - time[0]) / size > 100 * time.size:
-            raise source.error("its gaps are too long to bridge", "use `gaps=split`", "time")
+            problem = "its gaps are too long to bridge"
+            raise source.error(problem, "", "time", options=[{"gaps": "split"}])
     found = []
     for first, after in spans:
         t, bridged = time[first:after], holes[first:after] & (not split)
@@ -110,15 +114,11 @@ def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
             raise source.error("all of its samples are missing", remedy, name, 0)
         if n and source.request.gaps == "error":
             problem = f"{n} of {missing.size} samples are missing or not finite"
-            remedy = (
-                "use `gaps=interpolate` to bridge them, `gaps=split` to cut them out, or `raw` where "
-                "they are numbers that were measured"
-            )
-            raise source.error(problem, remedy, name, int(np.argmax(missing)))
+            raise source.error(problem, "", name, int(np.argmax(missing)), _BRIDGED)
         found[name] = missing
     if not found:
         problem = "every column has samples missing"
-        raise source.error(problem, "use `gaps=interpolate` or `gaps=split`")
+        raise source.error(problem, options=_BRIDGED)
     return found
 
 
@@ -148,8 +148,7 @@ def _judge_gaps(cuts: NDArray[np.intp], times: Times, source: Source) -> None:
     total = f"{len(cuts)} gap{'s' * (len(cuts) > 1)} in time, {lengths.sum():.6g} s in all"
     if source.request.gaps == "error":
         problem = f"there is a gap of {lengths[0]:.6g} s before this row ({total})"
-        remedy = "use `gaps=split` to cut there or `gaps=interpolate` to bridge them"
-        raise source.error(problem, remedy, "time", int(cuts[0]))
+        raise source.error(problem, "", "time", int(cuts[0]), _BRIDGED)
     source.warn(f"bridged by straight lines: {total}")
 
 
@@ -159,7 +158,7 @@ def _judged_step(
     """Return the step in seconds; raise an error for a doubtful unit, and note jitter."""
     seconds = times.seconds(size)
     if seconds > 5.0 and not times.certain:
-        raise timebase.doubtful_unit(f"its steps are {seconds:.6g} s", seconds, source)
+        raise timebase.doubtful_unit(f"its steps are {seconds:.6g} s", times.values, source)
     if jitter is not None:
         rms, worst = (f"{times.seconds(x):.3g} s ({100 * x / size:.3g} %)" for x in jitter)
         source.warn(
@@ -176,7 +175,8 @@ def _long_enough(spans: timebase.Spans, source: Source) -> timebase.Spans:
     if not long.size:
         raise source.error(
             f"no stretch without gaps has {fewest} samples",
-            "use `gaps=interpolate`, or give a recording with fewer gaps",
+            "give a recording with fewer gaps",
+            options=[{"gaps": "interpolate"}],
         )
     if len(long) < len(spans):
         rows = [f"{source.table.row(first)}" for first in np.setdiff1d(spans[:, 0], long[:, 0])]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from mckibben.arrays import Array
 from mckibben.files.headers import unit_of
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
+from mckibben.files.table import Column
 from mckibben.files.units import SPELLINGS, convert
 from mckibben.recording import PLAUSIBLE
 
@@ -100,25 +102,42 @@ def _is_code(code: float, known: Array) -> bool:
     return bool(far or at_once) and np.unique(others).size >= 10
 
 
-def refuse_impossible(channel: str, values: Array, read_in: str, source: Source) -> None:
-    """Raise an error for values that no rig has, and suggest another unit than ``read_in``."""
+def question_size(
+    channel: str, column: Column, values: Array, read_in: str, source: Source, *, assumed: bool
+) -> None:
+    """Raise an error for values of a size that no rig has in the unit that the file states.
+
+    Sizes that are rare are questioned too where the unit is ``assumed``. What a user states never is.
+    """
     target = unit_of(channel)
-    finite = np.isfinite(values)
-    if target not in PLAUSIBLE or not finite.any():
+    known = values[np.isfinite(values)]
+    if target not in PLAUSIBLE or not known.size:
         return
-    low, high, *_ = PLAUSIBLE[target]
-    zero, small = TOO_SMALL.get(target, (0.0, 0.0))
-    known = values[finite]
-    least, largest = known.min(), known.max()
-    if low <= least and largest <= high and not zero < max(-least, largest) < small:
+    low, high, _, least, most = PLAUSIBLE[target]
+    zero, small = (0.0, least) if assumed else TOO_SMALL.get(target, (0.0, 0.0))
+    sizes, excess = np.abs(known), np.maximum(known - high, low - known)
+    rare = zero < sizes.max() < small or (assumed and sizes.max() > most)
+    if excess.max() <= 0 and not rare:
         return
-    excess = np.maximum(known - high, low - known)
-    at = int(np.flatnonzero(finite)[np.argmax(excess if excess.max() > 0 else np.abs(known))])
-    units = fitting_units(values[at], read_in, target)
-    options = " or ".join(f"`units[{channel}]={unit}`" for unit in units)
-    problem = f"{values[at]:.6g} {target} is impossible: is it in {' or '.join(units)}?"
-    remedy = f"name its unit, as in {options}, or correct that cell"
-    raise source.error(problem, remedy, channel, at)
+    suspect = known[np.argmax(excess if excess.max() > 0 else sizes)]
+    units = fitting_units(suspect, read_in, target)
+    options: list[dict[str, Any]] = [{"units": {channel: unit}} for unit in units]
+    if target == "" and assumed:
+        options.append(in_mm(channel, column, source))
+    stated = read_in or "1"
+    if stated not in units:
+        options.append({"units": {channel: stated}})
+    size = f"it reaches {suspect:.6g} {target}".rstrip()
+    problem = f"{size}{', without a unit' if assumed else ''}: is it in {' or '.join(units)}?"
+    at = int(np.argmax(values == suspect))
+    raise source.error(problem, "correct that cell", channel, at, options)
+
+
+def in_mm(channel: str, column: Column, source: Source) -> dict[str, dict[str, str | None]]:
+    """Return the options that read what is called a contraction as a displacement [mm]."""
+    of = channel.replace("contraction", "displacement")
+    without = {channel: None} if channel in source.request.units else {}
+    return {"columns": {of: column.header}, "units": {of: "mm", **without}}
 
 
 def fitting_units(value: float, read_in: str, target: str) -> list[str]:

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
 
 from mckibben.channels import by_name
+from mckibben.errors import DataError
 from mckibben.files import gaps as gaps_in
 from mckibben.files import sources, timebase
 from mckibben.files.channels import about
-from mckibben.files.choosing import Seen, seen
-from mckibben.files.converting import ASSUMED, Times, in_package_units
+from mckibben.files.choosing import Seen, named_in, seen
+from mckibben.files.converting import ASSUMED, in_package_units
 from mckibben.files.formats import MOST_BYTES
 from mckibben.files.memory import Data, InMemory, items, table_of
 from mckibben.files.notices import noted
+from mckibben.files.remedies import offering
 from mckibben.files.request import Request, Source
+from mckibben.files.table import Table
+from mckibben.files.timebase import Times
 from mckibben.keywords import ReadKeywords
 from mckibben.options import ReadOptions, given_options
 from mckibben.recording import Recording
@@ -159,31 +163,67 @@ def columns_of(path: str | Path, options: ReadOptions | None = None) -> list[See
     return seen(request.of(table, path))
 
 
+@dataclass(frozen=True)
+class _Loaded:
+    """The tables of data, where they are from, and what was noted on the way."""
+
+    tables: list[Table]
+    path: Path
+    meta: Mapping[str, Any]
+    notes: list[str]
+
+
 def _read(data: Path | InMemory, request: Request) -> tuple[list[Recording], Source]:
-    """Return the recordings of a file, with notes after earlier ones, and their first file."""
+    """Return the recordings of a file, with notes after earlier ones, and their first table.
+
+    Raises
+    ------
+    DataError
+        With the options that read it, tried here.
+    """
     if isinstance(data, Path):
         request.check(data)
         request = replace(request, described=about(data))
+    loaded = _loaded(data, request)
+
+    def attempt(changed: Request) -> dict[str, str]:
+        same = changed.layout == request.layout
+        recordings, used = _interpreted(loaded if same else _loaded(data, changed), changed)
+        named = named_in(used[0])
+        return {header: name for header, name in named.items() if name in (*recordings[0], "time")}
+
+    try:
+        recordings, used = _interpreted(loaded, request)
+    except DataError as error:
+        before = named_in(request.of(loaded.tables[0], loaded.path))
+        raise offering(error, request, before, attempt) from None
+    return recordings, used[0]
+
+
+def _loaded(data: Path | InMemory, request: Request) -> _Loaded:
     with noted() as notes:
         if isinstance(data, Path):
-            path = data
-            tables, digest = sources.tables(path, request)
-            meta = {"file": str(path), "sha256": digest}
-        else:
-            table, path = table_of(data)
-            tables, meta = [table], {}
-            request.check(path, text=False)
-        in_memory = not isinstance(data, Path)
-        of_each = [request.of(table, path, in_memory=in_memory) for table in tables]
-        found = [each for source in of_each for each in _recordings(source, meta)]
+            tables, digest = sources.tables(data, request)
+            return _Loaded(tables, data, {"file": str(data), "sha256": digest}, notes)
+        table, path = table_of(data)
+        request.check(path, text=False)
+        return _Loaded([table], path, {}, notes)
+
+
+def _interpreted(loaded: _Loaded, request: Request) -> tuple[list[Recording], list[Source]]:
+    """Return the recordings of tables, and each table with the request."""
+    in_memory = "file" not in loaded.meta
+    with noted() as notes:
+        of_each = [request.of(table, loaded.path, in_memory=in_memory) for table in loaded.tables]
+        found = [each for source in of_each for each in _recordings(source, loaded.meta)]
     stated = bool(request.columns or request.units)  # then units that were assumed before are not
     recordings = []
     for recording in found:
         earlier = [note for note in recording.notes if not (stated and note.startswith(ASSUMED))]
-        both = [*dict.fromkeys([*earlier, *notes])]
+        both = [*dict.fromkeys([*earlier, *loaded.notes, *notes])]
         same = both == list(recording.notes)
         recordings.append(recording if same else recording.with_meta(notes=both))
-    return recordings, of_each[0]
+    return recordings, of_each
 
 
 def _recordings(source: Source, origin: Mapping[str, Any]) -> list[Recording]:
@@ -198,7 +238,7 @@ def _recordings(source: Source, origin: Mapping[str, Any]) -> list[Recording]:
     start = table.start_time if clock is None else clock.seconds(clock.values[0])
     times = clock if step is None else None
     if times is not None:
-        times = replace(times, values=timebase.increasing(times.values, source))
+        times = timebase.increasing(times, source)
     pieces = gaps_in.pieces(channels, times, step, start, source)
     if request.informative:
         _refuse_constant(pieces, source)
@@ -239,9 +279,8 @@ def _stated_step(times: Times | None, source: Source) -> float | None:
     else:
         return step if table.sample_time is None else table.sample_time
     problem = f"{problem}, which is not the {1 / step:g} a second requested"
-    raise source.error(
-        problem, "leave `rate` and `sample_time` out, or delete the column of times", "time"
-    )
+    given = {name: None for name in ("rate", "sample_time") if getattr(request, name) is not None}
+    raise source.error(problem, "delete the column of times", "time", options=[given])
 
 
 def _refuse_constant(pieces: Sequence[gaps_in.Piece], source: Source) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
@@ -34,6 +34,11 @@ class Request(ReadOptions):
     def step(self) -> float | None:
         """Sample time as requested [s]."""
         return self.sample_time if self.rate is None else 1.0 / self.rate
+
+    @property
+    def layout(self) -> tuple[object, ...]:
+        """What determines the tables of a file, without what is read of them."""
+        return self.header, self.skip, self.encoding
 
     @property
     def fewest(self) -> int:
@@ -81,6 +86,14 @@ class Request(ReadOptions):
                     problem, file=path, parameter="units", channel=one.header, remedy=remedy
                 )
 
+    def changed(self, options: Mapping[str, Any]) -> Request:
+        """Return the request with more options, or with others in place of what it has."""
+        merged: dict[str, Any] = {
+            name: _merged(getattr(self, name), value) if isinstance(value, Mapping) else value
+            for name, value in options.items()
+        }
+        return replace(self, **merged)
+
     @property
     def interprets(self) -> bool:
         """Whether an option of reading, and not of what is done then, is given."""
@@ -115,6 +128,10 @@ class Request(ReadOptions):
                 raise error(problem, channel=channel, remedy="give finite numbers, the gain not 0")
 
 
+def _merged(before: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in {**before, **more}.items() if value is not None}
+
+
 @dataclass(frozen=True)
 class Source:
     """A table, its file, and the request for it."""
@@ -140,11 +157,18 @@ class Source:
         return found
 
     def error(
-        self, problem: str, remedy: str, channel: str | None = None, sample: int | None = None
+        self,
+        problem: str,
+        remedy: str = "",
+        channel: str | None = None,
+        sample: int | None = None,
+        options: Sequence[Mapping[str, Any]] = (),
     ) -> DataError:
         """Return the error for this file; a sample, counted from 0, is given by its row."""
         row = None if sample is None else self.table.row(sample)
-        return DataError(problem, remedy=remedy, file=self.path, channel=channel, row=row)
+        return DataError(
+            problem, remedy=remedy, options=options, file=self.path, channel=channel, row=row
+        )
 
     def warn(self, text: str, *, quiet: bool = False) -> None:
         """Issue a `DataWarning` about this file, unless ``quiet``, and note it."""

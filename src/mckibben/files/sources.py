@@ -223,8 +223,8 @@ def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Re
     for at, (path, table) in enumerate(each):
         if timed:
             source = Source(table, request, path)
-            clock = times_of(clocks[at], source)
-            seconds.append(convert(timebase.increasing(clock.values, source), clock.unit, "s"))
+            clock = timebase.increasing(times_of(clocks[at], source), source)
+            seconds.append(convert(clock.values, clock.unit, "s"))
         else:
             samples = np.arange(table.n_samples, dtype=np.float64)
             seconds.append(table.start_time + (table.sample_time or 0.0) * samples)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from mckibben.files.headers import snake_case
 from mckibben.files.notices import listed
 from mckibben.files.quality import wraps
 from mckibben.files.request import Source
+from mckibben.files.units import convert
 
 Spans = NDArray[np.intp]
 """Start and stop of each span of samples, stop excluded, shape (m, 2)."""
@@ -27,8 +29,28 @@ RATES = ("fs", "Fs", "sample_rate", "sampling_frequency")
 STEPS = ("Ts", "dt", "sample_time")
 """Names of scalars that are sample times [s]."""
 
-_SINCE_1970 = {"ms": (1e12, 4.2e12), "us": (1e15, 4.2e15), "ns": (1e18, 4.2e18)}
-"""Unit -> range of times since 1970 in that unit, for the years 2001 to 2103."""
+_SINCE_1970 = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+"""Units of times since 1970, and how many are a second."""
+
+_YEARS_2001_TO_2103 = (1e9, 4.2e9)
+"""Seconds since 1970."""
+
+
+@dataclass(frozen=True)
+class Times:
+    """Times in their original unit, with the recorded digits.
+
+    The unit is ``certain`` where it was requested or is not the second.
+    """
+
+    values: Array
+    unit: str = "s"
+    certain: bool = True
+    assumed: bool = False
+
+    def seconds(self, duration: float) -> float:
+        """Return a time or duration in this unit in seconds."""
+        return float(convert(np.array([duration]), self.unit, "s")[0])
 
 
 class Step(NamedTuple):
@@ -42,7 +64,7 @@ class Step(NamedTuple):
     jitter: tuple[float, float] | None
 
 
-def increasing(time: Array, source: Source) -> Array:
+def increasing(times: Times, source: Source) -> Times:
     """Return strictly increasing times; counters that wrap are unwrapped, with a note.
 
     Raises
@@ -50,6 +72,7 @@ def increasing(time: Array, source: Source) -> Array:
     DataError
         If a time is missing, is repeated or decreases; names the row.
     """
+    time = times.values
     missing = np.flatnonzero(~np.isfinite(time))
     if missing.size:
         problem = f"the time is missing in {missing.size} row(s)"
@@ -64,14 +87,25 @@ def increasing(time: Array, source: Source) -> Array:
     steps = np.diff(time)
     wrong = np.flatnonzero(steps <= 0)
     if not wrong.size:
-        return time
+        return replace(times, values=time)
     first = int(wrong[0])
     problem = f"the time goes back from {time[first]:.10g} to {time[first + 1]:.10g}"
-    remedy = "split the file there, or sort its rows by time"
+    remedy, options = "split the file there, or sort its rows by time", []
     if steps[first] == 0:
         problem = f"the time {time[first]:.10g} is repeated"
-        remedy = "delete the repeated row; or, if times were rounded when saved, give `rate`"
-    raise source.error(problem, remedy, "time", first + 1)
+        remedy = "delete the repeated row"
+        options = [{"sample_time": step} for step in _of_rounded(times)]
+    raise source.error(problem, remedy, "time", first + 1, options)
+
+
+def _of_rounded(times: Times) -> Iterator[float]:
+    """Yield the sample time [s] of times that were rounded when they were saved."""
+    time = times.values
+    mean = (time[-1] - time[0]) / (time.size - 1)
+    for size in _shortest_first(mean) if mean > 0 else ():
+        if agrees(time, size):
+            yield times.seconds(size)
+            return
 
 
 def stated_step(source: Source) -> float | None:
@@ -136,27 +170,41 @@ def unit_by_size(time: Array, source: Source) -> str | None:
             f"the times have no unit; {time[0]:.12g} and the short steps may be days, as "
             "spreadsheets count them, or seconds"
         )
-        raise source.error(problem, "use `units[time]=day` or `units[time]=s`", "time", 0)
-    for unit, (first, last) in _SINCE_1970.items():
-        if first <= low and high < last:
+        raise source.error(problem, "", "time", 0, _time_units("day", "s"))
+    first, last = _YEARS_2001_TO_2103
+    for unit, per_second in _SINCE_1970.items():
+        if first <= low / per_second and high / per_second < last:
             source.warn(
                 f"the times have no unit; by their size they are counted in {unit} since 1970; "
                 "use `units[time]=UNIT` where that is wrong"
             )
             return unit
-    step = float(np.median(steps))
-    if step >= 1 and np.array_equal(time, np.rint(time)):
-        raise doubtful_unit("it has no unit and counts in whole numbers", step, source)
+    if np.median(steps) >= 1 and np.array_equal(time, np.rint(time)):
+        raise doubtful_unit("it has no unit and counts in whole numbers", time, source)
     return None
 
 
-def doubtful_unit(problem: str, step: float, source: Source) -> DataError:
-    """Return the error for times of uncertain unit; suggest units with steps of 0.1 ms to 5 s."""
-    seconds = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-    plausible = [unit for unit, scale in seconds.items() if 1e-4 <= scale * step <= 5.0] or ["ms"]
-    options = " or ".join(f"`units[time]={unit}`" for unit in plausible)
-    remedy = f"name its unit, as in {options}, or `units[time]=s` if that is right"
-    return source.error(f"{problem}: is it in {' or '.join(plausible)}?", remedy, "time", 0)
+def doubtful_unit(problem: str, time: Array, source: Source) -> DataError:
+    """Return the error for times of uncertain unit, or of none."""
+    plausible = plausible_units(time)
+    text = f"{problem}: is it in {' or '.join(plausible)}?"
+    return source.error(text, "", "time", 0, _time_units(*dict.fromkeys([*plausible, "s"])))
+
+
+def plausible_units(time: Array) -> list[str]:
+    """Return units in which steps are from 0.1 ms to 5 s; first those in which it all is 2 s to a day.
+
+    >>> plausible_units(np.arange(600.0)), plausible_units(20 * np.arange(600.0))
+    (['s', 'ms'], ['ms'])
+    """
+    step, duration = float(np.median(np.diff(time))), float(time[-1] - time[0])
+    sizes = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+    units = [unit for unit, size in sizes.items() if 1e-4 <= size * step <= 5.0]
+    return sorted(units, key=lambda unit: not 2.0 <= sizes[unit] * duration <= 86_400.0) or ["ms"]
+
+
+def _time_units(*units: str) -> list[dict[str, dict[str, str]]]:
+    return [{"units": {"time": unit}} for unit in units]
 
 
 def resolution(time: Array) -> float:

@@ -1,0 +1,83 @@
+"""Remedies of errors of reading: each set of options is tried before it is offered."""
+
+from __future__ import annotations
+
+import copy
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from mckibben.errors import DataError
+from mckibben.files.headers import unit_of
+from mckibben.files.notices import noted
+from mckibben.files.request import Request
+
+STEPS = 3
+"""Remedies that a reading may need, one after the other."""
+
+Named = Mapping[str, str]
+"""Header of a column -> the channel that it is read as."""
+
+Attempt = Callable[[Request], Named]
+"""Reads with a request; raises a `DataError` where that fails."""
+
+
+def offering(error: DataError, request: Request, before: Named, attempt: Attempt) -> DataError:
+    """Return an error with those of its options with which a reading succeeds, in their order.
+
+    Nothing else may change: columns that the options do not name are the channels that they are
+    ``before``, if standard ones. Where an option leads to another question that has a single answer,
+    that is added to it. Where none succeeds, those are offered that lead to an error of another kind
+    without options: what is wrong then has to be mended in the file.
+    """
+    if not error.options:
+        return error
+
+    def works(changed: Request) -> bool:
+        after = attempt(changed)
+        meant = {*changed.columns, *changed.units, *changed.columns.values()}
+        for header, channel in before.items():
+            standard = unit_of(channel) is not None and not meant & {header, channel}
+            if standard and after.get(header) != channel:
+                return False
+        return True
+
+    found = list(_outcomes(error, request, works, STEPS))
+    successes = [options for options, end in found if end is None]
+    offered = copy.copy(error)
+    offered.options = tuple(successes or [options for options, _ in found])
+    return offered
+
+
+def _outcomes(
+    error: DataError, request: Request, works: Callable[[Request], bool], steps: int
+) -> Iterator[tuple[Mapping[str, Any], DataError | None]]:
+    """Yield the options of an error that lead on, each with the error that remains, or None."""
+    for options in error.options:
+        try:
+            changed = request.changed(options)
+            with warnings.catch_warnings(), noted():
+                warnings.simplefilter("ignore")
+                if works(changed):
+                    yield options, None
+        except DataError as further:
+            if (further.channel, further.problem) == (error.channel, error.problem):
+                continue
+            if not further.options:
+                yield options, further
+            elif steps > 1:
+                later = list(_outcomes(further, changed, works, steps - 1))
+                answers = [more for more, end in later if end is None]
+                if answers:
+                    yield _both(options, answers[0]) if len(answers) == 1 else options, None
+                elif later:
+                    yield options, later[0][1]
+
+
+def _both(options: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options with more of them; mappings of one name are merged."""
+    both: dict[str, Any] = {**options, **more}
+    for name in options.keys() & more.keys():
+        if isinstance(more[name], Mapping):
+            both[name] = {**options[name], **more[name]}
+    return both

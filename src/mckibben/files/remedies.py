@@ -58,8 +58,7 @@ def _outcomes(
             changed = request.changed(options)
             with warnings.catch_warnings(), noted():
                 warnings.simplefilter("ignore")
-                if works(changed):
-                    yield options, None
+                nothing_else = works(changed)
         except DataError as further:
             if (further.channel, further.problem) == (error.channel, error.problem):
                 continue
@@ -72,6 +71,9 @@ def _outcomes(
                     yield _both(options, answers[0]) if len(answers) == 1 else options, None
                 elif later:
                     yield options, later[0][1]
+            continue
+        if nothing_else:
+            yield options, None
 
 
 def _both(options: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,17 +1,108 @@
-"""Channels with separate times, resampled to the slowest requested one."""
+"""Channels that were not sampled together: found, and put on the times of the slowest requested one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array
+from mckibben.channels import ALONG, PULLS, TURNED
 from mckibben.files.headers import unit_of
 from mckibben.files.request import Source
 from mckibben.files.table import Column
 from mckibben.files.timebase import GAP
+
+Spots = NDArray[np.intp]
+"""Rows, counted from 0."""
+
+FEWEST_RENEWALS = 20
+"""Changes of a channel by which the rate at which it is renewed is recognised."""
+
+REGULAR = 0.9
+"""Share of the changes of a channel that are on a grid of its own, at least."""
+
+CAUSES = ("pressure", "voltage", "command")
+"""Quantities that drive muscles, and may be held for several rows as they were commanded."""
+
+
+def apart(named: Mapping[str, Column], time: Array) -> tuple[dict[str, Column], dict[str, float]]:
+    """Return columns with times of their own where not all were sampled in every row.
+
+    Either rows are messages, most of which lack a channel; or an output keeps its value for several
+    rows while the drive changes, as a slow sensor in the file of a fast logger.
+
+    Parameters
+    ----------
+    named : mapping of str to Column
+        Of one length.
+    time : ndarray, shape (n,)
+        Times of the rows [s], increasing, but rows of different channels may have the same.
+
+    Returns
+    -------
+    named : dict of str to Column
+    renewed : dict of str to float
+        Channel -> the rows after which it is renewed, of the second kind.
+    """
+    numbers = {
+        name: column.values
+        for name, column in named.items()
+        if name != "time" and column.values is not None and column.flaw is None
+    }
+    there = {name: np.flatnonzero(np.isfinite(values)) for name, values in numbers.items()}
+    there = {name: rows for name, rows in there.items() if rows.size}
+    complete = reduce(np.intersect1d, there.values()) if there else np.arange(time.size)
+    renewed: dict[str, float] = {}
+    if complete.size < time.size / 2:
+        rows = there
+    else:
+        drives = [values for name, values in numbers.items() if name.partition("_")[0] in CAUSES]
+        found = {name: _renewals(x, drives) for name, x in numbers.items() if _is_output(name)}
+        rows = {name: at for name, at in found.items() if at is not None}
+        renewed = {name: time.size / at.size for name, at in rows.items()}
+    if not rows:
+        return dict(named), {}
+    columns = {name: column for name, column in named.items() if name != "time"}
+    for name, values in numbers.items():
+        at = rows.get(name, np.arange(time.size))
+        columns[name] = replace(columns[name], values=values[at], times=time[at])
+    return columns, renewed
+
+
+def _is_output(channel: str) -> bool:
+    return channel.partition("_")[0] in (*ALONG, *TURNED, *PULLS)
+
+
+def _renewals(values: Array, drives: Sequence[Array]) -> Spots | None:
+    """Return the rows in which a slow sensor was read, or None for one that was read in every row.
+
+    Its changes are on a grid of more than one row, unlike each other in size, as those of a coarse
+    one are not, and a drive changes in the rows between.
+    """
+    steps = np.diff(values)
+    changes = np.flatnonzero(steps) + 1
+    if changes.size < FEWEST_RENEWALS or not drives:
+        return None
+    sizes, apart = np.abs(steps[changes - 1]), np.diff(changes)
+    usual = float(np.median(apart))
+    pitch = float(apart[apart <= 1.5 * usual].mean())
+    missed = np.maximum(1.0, np.rint(apart / pitch))
+    on_grid = np.abs(apart - pitch * missed) < min(1.0, 0.25 * pitch)
+    coarse = np.median(sizes) < 1.5 * np.quantile(sizes, 0.05)
+    held = np.delete(np.arange(steps.size), changes - 1)
+    driven = max(float(np.mean(np.diff(drive)[held] != 0)) for drive in drives) if held.size else 0
+    if pitch < 1.5 or np.mean(on_grid) < REGULAR or coarse or driven < 0.5:
+        return None
+    count = np.append(0.0, np.cumsum(missed))
+    inside = np.interp(np.arange(count[-1] + 1), count, changes)
+    before = changes[0] - pitch * np.arange(int(changes[0] / pitch), 0, -1)
+    after = changes[-1] + pitch * np.arange(1, int((values.size - 1 - changes[-1]) / pitch) + 1)
+    rows: Spots = np.rint(np.concatenate([before, inside, after])).astype(np.intp)
+    return rows
 
 
 def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Column], list[str]]:

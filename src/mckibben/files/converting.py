@@ -51,6 +51,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     """
     request, source = source.request, _with_clocks(source)
     columns, left_out = assign(source)
+    columns, source, sampled = _apart(columns, source)
     columns, dropped = clocks.on_one(columns, source)
     left_out |= dict.fromkeys(dropped, "it does not cover the times of the others")
     clock = columns.pop("time", None)
@@ -82,6 +83,8 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         ],
         "pressure_reference": references,
         "calibration": {name: one.calibration for name, one in each if one.calibration},
+        "assumed_units": [name for name, one in each if one.assumed and one.unit],
+        "sampled": sampled,
     }
     assumed = ["time in s"] if times is not None and times.assumed else []
     assumed += [f"{name} in {one.unit}" for name, one in each if one.assumed and one.unit]
@@ -138,6 +141,36 @@ def _with_clocks(source: Source) -> Source:
             values = None if column.values is None else column.values[known]
             columns.append(replace(column, values=values, times=seconds[known]))
     return replace(source, table=replace(table, columns=tuple(columns), lines=None))
+
+
+def _apart(
+    columns: dict[str, Column], source: Source
+) -> tuple[dict[str, Column], Source, dict[str, float]]:
+    """Return columns with times of their own where not all were sampled in every row.
+
+    Then the rates of slow sensors [Hz], by channel.
+    """
+    table, step, clock = source.table, source.request.step, columns.get("time")
+    if table.own or table.has_clocks or (clock is None and step is None):
+        return columns, source, {}
+    if step is not None:
+        seconds = step * np.arange(table.n_samples, dtype=np.float64)
+    elif clock is not None:
+        times = times_of(clock, source)
+        seconds = convert(times.values, times.unit, "s")
+    if not np.all(np.diff(seconds) >= 0):
+        return columns, source, {}
+    found, renewed = clocks.apart(columns, seconds)
+    if all(column.times is None for column in found.values()):
+        return columns, source, {}
+    rate = (seconds.size - 1) / (seconds[-1] - seconds[0])
+    sampled = {name: float(f"{rate / rows:.4g}") for name, rows in renewed.items()}
+    for name, rows in renewed.items():
+        source.warn(
+            f"channel {name!r} is renewed every {rows:.4g} rows, {sampled[name]:g} times a second, "
+            "so it is read at these rows"
+        )
+    return found, replace(source, table=replace(table, lines=None)), sampled
 
 
 def times_of(column: Column, source: Source) -> Times:

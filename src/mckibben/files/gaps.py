@@ -112,9 +112,10 @@ def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
         if n == missing.size:
             remedy = f"name a column that holds numbers with `columns[{name}]=COLUMN`"
             raise source.error("all of its samples are missing", remedy, name, 0)
-        if n and source.request.gaps == "error":
-            problem = f"{n} of {missing.size} samples are missing or not finite"
-            raise source.error(problem, "", name, int(np.argmax(missing)), _BRIDGED)
+        inside = _within(missing)
+        if inside.any() and source.request.gaps == "error":
+            problem = f"{inside.sum()} of {missing.size} samples are missing or not finite"
+            raise source.error(problem, "", name, int(np.argmax(inside)), _BRIDGED)
         found[name] = missing
     if not found:
         problem = "every column has samples missing"
@@ -122,17 +123,18 @@ def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
     return found
 
 
+def _within(missing: Mask) -> Mask:
+    """Return which missing samples have others before and after them."""
+    before = np.logical_or.accumulate(~missing)
+    after = np.logical_or.accumulate(~missing[::-1])[::-1]
+    return missing & before & after
+
+
 def _enclosed(missing: dict[str, Mask], source: Source) -> Mask:
     """Return where every channel has samples before and after, with a note on interpolation."""
-    inside = np.logical_and.reduce(
-        [
-            np.logical_or.accumulate(~mask) & np.logical_or.accumulate(~mask[::-1])[::-1]
-            for mask in missing.values()
-        ]
-    )
+    inside = np.logical_and.reduce([~mask | _within(mask) for mask in missing.values()])
     for name, mask in missing.items():
-        if mask.any():
-            n = (mask & inside).sum()
+        if n := (mask & inside).sum():
             source.warn(f"channel {name!r}: {n} missing sample(s) were interpolated")
     if not inside.all():
         source.warn(

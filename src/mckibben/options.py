@@ -253,6 +253,9 @@ class ReadOptions:
         Lines after it that are left out.
     encoding : str, optional
         Of a text, such as ``"cp932"``; default as found.
+    join : bool
+        Whether all recordings are one run: pieces with the same channels one after the other, or the
+        channels of several loggers, put on the times of the slowest.
     between : (float, float), optional
         Part of every recording [s].
     resample : float, optional
@@ -305,6 +308,9 @@ class ReadOptions:
     header: Annotated[int, Option("Line of a text with the names of columns.", "LINE")] = 0
     skip: Annotated[int, Option("Lines after the header that are left out.", "N")] = 0
     encoding: Annotated[str | None, Option("Encoding of a text. Default: as found.", "NAME")] = None
+    join: Annotated[bool, Option("Join pieces of one run, or the files of several loggers.")] = (
+        False
+    )
     between: Annotated[
         tuple[float | None, float | None] | None,
         Option("Part of every recording [s]; either may be left out.", "START:END", "", span),

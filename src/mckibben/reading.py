@@ -12,6 +12,7 @@ from mckibben.errors import DataError
 from mckibben.files.memory import Data, InMemory, items
 from mckibben.options import ReadOptions
 from mckibben.recording import Recording
+from mckibben.signals.lags import lags
 from mckibben.system.showing import Result
 
 if TYPE_CHECKING:
@@ -182,12 +183,13 @@ class Contents(Result):
                 "sample_time": one.sample_time,
                 "start_time": one.start_time,
                 "channels": {
-                    name: {"unit": one.units[name], "min": low, "max": high}
+                    name: {"unit": one.units[name], "min": low, "max": high, "lag": late.get(name)}
                     for name, (low, high) in one.ranges.items()
                 },
                 "meta": dict(one.meta),
             }
             for one in self.recordings
+            for late in [{name: one.step * lag.samples for name, lag in lags(one).items()}]
         ]
         read = {"files": plain(self.columns), "recordings": recordings}
         return {**read, "data_gaps": plain(self.gaps)}
@@ -210,7 +212,9 @@ def contents(
     named = [*_listed(inputs), *_listed(outputs)] or None
     recordings: list[Recording] = []
     columns: dict[str, list[Seen]] = {}
-    for one in items(data):
+    if reading.join:
+        recordings = read(data, reading, channels=named, informative=False)
+    for one in () if reading.join else items(data):
         if isinstance(one, Recording) or (isinstance(one, Path) and one.is_dir()):
             recordings += read(one, reading, channels=named, informative=False)
         else:

@@ -119,7 +119,7 @@ def test_a_thousand_files_are_read_rightly_or_refused_with_what_helps(
     for seed in range(part, 1000, PARTS):
         file = odd(seed, tmp_path)
         try:
-            found, options = followed(file)
+            found, _ = followed(file)
             if isinstance(found, Recording):
                 check(found, file)
             else:

@@ -54,8 +54,9 @@ MISSING = ["", "-", "--", "---", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "#N/A"
 MISSING += ["None", "inf", "-inf", "∞", "+∞", "-∞", "OL", "OVLD"]
 
 
-@pytest.mark.parametrize("cell", WORDS + MISSING)
-@pytest.mark.parametrize("at", [0, 7, N - 1])
+@pytest.mark.parametrize(
+    ("cell", "at"), [(c, k) for c in WORDS for k in (0, 7, N - 1)] + [(c, 7) for c in MISSING]
+)
 @pytest.mark.parametrize("header", ["t_s,pressure_bar,x_mm", "count,pressure_bar,force_N"])
 def test_a_cell_without_a_number_is_refused_by_its_row(
     tmp_path: Path, cell: str, at: int, header: str
@@ -66,6 +67,18 @@ def test_a_cell_without_a_number_is_refused_by_its_row(
         assert (error.channel, error.row) == ("pressure", at + 2)
         assert (cell if cell in WORDS else "1 of 400") in error.problem
         assert cell in WORDS or "gaps=interpolate" in error.remedy
+
+
+@pytest.mark.parametrize("rows", [[0, 1], [N - 1], [0, N - 2, N - 1]])
+def test_rows_before_a_channel_begins_and_after_it_ends_are_cut_off(
+    tmp_path: Path, rows: list[int]
+) -> None:
+    path = put(tmp_path / "a.csv", "t_s,pressure_bar,x_mm", T, changed(P, rows, np.nan), Y)
+    recording = one(path)
+    assert recording["pressure"].tolist() == np.delete(P, rows).tolist()
+    assert recording["displacement"].tolist() == np.delete(Y, rows).tolist()
+    assert len(recording.notes) == 1
+    assert "bridged" not in recording.meta
 
 
 def test_other_columns_with_such_cells_are_left_out(tmp_path: Path) -> None:

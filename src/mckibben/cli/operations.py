@@ -40,10 +40,11 @@ def operation_command(name: str) -> click.Command:
     progress = {"progress": True} if "progress" in parameters else {}
 
     def run(*, as_json: bool, **given: Any) -> int:
+        from mckibben.files.notices import observed
         from mckibben.report import text
 
         out = given.get("out")
-        with stoppable(out if operation.writes else None):
+        with stoppable(out if operation.writes else None), observed() as read:
             found = operation.run(**given, **progress)
             stop_short(found, out)
         about = {"folder" if operation.writes else "file": str(out)} if out else {}
@@ -51,7 +52,8 @@ def operation_command(name: str) -> click.Command:
             about |= found.to_dict()
         written = [out / one for one in operation.writes] if out and operation.writes else [out]
         notes = getattr(found, "notes", ())
-        show(about, lambda: () if found is None else text.shown(found), as_json, notes, written)
+        lines = () if found is None else text.shown(found)
+        show(about, lambda: lines, as_json, notes, written, read)
         return NO_RESULT if getattr(found, "failed", False) else 0
 
     return command_of(name, _help(operation.run), run, taken)

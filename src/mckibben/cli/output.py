@@ -6,11 +6,14 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mckibben.cli.parameters import as_command, as_flag, plainly
 from mckibben.errors import MckibbenError, in_terms_of
 from mckibben.system.atomic import to_json
+
+if TYPE_CHECKING:
+    from mckibben.recording import Recording
 
 INTERRUPTED = 130
 """Exit code of an interrupted command."""
@@ -86,8 +89,9 @@ def show(
     as_json: bool,
     notes: Iterable[str] = (),
     written: Sequence[object] = (),
+    read: Sequence[Recording] = (),
 ) -> None:
-    """Print a result: as JSON, or its lines, notes, and what was written.
+    """Print a result: as JSON, or what was read for it, its lines, notes, and what was written.
 
     Parameters
     ----------
@@ -99,7 +103,9 @@ def show(
     if as_json:
         say(to_json(result.to_dict() if hasattr(result, "to_dict") else result))
         return
-    for line in lines():
+    from mckibben.report.words import read_lines
+
+    for line in (*read_lines(read), *lines()):
         if line.startswith("Note: "):
             note(line.removeprefix("Note: "))
         else:

@@ -85,6 +85,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         "calibration": {name: one.calibration for name, one in each if one.calibration},
         "assumed_units": [name for name, one in each if one.assumed and one.unit],
         "sampled": sampled,
+        "began": None if times is None else times.began,
     }
     assumed = ["time in s"] if times is not None and times.assumed else []
     assumed += [f"{name} in {one.unit}" for name, one in each if one.assumed and one.unit]
@@ -176,7 +177,8 @@ def _apart(
 def times_of(column: Column, source: Source) -> Times:
     """Return the times in a column of numbers or dates."""
     if column.values is None:
-        return Times(instants.seconds(column.texts, source))
+        since, began = instants.seconds(column.texts, source)
+        return Times(since, began=began)
     values = _numbers("time", column, source)
     found, assumed = _unit("time", column, values, source)
     unit = found.name

@@ -17,7 +17,7 @@ from mckibben.recording import FEWEST_SAMPLES
 
 Channels = dict[str, Array]
 
-_BRIDGED = ({"gaps": "interpolate"}, {"gaps": "split"}, {"raw": True})
+GAPS_BRIDGED = ({"gaps": "interpolate"}, {"gaps": "split"}, {"raw": True})
 """Remedies of missing samples and of gaps."""
 
 
@@ -115,11 +115,11 @@ def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
         inside = _within(missing)
         if inside.any() and source.request.gaps == "error":
             problem = f"{inside.sum()} of {missing.size} samples are missing or not finite"
-            raise source.error(problem, "", name, int(np.argmax(inside)), _BRIDGED)
+            raise source.error(problem, "", name, int(np.argmax(inside)), GAPS_BRIDGED)
         found[name] = missing
     if not found:
         problem = "every column has samples missing"
-        raise source.error(problem, options=_BRIDGED)
+        raise source.error(problem, options=GAPS_BRIDGED)
     return found
 
 
@@ -150,7 +150,7 @@ def _judge_gaps(cuts: NDArray[np.intp], times: Times, source: Source) -> None:
     total = f"{len(cuts)} gap{'s' * (len(cuts) > 1)} in time, {lengths.sum():.6g} s in all"
     if source.request.gaps == "error":
         problem = f"there is a gap of {lengths[0]:.6g} s before this row ({total})"
-        raise source.error(problem, "", "time", int(cuts[0]), _BRIDGED)
+        raise source.error(problem, "", "time", int(cuts[0]), GAPS_BRIDGED)
     source.warn(f"bridged by straight lines: {total}")
 
 

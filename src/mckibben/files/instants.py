@@ -31,8 +31,8 @@ def may_be_instant(text: str) -> bool:
     return _BEGINNING.match(text) is not None
 
 
-def seconds(texts: Sequence[str], source: Source) -> Array:
-    """Return instants as seconds since the first.
+def seconds(texts: Sequence[str], source: Source) -> tuple[Array, str]:
+    """Return instants as seconds since the first, and the first as ISO 8601; a time of day has no date.
 
     Parameters
     ----------
@@ -76,7 +76,8 @@ def seconds(texts: Sequence[str], source: Source) -> Array:
     since: Array = (instants - instants[0]).astype(np.float64) * 1e-9
     if form is not None and form["first"] is None:  # times of day go on after midnight
         since[1:] += 86400.0 * np.cumsum(np.diff(since) < -43200.0)
-    return since
+    date = str(instants[0])
+    return since, date.partition("T")[2] if form is not None and form["first"] is None else date
 
 
 def _in_one_form(parts: Any, form: re.Match[str]) -> tuple[Any, list[str]]:

@@ -10,9 +10,11 @@ from contextvars import ContextVar
 from pathlib import Path
 
 from mckibben.errors import DataWarning
+from mckibben.recording import Recording
 
 _HERE = str(Path(__file__).parent)
 _NOTED: ContextVar[list[str] | None] = ContextVar("noted", default=None)
+_OBSERVED: ContextVar[list[Recording] | None] = ContextVar("observed", default=None)
 
 
 def listed(items: Sequence[str], most: int = 30) -> str:
@@ -30,6 +32,25 @@ def noted() -> Iterator[list[str]]:
         yield notes
     finally:
         _NOTED.reset(token)
+
+
+@contextmanager
+def observed() -> Iterator[list[Recording]]:
+    """Collect the recordings that are read within the context."""
+    recordings: list[Recording] = []
+    token = _OBSERVED.set(recordings)
+    try:
+        yield recordings
+    finally:
+        _OBSERVED.reset(token)
+
+
+def observe(recordings: list[Recording]) -> list[Recording]:
+    """Return recordings, which whoever observes what is read then has."""
+    seen = _OBSERVED.get()
+    if seen is not None:
+        seen += recordings
+    return recordings
 
 
 def warn(path: Path, text: str, *, quiet: bool = False) -> None:

@@ -18,8 +18,9 @@ from mckibben.files.channels import about
 from mckibben.files.choosing import Seen, named_in, seen
 from mckibben.files.converting import ASSUMED, in_package_units
 from mckibben.files.formats import MOST_BYTES
+from mckibben.files.joining import joined, pieces_of_one
 from mckibben.files.memory import Data, InMemory, items, table_of
-from mckibben.files.notices import noted
+from mckibben.files.notices import noted, observe, warn
 from mckibben.files.remedies import offering
 from mckibben.files.request import Request, Source
 from mckibben.files.table import Table
@@ -28,6 +29,7 @@ from mckibben.keywords import ReadKeywords
 from mckibben.options import ReadOptions, given_options
 from mckibben.recording import Recording
 from mckibben.signals import resample, zeroed
+from mckibben.signals.lags import comes_first, lags
 
 MAY_BE_HELD = frozenset(
     {"displacement", "length", "contraction", "angle", "velocity", "force", "temperature"}
@@ -106,11 +108,37 @@ def read(
             found.append(one)
         else:
             found += _read(one, request)[0]
-    return _prepared(found, chosen)
+    if chosen.join:
+        found = joined(found, request)
+    return observe(_prepared(_noted(found), chosen))
 
 
 def _request(options: ReadOptions, **more: Any) -> Request:
     return Request(**{one.name: getattr(options, one.name) for one in fields(options)}, **more)
+
+
+def _noted(recordings: list[Recording]) -> list[Recording]:
+    """Return recordings with notes on what continues another, or moves before what drives it."""
+    told: dict[int, list[str]] = {}
+    for before, after in pieces_of_one(recordings):
+        text = f"it begins where {before.name} ends; if both are one run, use `join`"
+        told.setdefault(id(after), []).append(text)
+    for one in recordings:
+        for name, late in lags(one).items():
+            if comes_first(late):
+                unit = "samples" if one.sample_time is None else "s"
+                text = (
+                    f"channel {name!r} moves {-late.samples * one.step:.3g} {unit} before "
+                    "what should drive it: columns are swapped, or clocks differ"
+                )
+                told.setdefault(id(one), []).append(text)
+    for one in recordings:
+        for text in told.get(id(one), ()):
+            warn(Path(one.source or one.name), text)
+    return [
+        one.with_meta(notes=[*one.notes, *told[id(one)]]) if id(one) in told else one
+        for one in recordings
+    ]
 
 
 def _prepared(recordings: list[Recording], options: ReadOptions) -> list[Recording]:

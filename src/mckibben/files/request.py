@@ -97,7 +97,7 @@ class Request(ReadOptions):
     @property
     def interprets(self) -> bool:
         """Whether an option of reading, and not of what is done then, is given."""
-        plain, done = ReadOptions(), ("between", "resample", "zero")
+        plain, done = ReadOptions(), ("join", "between", "resample", "zero")
         names = [one.name for one in fields(plain) if one.name not in done]
         return any(getattr(self, name) != getattr(plain, name) for name in names)
 

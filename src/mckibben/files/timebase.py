@@ -40,13 +40,15 @@ _YEARS_2001_TO_2103 = (1e9, 4.2e9)
 class Times:
     """Times in their original unit, with the recorded digits.
 
-    The unit is ``certain`` where it was requested or is not the second.
+    The unit is ``certain`` where it was requested or is not the second. ``began`` is the first instant
+    of dates.
     """
 
     values: Array
     unit: str = "s"
     certain: bool = True
     assumed: bool = False
+    began: str | None = None
 
     def seconds(self, duration: float) -> float:
         """Return a time or duration in this unit in seconds."""

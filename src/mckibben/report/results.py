@@ -17,6 +17,7 @@ from mckibben.report import interactive, model_subjects, reproduction, words
 from mckibben.report.builder import Equations, Figure, Item, Table, Text, Tile
 from mckibben.report.columns import columns_of_board
 from mckibben.report.drawing import POINTS
+from mckibben.signals.lags import lags
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
@@ -52,13 +53,20 @@ UNFOLDED = 30
 
 def recording(found: Recording) -> list[Item]:
     """Return the ranges of channels, and notes."""
+    sampled, late = found.meta.get("sampled", {}), lags(found)
     rows = [
-        [name, found.units[name] or "–", *(f"{end + 0.0:.6g}" for end in ends)]
+        [
+            name,
+            found.units[name] or "–",
+            *(f"{end + 0.0:.6g}" for end in ends),
+            sampled.get(name, found.sample_time and 1.0 / found.sample_time),
+            found.step * late[name].samples if name in late else None,
+        ]
         for name, ends in found.ranges.items()
     ]
     notes = reading_notes([found])
     return [
-        Table(["Channel", "Unit", "Lowest", "Highest"], rows),
+        Table(["Channel", "Unit", "Lowest", "Highest", "Rate [Hz]", "Lag [s]"], rows),
         Text(notes, "note", listed=True) if notes else None,
     ]
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from mckibben.files.notices import listed
 from mckibben.numerals import counted, numeral, percent
 from mckibben.recording import standard_unit
 
@@ -40,6 +41,9 @@ CHOICES = {
     "fit": ("fit RMSE", "the error on the fitted data, as there is no validation"),
 }
 """What a model may be chosen by: the heading of its figure, and in words. The test is not among them."""
+
+MOST_LINES = 5
+"""Most recordings that are listed in lines of their own, and columns in a line."""
 
 LEVEL = "not distinguished from the chosen model by this test: the interval of the difference contains 0"
 """Of a model that is `level`."""
@@ -626,6 +630,29 @@ def learned(found: Learned) -> list[str]:
             for name in found.rmse
         ),
     ]
+
+
+def read_lines(recordings: Sequence[Recording]) -> list[str]:
+    """Return a line on each of some recordings: channels, ranges, grid, and what was left out."""
+    latest = {(one.source, one.name): one for one in recordings}  # some are read twice
+    lines = [_read(one) for one in list(latest.values())[:MOST_LINES]]
+    more = list(latest.values())[MOST_LINES:]
+    samples = sum(map(len, more))
+    return [*lines, f"{len(more)} more recordings: {samples} samples in all"] if more else lines
+
+
+def _read(one: Recording) -> str:
+    before = dict(text.split(" from ", 1) for text in one.meta.get("converted_units", ()))
+    ranges = []
+    for name, ends in one.ranges.items():
+        low, high = (numeral(end + 0.0, 3) for end in ends)
+        was = f" (from {before[name].partition(' to ')[0]})" if name in before else ""
+        ranges.append(f"{name} {low} to {high} {one.units[name]}".rstrip() + was)
+    grid = "no time" if one.sample_time is None else f"{one.sample_time:g} s apart"
+    long = "" if one.duration is None else f", {numeral(one.duration, 3)} s"
+    left = one.meta.get("ignored_columns", ())
+    unread = f"; not read: {listed(left, MOST_LINES)}" if left else ""
+    return f"{one.name}: {listed(ranges, 8)}; {len(one)} samples {grid}{long}{unread}"
 
 
 def duration(recording: Recording) -> str:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.channels import by_name
 from mckibben.recording import Recording
 
 LONGEST = 2**15
@@ -61,7 +62,8 @@ def lag(cause: Array, effect: Array, sign: float = 0.0) -> Lag:
     (7, True)
     """
     every = -(-cause.size // LONGEST)
-    x, y = (some[::every] - some[::every].mean() for some in (cause, effect))
+    x, y = (some[::every] / np.abs(some).max() for some in (cause, effect))
+    x, y = x - x.mean(), y - y.mean()
     n, size = x.size, 2 * x.size
     product = np.fft.rfft(y, size) * np.fft.rfft(x, size).conj()
     reach = max(1, int(WIDEST * n))
@@ -79,13 +81,13 @@ def lag(cause: Array, effect: Array, sign: float = 0.0) -> Lag:
     return Lag(float(late), float(found[at]), float(found[reach:].max()))
 
 
-def lags(recording: Recording, drives: tuple[str, ...]) -> dict[str, Lag]:
+def lags(recording: Recording) -> dict[str, Lag]:
     """Return the lag of every other channel that varies behind its drive, where both are known.
 
     The drive of ``displacement_2`` is ``pressure_2``, or the only one.
     """
     moving = {name: x for name, x in recording.channels.items() if np.ptp(x) > 0}
-    drives = tuple(name for name in drives if name in moving)
+    drives = [name for name in by_name([recording])[0] if name in moving]
     found = {}
     for name, samples in moving.items():
         quantity, _, number = name.partition("_")

@@ -43,6 +43,7 @@ def study(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
+    from mckibben.files.notices import observed
     from mckibben.outputs import unfinished
     from mckibben.recording import notes_by_file
     from mckibben.report import results, text
@@ -54,7 +55,7 @@ def study(
             live = unfinished(out) / "report.html"
             say(f"Report so far, updated with every model: {live}\n", flush=True)
 
-    with stoppable(out):
+    with stoppable(out), observed() as read:
         found = workflow.study(
             files,
             test,
@@ -75,4 +76,5 @@ def study(
         as_json,
         found.leaderboard.notes,
         written=[out / "report.html"],
+        read=read,
     )

@@ -25,6 +25,7 @@ class ReadKeywords(TypedDict, total=False):
     header: int
     skip: int
     encoding: str | None
+    sheet: str | None
     between: tuple[float | None, float | None] | None
     resample: float | None
     zero: Sequence[str]

@@ -253,6 +253,8 @@ class ReadOptions:
         Lines after it that are left out.
     encoding : str, optional
         Of a text, such as ``"cp932"``; default as found.
+    sheet : str, optional
+        Of a spreadsheet; default that with the most rows of numbers.
     between : (float, float), optional
         Part of every recording [s].
     resample : float, optional
@@ -305,6 +307,9 @@ class ReadOptions:
     header: Annotated[int, Option("Line of a text with the names of columns.", "LINE")] = 0
     skip: Annotated[int, Option("Lines after the header that are left out.", "N")] = 0
     encoding: Annotated[str | None, Option("Encoding of a text. Default: as found.", "NAME")] = None
+    sheet: Annotated[
+        str | None, Option("Sheet of a spreadsheet. Default: the one with most numbers.", "NAME")
+    ] = None
     between: Annotated[
         tuple[float | None, float | None] | None,
         Option("Part of every recording [s]; either may be left out.", "START:END", "", span),

@@ -1,0 +1,160 @@
+"""Lines of samples in a text table: those that are none are left out, counted and noted."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.errors import DataError
+from mckibben.files.headers import is_clock, parse
+from mckibben.files.instants import may_be_instant
+from mckibben.files.notices import warn
+from mckibben.files.sniffing import Layout
+from mckibben.files.units import find
+
+MOST = 0.1
+"""Largest share of lines with digits that are no samples; a file with more is refused."""
+
+
+def samples(rows: Sequence[bytes], layout: Layout, path: Path) -> tuple[list[int], list[bytes]]:
+    """Return the numbers of the lines of samples, counted from 1, and their text.
+
+    Blank lines, comments and what is below the table are left out; so are words and lines that were
+    cut off, but of samples without times, which become missing samples; and exact repeats of a row.
+
+    Raises
+    ------
+    DataError
+        If there are none, a quotation mark is not closed, or too many have other numbers of cells.
+    """
+    numbers, timed = _filled(rows, layout, path), _is_timed(rows, layout)
+    lines = [rows[number - 1] for number in numbers]
+    counts = _counts(lines, numbers, layout, path)
+    wrong = (counts > len(layout.headers)) | (counts < layout.least)
+    mark = re.escape((layout.dialect.separator or " ").encode())
+    begins = re.compile(rb'[ "]*(?:[-+.]?\d|%s)' % mark).match
+    number = np.array([begins(line) is not None for line in lines])
+    end = _end(lines, numbers, number & ~wrong, path)
+    numbers, lines, number = numbers[:end], lines[:end], number[:end]
+    wrong, counts = wrong[:end], counts[:end]
+    if 2 * number.sum() >= number.size:
+        wrong[[k for k in np.flatnonzero(~number) if _is_of_words(lines[k], layout)]] = True
+    if wrong.any():
+        _refuse_many(wrong, lines, numbers, counts, layout, path)
+        lost = np.flatnonzero(wrong & number & (not timed))
+        for k in lost:
+            lines[k] = (layout.dialect.separator or " ").encode().join([b"nan"] * layout.least)
+            wrong[k] = False
+        _note(lost, "damaged, and read as missing samples", rows, numbers, path)
+        _note(np.flatnonzero(wrong), "no samples, and left out", rows, numbers, path)
+    alike = [timed and k > 0 and lines[k] == lines[k - 1] for k in range(len(lines))]
+    _note(np.flatnonzero(alike), "the same as the row before, and left out", rows, numbers, path)
+    keep = np.flatnonzero(~wrong & ~np.array(alike, dtype=bool))
+    if keep.size < len(lines):
+        numbers, lines = [numbers[k] for k in keep], [lines[k] for k in keep]
+    if numbers[-1] - numbers[0] >= len(numbers) and not timed:
+        warn(path, "lines between samples are left out: without times, what follows moves up")
+    return numbers, lines
+
+
+def _filled(rows: Sequence[bytes], layout: Layout, path: Path) -> list[int]:
+    """Return the numbers of the lines that are not blank, nor comments, nor separators at the end."""
+    separator = (layout.dialect.separator or " ").encode()
+    blanks = rb" \v\f" if separator == b"\t" else rb" \t\v\f"
+    skipped = re.compile(rb"[%s]*(?:$|%s)" % (blanks, layout.dialect.comment.encode())).match
+    below = rows[layout.first : layout.stop]
+    numbers = [k for k, row in enumerate(below, layout.first + 1) if not skipped(row)]
+    while numbers and not rows[numbers[-1] - 1].strip(b' \t\v\f"' + separator):
+        numbers.pop()
+    if not numbers:
+        remedy = "give a file with samples"
+        raise DataError("there is a header and no samples", file=path, remedy=remedy)
+    return numbers
+
+
+def _counts(
+    lines: Sequence[bytes], numbers: Sequence[int], layout: Layout, path: Path
+) -> NDArray[np.int64]:
+    """Return the number of cells of every line."""
+    joined, separator = b"\n".join(lines), layout.dialect.separator
+    if b'"' in joined:
+        lines = re.sub(rb'"[^"\n]*"', b"_", joined).split(b"\n")
+        for number, line in zip(numbers, lines, strict=True):
+            if b'"' in line:
+                problem, remedy = "a quotation mark is not closed", "write no line breaks in cells"
+                raise DataError(problem, file=path, row=number, remedy=remedy)
+    if separator is None:
+        return np.array([len(line.split()) for line in lines])
+    mark = separator.encode()
+    return np.array([line.count(mark) + 1 for line in lines])
+
+
+def _end(
+    lines: Sequence[bytes], numbers: Sequence[int], sound: NDArray[np.bool_], path: Path
+) -> int:
+    """Return the number of lines before words behind a blank line, such as "Maximum", with a note.
+
+    Unless a good part of the samples follows.
+    """
+    named = re.compile(rb"[\s\"]*[A-Za-z\x80-\xff]").match
+    behind = np.flatnonzero(np.diff(numbers) > 1) + 1
+    so_far = np.cumsum(sound)
+    for at in map(int, behind) if not named(lines[0]) else ():
+        if named(lines[at]) and so_far[-1] - so_far[at] <= MOST * so_far[at]:
+            rest = lines[at].decode("utf-8", "replace")
+            warn(path, f"from row {numbers[at]} on it is no table, left out: {rest[:60]!r}")
+            return at
+    return len(lines)
+
+
+def _is_of_words(line: bytes, layout: Layout) -> bool:
+    """Return whether a line begins with a word and has more words than numbers."""
+    cells = layout.dialect.split(line.decode("utf-8", "replace"), len(layout.headers))
+    first = next(filter(None, cells), "")
+    return layout.dialect.balance([first]) < 0 and layout.dialect.balance(cells) < 0
+
+
+def _refuse_many(
+    wrong: NDArray[np.bool_],
+    lines: Sequence[bytes],
+    numbers: Sequence[int],
+    counts: NDArray[np.int64],
+    layout: Layout,
+    path: Path,
+) -> None:
+    """Raise an error if many lines with digits are no samples."""
+    digits = [int(k) for k in np.flatnonzero(wrong) if re.search(rb"\d", lines[k])]
+    if len(digits) <= max(1, MOST * len(lines)) and not wrong.all():
+        return
+    at = digits[0] if digits else 0
+    problem = f"there are {counts[at]} cells where the header has {len(layout.headers)}"
+    if len(digits) > 1:
+        problem += f", and so in {len(digits)} of {len(lines)} lines"
+    remedy = "complete or delete such lines, or give the line of names with `header`"
+    raise DataError(problem, file=path, row=numbers[at], remedy=remedy)
+
+
+def _note(
+    some: Sequence[int] | NDArray[np.intp],
+    what: str,
+    rows: Sequence[bytes],
+    numbers: Sequence[int],
+    path: Path,
+) -> None:
+    if len(some):
+        number = numbers[some[0]]
+        text = " ".join(rows[number - 1].decode("utf-8", "replace").split())[:60]
+        warn(path, f"{len(some)} line(s) are {what}, the first in row {number}: {text!r}")
+
+
+def _is_timed(rows: Sequence[bytes], layout: Layout) -> bool:
+    """Return whether a column has times, by its name, its unit, or its cells."""
+    units = zip(layout.headers, layout.units, strict=True)
+    found = [find(text) for h, u in units if (text := u or parse(h).unit)]
+    cells = layout.dialect.split(rows[layout.first].decode("utf-8", "replace"))
+    seconds = any(unit is not None and unit.target == "s" for unit in found)
+    return seconds or any(map(is_clock, layout.headers)) or any(map(may_be_instant, cells))

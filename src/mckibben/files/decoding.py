@@ -14,8 +14,14 @@ _ENCODINGS = ("cp1252", "cp932", "gb18030", "cp949", "latin-1")
 _LOOKED_AT = 2**16  # bytes by which the encoding is recognised
 _CONTROL = bytes([*range(0x09), *range(0x0E, 0x20), 0x7F])
 _ESCAPE = re.compile(rb"\x1b(?:\[[0-9;?]*[ -/]*[@-~]|\][^\x07\x1b\n]*(?:\x07|\x1b\\)|[@-Z\\^_])")
-_WITHIN = re.compile(rb"(?<=[0-9.,])[\x00-\x06\x08\x0e-\x1f\x7f]+(?=[0-9.eE+-])")
-_MOST = 0.02  # share of control characters in a text
+_TERMINAL = b"\0\x07\b\x1b"
+_WITHIN = re.compile(  # a number, or where one may have been
+    rb"(?<=[0-9.,])[\0\x08]+(?=[0-9.eE+-])|(?<=[0-9.,;\t ])[\x01-\x06\x0e-\x1f\x7f]+(?=[0-9.,;\t ])"
+)
+_MOST, _MOST_OTHERS = (
+    0.2,
+    0.005,
+)  # shares of a text: of what terminals write, and of other characters
 
 
 def decoded(data: bytes, path: Path) -> bytes:
@@ -26,8 +32,9 @@ def decoded(data: bytes, path: Path) -> bytes:
     DataError
         For binary data.
     """
-    if data.endswith(bytes(4)):  # what a logger reserved
-        data = data.rstrip(b"\0")
+    if data.endswith(bytes(4)) and data.strip(b"\0"):  # what a logger reserved
+        n_zeros = len(data) - len(data := data.rstrip(b"\0"))
+        warn(path, f"{n_zeros} zero bytes at the end are left out")
     start = data[:_LOOKED_AT]
     zeros = [start[at::2].count(0) * 4 > len(start) for at in (0, 1)]
     wide = "utf-16-be" if zeros[0] else "utf-16-le" if zeros[1] else "utf-8"
@@ -43,8 +50,10 @@ def decoded(data: bytes, path: Path) -> bytes:
 def _printable(data: bytes, path: Path) -> bytes:
     """Return a text without control characters; a number with one within is marked as damaged."""
     text = _ESCAPE.sub(b"", data)
-    plain = text.translate(None, _CONTROL)
-    if not plain.strip() or len(text) - len(plain) > max(8, _MOST * len(text)):
+    others = text.translate(None, _TERMINAL)
+    plain = others.translate(None, _CONTROL)
+    n_others, n = len(others) - len(plain), len(text)
+    if not plain.strip() or n_others > max(4, _MOST_OTHERS * n) or n - len(plain) > _MOST * n:
         better = "give the file the ending of its format, or export it as CSV"
         raise DataError("this is not text", file=path, remedy=better)
     controls = [line != line.translate(None, _CONTROL) for line in data.split(b"\n")]

@@ -21,7 +21,7 @@ def keyed(data: bytes) -> Found | None:
     >>> keyed(b"p:1.20,d:3.4")[1].headers
     ['p', 'd']
     """
-    start = [_pairs(line) for line in data[: 2**16].split(b"\n")[:400] if line.strip()]
+    start = [_pairs(line) for line in data[: 2**16].split(b"\n") if line.strip()]
     named = [tuple(one) for one in start if one]
     names = max(named, key=named.count, default=())
     if not names or 2 * named.count(names) <= len(start):
@@ -33,6 +33,8 @@ def keyed(data: bytes) -> Found | None:
             first = at if first < 0 else first
             comma |= any(re.match(r"[-+]?\d*,\d", cell) is not None for cell in found.values())
             rows[at] = "\t".join(found.values()).encode()
+        elif row.strip():
+            rows[at] += b"\t" * len(names)  # more cells than a sample has
     dialect = Dialect("\t", "," if comma else ".")
     return rows, Layout(dialect, [*names], [None] * len(names), first, len(names))
 
@@ -41,7 +43,9 @@ def _pairs(row: bytes) -> dict[str, str] | None:
     """Return name -> text of a line of such pairs, which an instant may precede; None for others."""
     line = row.decode("utf-8", "replace").replace('"', "").strip("{};,| \t")
     before, *parts = re.split(r"(?:^|[,;|\s]+)([^\W\d][^\s:=,;|]*)\s*[:=]\s*", line)
-    found = dict(zip(parts[::2], parts[1::2], strict=True))
+    found = {
+        name: " ".join(cell.split()) for name, cell in zip(parts[::2], parts[1::2], strict=True)
+    }
     before = before.strip().removesuffix("->").strip()
     if not found or len(parts) > 2 * len(found) or (before and not may_be_instant(before)):
         return None

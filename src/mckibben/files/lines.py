@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,32 +34,39 @@ def samples(rows: Sequence[bytes], layout: Layout, path: Path) -> tuple[list[int
     """
     numbers, timed = _filled(rows, layout, path), _is_timed(rows, layout)
     lines = [rows[number - 1] for number in numbers]
-    counts = _counts(lines, numbers, layout, path)
+    counts, begins = _measured(lines, numbers, layout, path)
     wrong = (counts > len(layout.headers)) | (counts < layout.least)
-    mark = re.escape((layout.dialect.separator or " ").encode())
-    begins = re.compile(rb'[ "]*(?:[-+.]?\d|%s)' % mark).match
-    number = np.array([begins(line) is not None for line in lines])
-    end = _end(lines, numbers, number & ~wrong, path)
-    numbers, lines, number = numbers[:end], lines[:end], number[:end]
-    wrong, counts = wrong[:end], counts[:end]
-    if 2 * number.sum() >= number.size:
-        wrong[[k for k in np.flatnonzero(~number) if _is_of_words(lines[k], layout)]] = True
+    end = _end(lines, numbers, begins & ~wrong, path)
+    numbers, lines, begins, wrong = numbers[:end], lines[:end], begins[:end], wrong[:end]
+    if 2 * begins.sum() >= begins.size:
+        wrong[[k for k in np.flatnonzero(~begins) if _is_of_words(lines[k], layout)]] = True
     if wrong.any():
         _refuse_many(wrong, lines, numbers, counts, layout, path)
-        lost = np.flatnonzero(wrong & number & (not timed))
+        lost = np.flatnonzero(wrong & begins) if not timed else np.array([], dtype=int)
         for k in lost:
             lines[k] = (layout.dialect.separator or " ").encode().join([b"nan"] * layout.least)
-            wrong[k] = False
         _note(lost, "damaged, and read as missing samples", rows, numbers, path)
+        wrong[lost] = False
         _note(np.flatnonzero(wrong), "no samples, and left out", rows, numbers, path)
-    alike = [timed and k > 0 and lines[k] == lines[k - 1] for k in range(len(lines))]
-    _note(np.flatnonzero(alike), "the same as the row before, and left out", rows, numbers, path)
-    keep = np.flatnonzero(~wrong & ~np.array(alike, dtype=bool))
-    if keep.size < len(lines):
-        numbers, lines = [numbers[k] for k in keep], [lines[k] for k in keep]
-    if numbers[-1] - numbers[0] >= len(numbers) and not timed:
-        warn(path, "lines between samples are left out: without times, what follows moves up")
+        numbers, lines = _without(wrong, numbers, lines)
+    if timed:
+        again = np.array([False, *map(operator.eq, lines[1:], lines)])
+        _note(
+            np.flatnonzero(again), "the same as the row before, and left out", rows, numbers, path
+        )
+        numbers, lines = _without(again, numbers, lines)
+    elif numbers[-1] - numbers[0] >= len(numbers):
+        warn(path, "blank or other lines are left out: without times, what follows moves up")
     return numbers, lines
+
+
+def _without(
+    some: NDArray[np.bool_], numbers: list[int], lines: list[bytes]
+) -> tuple[list[int], list[bytes]]:
+    if not some.any():
+        return numbers, lines
+    keep = np.flatnonzero(~some)
+    return [numbers[k] for k in keep], [lines[k] for k in keep]
 
 
 def _filled(rows: Sequence[bytes], layout: Layout, path: Path) -> list[int]:
@@ -76,21 +84,28 @@ def _filled(rows: Sequence[bytes], layout: Layout, path: Path) -> list[int]:
     return numbers
 
 
-def _counts(
+def _measured(
     lines: Sequence[bytes], numbers: Sequence[int], layout: Layout, path: Path
-) -> NDArray[np.int64]:
-    """Return the number of cells of every line."""
-    joined, separator = b"\n".join(lines), layout.dialect.separator
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the number of cells of every line, and whether it begins with a number or a blank cell."""
+    joined, mark = b"\n".join(lines), (layout.dialect.separator or " ").encode()
+    slowly = re.compile(rb'[ "]*(?:[-+.]?\d|%s)' % re.escape(mark)).match
+    text = np.frombuffer(joined, np.uint8)
+    starts = np.concatenate([[0], np.flatnonzero(text == ord("\n")) + 1])
+    begins = (text[starts] - ord("0") < 10) | (text[starts] == ord(mark))
+    begins[[k for k in np.flatnonzero(~begins) if slowly(lines[k])]] = True
     if b'"' in joined:
-        lines = re.sub(rb'"[^"\n]*"', b"_", joined).split(b"\n")
+        joined = re.sub(rb'"[^"\n]*"', b"_", joined)
+        lines, text = joined.split(b"\n"), np.frombuffer(joined, np.uint8)
         for number, line in zip(numbers, lines, strict=True):
             if b'"' in line:
                 problem, remedy = "a quotation mark is not closed", "write no line breaks in cells"
                 raise DataError(problem, file=path, row=number, remedy=remedy)
-    if separator is None:
-        return np.array([len(line.split()) for line in lines])
-    mark = separator.encode()
-    return np.array([line.count(mark) + 1 for line in lines])
+    if layout.dialect.separator is None:
+        return np.array([len(line.split()) for line in lines]), begins
+    ends = np.append(np.flatnonzero(text == ord("\n")), text.size)
+    cells = np.searchsorted(np.flatnonzero(text == ord(mark)), ends)
+    return np.diff(cells, prepend=0) + 1, begins
 
 
 def _end(
@@ -157,4 +172,5 @@ def _is_timed(rows: Sequence[bytes], layout: Layout) -> bool:
     found = [find(text) for h, u in units if (text := u or parse(h).unit)]
     cells = layout.dialect.split(rows[layout.first].decode("utf-8", "replace"))
     seconds = any(unit is not None and unit.target == "s" for unit in found)
-    return seconds or any(map(is_clock, layout.headers)) or any(map(may_be_instant, cells))
+    instants = (may_be_instant(cell) and not layout.dialect.form(cell)[1] for cell in cells)
+    return seconds or any(map(is_clock, layout.headers)) or any(instants)

@@ -191,7 +191,7 @@ def _head(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
 
 
 def _named(rows: Sequence[Row], head: Head) -> Names | None:
-    """Return the names in rows, with the units in the row below them."""
+    """Return the names in rows, with the units in a row below them."""
     cells = [row[: head.used] for _, row in rows]
     units = [k for k in range(1, len(cells)) if _are_units(cells[k], cells[k - 1])]
     names = [
@@ -203,9 +203,10 @@ def _named(rows: Sequence[Row], head: Head) -> Names | None:
         return None
     best = max(names, key=lambda k: (_known(cells[k]), k))
     headers = rows[best][1]
-    below = rows[best + 1][1] if best + 1 in units else []
+    last = next((k for k in units if k > best), best)
+    below = rows[last][1] if last > best else []
     stated = [*below, *[""] * (len(headers) - len(below))][: len(headers)]
-    return Names(headers, stated, rows[best][0], rows[best + (best + 1 in units)][0])
+    return Names(headers, stated, rows[best][0], rows[last][0])
 
 
 def _merged(names: Names, head: Head) -> list[str]:

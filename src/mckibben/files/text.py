@@ -32,7 +32,7 @@ from mckibben.files.table import Column, Table
 from mckibben.system.atomic import digest
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
 
-_SNIFFED = 2**18  # bytes by which the layout of a table is recognised
+_SNIFFED = 2**18  # bytes of a line by which the layout of a table is recognised
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -114,8 +114,9 @@ def parsed(data: bytes, path: Path, separators: Sequence[str | None] = SEPARATOR
         data = b"\n" + data[named.end() :]  # so that lines have the same numbers
     if (found := keyed(data)) is not None:
         return _table(*found, path)
-    start = data[:_SNIFFED].decode("utf-8", "replace").split("\n")
-    return _table(data.split(b"\n"), sniff(start[:400], path, separators), path)
+    rows = data.split(b"\n")
+    start = [row[:_SNIFFED].decode("utf-8", "replace") for row in rows[:400]]
+    return _table(rows, sniff(start, path, separators), path)
 
 
 def _table(rows: Sequence[bytes], layout: Layout, path: Path) -> Table:

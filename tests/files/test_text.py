@@ -333,7 +333,7 @@ def test_what_terminals_write_is_left_out(tmp_path: Path, kind: str) -> None:
 
 
 def test_a_number_with_a_control_character_within_is_damaged(tmp_path: Path) -> None:
-    for mark in "\0\b\x01":
+    for mark in "\0\a\b\x01":
         text = PLAIN.replace("\n0.1,3.4", f"\n0.1,3{mark}.4")
         assert place(file(tmp_path, text)) == ("pressure", 12)
 

@@ -16,7 +16,7 @@ _CONTROL = bytes([*range(0x09), *range(0x0E, 0x20), 0x7F])
 _ESCAPE = re.compile(rb"\x1b(?:\[[0-9;?]*[ -/]*[@-~]|\][^\x07\x1b\n]*(?:\x07|\x1b\\)|[@-Z\\^_])")
 _TERMINAL = b"\0\x07\b\x1b"
 _WITHIN = re.compile(  # a number, or where one may have been
-    rb"(?<=[0-9.,])[\0\x08]+(?=[0-9.eE+-])|(?<=[0-9.,;\t ])[\x01-\x06\x0e-\x1f\x7f]+(?=[0-9.,;\t ])"
+    rb"(?<=[0-9.,])[\0\x07\x08]+(?=[0-9.eE+-])|(?<=[0-9.,;\t ])[\x01-\x06\x0e-\x1f\x7f]+(?=[0-9.,;\t ])"
 )
 _MOST, _MOST_OTHERS = (
     0.2,

@@ -26,6 +26,7 @@ class ReadKeywords(TypedDict, total=False):
     skip: int
     encoding: str | None
     join: bool
+    sheet: str | None
     between: tuple[float | None, float | None] | None
     resample: float | None
     zero: Sequence[str]

@@ -256,6 +256,8 @@ class ReadOptions:
     join : bool
         Whether all recordings are one run: pieces with the same channels one after the other, or the
         channels of several loggers, put on the times of the slowest.
+    sheet : str, optional
+        Of a spreadsheet; default that with the most rows of numbers.
     between : (float, float), optional
         Part of every recording [s].
     resample : float, optional
@@ -311,6 +313,9 @@ class ReadOptions:
     join: Annotated[bool, Option("Join pieces of one run, or the files of several loggers.")] = (
         False
     )
+    sheet: Annotated[
+        str | None, Option("Sheet of a spreadsheet. Default: the one with most numbers.", "NAME")
+    ] = None
     between: Annotated[
         tuple[float | None, float | None] | None,
         Option("Part of every recording [s]; either may be left out.", "START:END", "", span),

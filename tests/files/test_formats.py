@@ -204,6 +204,44 @@ def test_titles_are_passed_over_units_read_and_other_sheets_listed(
     assert recording.meta["ignored_columns"] == ["Notes"]
 
 
+@pytest.mark.parametrize("wanted", [None, "Run", "Table"])
+def test_the_sheet_with_most_rows_of_numbers_is_read_or_the_one_named(
+    tmp_path: Path, wanted: str | None
+) -> None:
+    days = [[datetime.datetime(2026, 1, 1 + k // 3), "what was done", "by A"] for k in range(90)]
+    table: list[list[Any]] = [["V", "bar"], *([k / 10, k] for k in range(20))]
+    path = book(tmp_path / "a.xlsx", Diary=days, Table=table, Run=[*NAMES, *SOUND])
+    toml = tmp_path / "channels.toml"
+    for described in (None, "Run", "Diary"):
+        toml.write_text("" if described is None else f'sheet = "{described}"\n')
+        if wanted is None and described == "Diary":
+            assert refused(path).file == path
+            continue
+        recording = one(path, sheet=wanted)
+        others = {"Diary", "Table", "Run"} - {wanted or "Run"}
+        assert set(recording.meta["ignored_columns"]) == others
+        if wanted == "Table":
+            assert recording["pressure"].tolist() == [*range(20)]
+        else:
+            check(recording)
+    error = refused(path, sheet="Results")
+    assert error.parameter == "sheet"
+    assert "Diary, Table, Run" in error.remedy
+    (tmp_path / "a.csv").write_text("time_s,p_bar\n" + "".join(f"{t},{p}\n" for t, p, _ in SOUND))
+    assert refused(tmp_path / "a.csv", sheet="Run").parameter == "sheet"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["{:.4f}".format, "{:.4f} kPa".format, lambda value: f"{value:.4f}".replace(".", ","),
+     lambda value: f"{value:.6E}".replace("E", "D"), lambda value: f"{value:.1f}".replace(".", ",")],
+)  # fmt: skip
+def test_numbers_that_are_text_are_read(tmp_path: Path, text: Callable[[float], str]) -> None:
+    rows = [[t, text(p), x] for t, p, x in SOUND]
+    recording = one(book(tmp_path / "a.xlsx", Run=[*NAMES, *rows]))
+    assert recording["pressure"] == pytest.approx(P / 100, abs=6e-4)
+
+
 @pytest.mark.parametrize("cell", ["1,5", "1.234", "1'000", "off"])
 @pytest.mark.parametrize("row", [1, 20])
 def test_text_that_may_be_several_numbers_is_refused(tmp_path: Path, cell: str, row: int) -> None:

@@ -31,7 +31,7 @@ K = np.arange(N)
 PRESSURE, MOVED = np.round(2 + np.sin(K / 3), 4), np.round(10 - 3 * np.cos(K / 3), 4)
 FRAME = pd.DataFrame({"time_s": K / 10, "pressure_bar": PRESSURE, "displacement_mm": MOVED})
 CSV = FRAME.to_csv(index=False).encode()
-LONG = CSV.replace(b"\n0.1", b"\n%s\n0.1" % (b"1" * 20_000_000))
+WIDER = CSV.replace(b"5\n", b"5,7\n")
 CHANNELS = ("pressure", "displacement")
 P, X, T = *CHANNELS, "time"
 
@@ -157,7 +157,7 @@ CASES: list[Case] = [
     Case("header_only.csv", b"time_s,pressure_bar,displacement_mm\n"),
     Case("short_header.csv", CSV.replace(b",displacement_mm", b""), row=2, names="3 cells"),
     Case("quote.csv", CSV.replace(b"\n0.4", b'\n"0.4'), row=6),
-    Case("long.csv", LONG, row=3, names="1 cells"),
+    Case("wider.csv", WIDER, row=WIDER[: WIDER.index(b",7\n")].count(b"\n") + 1, names="4 cells"),
     Case("two_times.csv", partial(csv, t_ms=1.0), T, names="'time_s' and 't_ms'"),
     # Time, and options
     Case("late.csv", partial(csv, time_s=LATE), T, 9, "'late'"),

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.files.made import columns, one, place, refused, rows
+from mckibben.files.lines import MOST
+from tests.files.made import columns, one, place, refused, rows, several, table
 
 N = 40
 T = [k / 100 for k in range(N)]
@@ -120,8 +122,7 @@ def test_words_that_end_a_file_are_left_out_and_averages_refused(tmp_path: Path)
     recording = one(file(tmp_path, PLAIN + "\nEnd of file\n"))
     assert recording["pressure"].tolist() == P
     assert any("row 43" in note for note in recording.notes)
-    for averages in ("mean,2.5,3.1\n", "sum of 40\n"):
-        assert refused(file(tmp_path, PLAIN + averages)).row == 42
+    assert refused(file(tmp_path, PLAIN + "mean,2.5,3.1\n")).row == 42
     dates = rows([f"2026-01-31T12:00:{k:02d}" for k in range(N)], P)
     assert refused(file(tmp_path, f"stamp,p_bar\n{dates}Maximum,39\n")).row == 42
 
@@ -131,15 +132,6 @@ def test_columns_without_numbers_are_listed(tmp_path: Path) -> None:
     recording = one(file(tmp_path, "time_s,p_bar,phase,x,y\n" + rows(T, P, *words)))
     assert recording.meta["ignored_columns"] == ["phase", "x", "y"]
     assert "phase (text, such as 'up')" in " ".join(recording.notes)
-
-
-@pytest.mark.parametrize(
-    "row", ["0.02,1.5", "0.02,1.5,2.0,3.0", "0.02 1.5 2.0", "Rate,100", "0.02,ERR,ERR"]
-)
-def test_the_first_row_of_other_cells_is_refused(tmp_path: Path, row: str) -> None:
-    lines = PLAIN.splitlines()
-    lines[20] = row
-    assert refused(file(tmp_path, "\n".join(["Bench 3", *lines]))).row == 22
 
 
 def test_the_header_is_the_row_of_known_names(tmp_path: Path) -> None:
@@ -258,3 +250,221 @@ def test_header_lines_after_it_and_encoding_can_be_given(tmp_path: Path) -> None
     assert found["pressure"].tolist() == P
     for wrong in ({"header": 1000}, {"skip": 1000}, {"encoding": "none"}, {"header": -1}):
         refused(path, **wrong)
+
+
+JUNK = [
+    ["rig> "], ["[INFO] ready"], ["WARN: p=1.2 high, d=3"], ["I (123) main: boot"], ["[INFO],ready,1"],
+    ["ESP-ROM:esp32s3-20210327", "rst:0x1 (POWERON),boot:0x8", ""], HEADER.splitlines(), ["", "OK", ""],
+    ["0.2"], ["0.2,1.5"], ["0.2,1.50.21,1.5,2.0"], ["0.2 1.5 2.0"], ["Rate,100"], ["\x1b[2K\x07> \b"],
+    ["1" * 2_000_000],
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("junk", JUNK, ids=lambda lines: (lines[0] or lines[1])[:30])
+@pytest.mark.parametrize("at", [1, 21, 30])
+def test_lines_between_samples_are_left_out_and_counted(
+    tmp_path: Path, junk: list[str], at: int
+) -> None:
+    lines = PLAIN.splitlines()
+    recording = one(file(tmp_path, "\n".join([*lines[:at], *junk, *lines[at:], ""])))
+    assert recording["pressure"].tolist() == P
+    assert recording["displacement"].tolist() == X
+    number = len([line for line in junk if line])
+    row = at + 1 + (not junk[0])
+    if at > 1:  # what is above the first sample is above the table
+        assert any(f"{number} line(s)" in n and f"row {row}:" in n for n in recording.notes)
+
+
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+def test_a_line_that_is_cut_off_shifts_no_column(tmp_path: Path) -> None:
+    lines, whole = PLAIN.splitlines(), {*zip(T, P, X, strict=True)}
+    for length in range(1, len(lines[20])):
+        text = "\n".join([*lines[:20], lines[20][:length], *lines[21:]])
+        found = [one.values for one in table(file(tmp_path, text)).columns]
+        read = [*zip(*(np.full(N, np.nan) if v is None else v for v in found), strict=True)]
+        assert {row[:2] for row in read} <= {row[:2] for row in whole} | {(T[19], math.nan)} or any(
+            one.flaw for one in table(file(tmp_path, text)).columns
+        )
+        assert len({*read} & whole) == N - 1
+
+
+def test_a_file_with_many_other_lines_is_refused(tmp_path: Path) -> None:
+    lines = PLAIN.splitlines()
+    for share in (MOST / 2, 2 * MOST):
+        other = [f"{line},7" if k % round(1 / share) == 1 else line for k, line in enumerate(lines)]
+        if share > MOST:
+            assert refused(file(tmp_path, "\n".join(other))).row == 2
+        else:
+            one(file(tmp_path, "\n".join(other)))
+
+
+def test_damaged_samples_without_times_are_missing(tmp_path: Path) -> None:
+    lines = ("p_bar,d_mm\n" + rows(P, X)).splitlines()
+    path = file(tmp_path, "\n".join([*lines[:20], "2.", *lines[21:]]))
+    assert place(path) == ("p", 21) or refused(path).row == 21
+    assert one(path, gaps="interpolate").n_samples == N
+
+
+def test_repeats_of_a_row_are_left_out_where_the_time_is_the_same(tmp_path: Path) -> None:
+    lines = PLAIN.splitlines()
+    recording = one(file(tmp_path, "\n".join([*lines[:20], *lines[18:20], *lines[20:]]).replace(
+        lines[19] + "\n" + lines[18], lines[19] + "\n" + lines[19])))  # fmt: skip
+    assert recording["pressure"].tolist() == P
+    other = lines[19].rpartition(",")[0] + ",9.5"
+    assert place(file(tmp_path, "\n".join([*lines[:20], other, *lines[20:]]))) == ("time", 21)
+    same = "p_bar,d_mm\n" + rows([2.5, *P[1:]], [1.0] * N) + "2.0,1.0\n" * 3
+    assert one(file(tmp_path, same), channels=["pressure"]).n_samples == N + 3
+
+
+CONTROLS = {
+    "colours": [f"\x1b[32m{line}\x1b[0m" for line in PLAIN.splitlines()],
+    "a title": ["\x1b]0;rig\x07", *PLAIN.splitlines()],
+    "ends of strings": [line.replace(",", "\0,") + "\0" for line in PLAIN.splitlines()],
+    "bells": [line + "\x07" for line in PLAIN.splitlines()],
+    "zeros at the end": [*PLAIN.splitlines(), "\0" * 3000],
+}
+
+
+@pytest.mark.parametrize("kind", CONTROLS)
+def test_what_terminals_write_is_left_out(tmp_path: Path, kind: str) -> None:
+    recording = one(file(tmp_path, "\n".join(CONTROLS[kind])))
+    assert recording["pressure"].tolist() == P
+    assert len(recording.notes) == 1
+
+
+def test_a_number_with_a_control_character_within_is_damaged(tmp_path: Path) -> None:
+    for mark in "\0\a\b\x01":
+        text = PLAIN.replace("\n0.1,3.4", f"\n0.1,3{mark}.4")
+        assert place(file(tmp_path, text)) == ("pressure", 12)
+
+
+# Tables of other forms ---------------------------------------------------------------------------
+
+TIMED, UNTIMED = (
+    {"pressure": ("bar", P), "displacement": ("mm", X)},
+    {"ch1": ("V", P), "ch2": ("V", X)},
+)
+BARE = {"p": ("", P), "x": ("", X)}
+NO, F = [""] * N, range(1, N + 1)
+MARKED = {f"m{k}_{axis}": ("mm", X if (k, axis) in ((1, "x"), (2, "z")) else P)
+          for k in (1, 2) for axis in "xyz"}  # fmt: skip
+SIX = (X, P, P, P, P, X)
+QUALISYS = "NO_OF_FRAMES\t40\nNO_OF_MARKERS\t2\nFREQUENCY\t100\nDATA_INCLUDED\t3D\n"
+MOTIVE = (
+    "Format Version,1.23,Take Name,a,Capture Frame Rate,100.000000,Length Units,Meters\n\n"
+    ",,Rigid Body,Rigid Body,Rigid Body,Rigid Body\n,,A,A,B,B\n"
+    f",,{','.join(['FC2B3B0D11111111'] * 2 + ['FC2B3B0D22222222'] * 2)}\n"
+    ",,Rotation,Position,Rotation,Position\nFrame,Time (Seconds),X,X,X,X\n"
+)
+SCOPE = "X,CH1,CH2,Start,Increment\nSequence,Volt,Volt,-2.0e+00,1.0e-02\n"
+STACK = "".join(f"{t},pressure,{p},bar\n{t},displacement,{x},mm\n" for t, p, x in EACH)
+PAIRS = [
+    "t={};p={};x={};",
+    "t:{},p:{},x:{}",
+    "t: {}  p: {}  x: {}",
+    '{{"t": {}, "p": {}, "x": {}}}',
+]
+OTHERS: dict[str, tuple[str, dict[str, tuple[str, list[float]]]]] = {
+    "cells of the header without samples": (SCOPE + rows(range(N), P, X, NO), UNTIMED),
+    "and without a separator": (SCOPE + rows(range(N), P, X), UNTIMED),
+    "a comment that was never made": ("t_s,p_bar,Weg_mm,note\n" + rows(T, P, X), TIMED),
+    "a separator below": (HEADER + rows(T, P, X, NO), TIMED),
+    "a separator above": (HEADER.replace("\n", ",\n") + rows(T, P, X), TIMED),
+    "a comma in a name": ("t (s),level (a, b),Weg (mm)\n" + rows(T, P, X), {"displacement": ("mm", X)}),
+    "Vicon": ("Trajectories\n100\n,,a:M1,,,a:M2,,\nFrame,Sub Frame,X,Y,Z,X,Y,Z\n,,mm,mm,mm,mm,mm,mm\n"
+        + rows(F, [0] * N, *SIX), MARKED),
+    "Motive": (MOTIVE + rows(F, T, P, [x / 1000 for x in X], P, [x / 1000 for x in X]),
+        {"a_position_x": ("mm", X), "b_rotation_x": ("", P)}),
+    "Qualisys": (QUALISYS + "MARKER_NAMES\tM1\tM2\n" + rows(*SIX, separator="\t"),
+        {name: ("", values) for name, (_, values) in MARKED.items()}),
+    "a rate above": ("# Sampling rate: 0.1 kHz\np_bar,Weg_mm\n" + rows(P, X), TIMED),
+    "an interval above": ("Sample Interval,1.0E-02\nPoints,40\n\nCH1 (V),CH2 (V)\n"
+        + rows(P, X), UNTIMED),
+    "units alone": ("sec,bar,mm\n" + rows(T, P, X), TIMED),
+    "units alone in brackets": ("[s];[bar];[mm]\n" + rows(T, P, X, separator=";"), TIMED),
+    "units two rows below": ("t,p,Weg\nA1,B1,C1\ns,bar,mm\n" + rows(T, P, X), TIMED),
+    **{f"names in each line: {form}": ("".join(form.format(*each) + "\n" for each in EACH),
+        {"pressure": ("bar", P), "x": ("", X)}) for form in PAIRS},
+    "names and units in each line": ("boot\n" + "".join(
+        f"12:00:{t:05.2f} -> P: {p} bar  D: {x} mm\n" for t, p, x in EACH), TIMED),
+    "Fortran": (HEADER + "".join(
+        f"{t:.4E},{p:.6E},{x:.6E}\n".replace("E", "D") for t, p, x in EACH), TIMED),
+    "a column with the other mark": (HEADER + "".join(
+        f'{t},"{p}",{x}\n'.replace(f'"{p}"', f'"{p}"'.replace(".", ",")) for t, p, x in EACH), TIMED),
+    "long": ("time_s,name,value,unit\n" + STACK, TIMED),
+    "long of one unit": ("t;signal;value\n" + "".join(
+        f"{t};p_bar;{p}\n{t};Weg_mm;{x}\n" for t, p, x in EACH), TIMED),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_forms(tmp_path: Path, name: str) -> None:
+    text, expected = OTHERS[name]
+    recording = one(file(tmp_path, text))
+    assert recording.sample_time == 0.01
+    assert recording.start_time == (-2.0 if text.startswith(SCOPE) else 0.0)
+    assert expected.keys() <= recording.channels.keys()
+    for channel, (unit, values) in expected.items():
+        assert (recording[channel].tolist(), unit) == (
+            pytest.approx(values),
+            recording.units[channel],
+        )
+
+
+@pytest.mark.parametrize("stamp", ["{:.3f}", "2026-01-31T12:00:{:06.3f}"])
+def test_signals_of_the_long_format_have_times_of_their_own(tmp_path: Path, stamp: str) -> None:
+    lines = [
+        f"{stamp.format(t + late)},{name},{t + late}\n"
+        for t in T
+        for name, late in (("p_bar", 0), ("force_N", 0.003))
+    ]
+    recording = one(file(tmp_path, "time,name,value\n" + "".join(lines)))
+    assert recording["pressure"] == pytest.approx(recording["force"])
+
+
+def test_the_frequency_of_an_experiment_is_no_rate(tmp_path: Path) -> None:
+    assert (
+        one(file(tmp_path, "# Frequency: 0.5 Hz\np_bar,Weg_mm\n" + rows(P, X))).sample_time is None
+    )
+
+
+# LabVIEW -----------------------------------------------------------------------------------------
+
+
+def lvm(x: str, mark: str, *segments: tuple[float, range]) -> str:
+    """Return a measurement file with segments, each with X0 and numbers of samples."""
+    text = (
+        f"LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDecimal_Separator\t{mark}\n"
+        f"Multi_Headings\tYes\nX_Columns\t{x}\nTime\t12:00:00,1\n***End_of_Header***\t\n\t\n"
+    )
+    for start, numbers in segments:
+        each: list[tuple[Any, ...]] = [(T[k] if x != "No" else "", P[k], X[k]) for k in numbers]
+        names = "X_Value\tPressure\tWeg\tComment"
+        if x == "Multi":
+            names, each = (
+                "X_Value\tPressure\tX_Value\tWeg\tComment",
+                [(t, p, t, d) for t, p, d in each],
+            )
+        text += (
+            f"Channels\t2\t\t\nSamples\t9\t9\t\nY_Unit_Label\tbar\tmm\t\nX_Dimension\tTime\tTime\t\n"
+            f"X0\t{start}\t{start}\t\nDelta_X\t0.010000\t0.010000\t\n***End_of_Header***\t\t\t\n"
+            f"{names}\n{rows(*zip(*each, strict=True), separator=chr(9))}\n"
+        )
+    return (
+        text if mark == "." else text.replace(".", mark).replace("Separator\t,\n", "Separator\t,\n")
+    )
+
+
+@pytest.mark.parametrize("mark", ".,")
+@pytest.mark.parametrize("x", ["One", "Multi", "No"])
+def test_labview_measurements(tmp_path: Path, x: str, mark: str) -> None:
+    whole = lvm(x, mark, (0.0, range(N)))
+    goes_on = lvm(x, mark, (0.0, range(20)), (0.2, range(20, N)))
+    for text in (whole, goes_on):
+        recording = one(file(tmp_path, text, "run.lvm"))
+        assert {
+            name: (recording.units[name], recording[name].tolist()) for name in recording.channels
+        } == TIMED
+        assert recording.sample_time == 0.01
+    again = several(file(tmp_path, lvm(x, mark, *[(0.0, range(20))] * 3), "run.lvm"))
+    assert [one["pressure"].tolist() for one in again] == [P[:20]] * 3

@@ -38,6 +38,7 @@ VALUES: dict[str, Use] = {
     "header": Use(2),
     "skip": Use(3),
     "encoding": Use("cp037"),
+    "sheet": Use("Data"),
     "between": Use((0.2, 0.8)),
     "resample": Use(0.04),
     "zero": Use(("displacement",)),

@@ -6,7 +6,7 @@ import csv
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ _FORMS = {
     mark: re.compile(
         r"(?P<hexadecimal>[+-]?0[xX][0-9a-fA-F]+)"
         rf"|(?P<three_digits>[+-]?0*[1-9]\d{{0,2}}[{mark}]\d{{3}})"  # one, or a thousand: 1,000
-        rf"|(?P<number>[+-]?(?:\d+(?:[{mark}]\d*)?|[{mark}]\d+)(?:[eE][+-]?\d+)?)"
+        rf"|(?P<number>[+-]?(?:\d+(?:[{mark}]\d*)?|[{mark}]\d+)(?:[eEdD][+-]?\d+)?)"  # Fortran: 1.5D+00
         r"(?:\s*(?P<unit>[A-Za-z°%µμΩ][^\d,;:]{0,9}\d?))?"
         r"|(?P<spaced>[+-]?\d{1,3}(?: \d{3})+(?:[.,]\d*)?)"
         r"|(?P<grouped>[+-]?\d{1,3}(?P<mark>[.,'’`_ \xa0\u2009\u202f])(?:\d{2,3}(?P=mark))*\d{3}"
@@ -56,6 +56,9 @@ class Dialect:
             cells = next((w for w in wider if len(cells) != width == len(w)), cells)
         else:
             cells = line.split(self.separator)
+            if width and len(cells) != width:  # "force (N, static)" is one name
+                outside = re.split(re.escape(self.separator) + r"(?![^(\[]*[)\]])", line)
+                cells = outside if len(outside) == width else cells
         return [cell.strip() for cell in cells]
 
     @property
@@ -80,7 +83,8 @@ class Dialect:
             return math.nan
         if found["hexadecimal"]:
             return int(found["hexadecimal"], 16)
-        return float((found["number"] or found["three_digits"]).replace(self.decimal, "."))
+        plain = (found["number"] or found["three_digits"]).replace(self.decimal, ".")
+        return float(re.sub("[dD]", "e", plain))
 
     def is_value(self, cell: str) -> bool:
         """Return whether a cell holds a number in any form, or an instant."""
@@ -105,6 +109,8 @@ def column(name: str, unit: str | None, cells: Any, dialect: Dialect) -> tuple[C
     forms, matches = zip(*map(dialect.form, words), strict=True)
     if may_be_instant(words[0]) and not matches[0]:
         return Column(name, None, unit, texts=[words[code] for code in codes]), ""
+    if "grouped" in forms and (marked := _with_other_mark(words, dialect)):
+        return column(name, unit, cells, marked)
     plain = [word for word, form in zip(words, forms, strict=True) if form == "number"]
     decimal = not plain or any(dialect.decimal in word for word in plain)
     other = {"three digits": "number" if decimal else "grouped", "spaced": "grouped"}
@@ -136,3 +142,15 @@ def column(name: str, unit: str | None, cells: Any, dialect: Dialect) -> tuple[C
     values = np.array([dialect.value(match) for match in matches])
     cell = next((w for w, f in zip(words, forms, strict=True) if f == "three digits"), "")
     return Column(name, values[codes], unit), "" if plain else cell
+
+
+def _with_other_mark(words: Sequence[str], dialect: Dialect) -> Dialect | None:
+    """Return the dialect with the other decimal mark where the words of a column show that it is so.
+
+    As text of a spreadsheet, or in quotation marks, beside columns with the mark of the table.
+    """
+    other = replace(dialect, decimal="," if dialect.decimal == "." else ".")
+    found = [other.form(word) for word in words]
+    shown = any(match and other.decimal in (match["number"] or "") for _, match in found)
+    sound = {form for form, _ in found} <= {"number", "three digits", "unit", "missing"}
+    return other if shown and sound else None

@@ -46,20 +46,24 @@ def tables(path: Path) -> list[Table]:
         return read(file, path)
 
 
-def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Return the raw contents of an open file.
+def read(file: BufferedReader, path: Path, sheet: str | None = None) -> list[Table]:
+    """Return the raw contents of an open file, of spreadsheets those of a sheet.
 
     Raises
     ------
     DataError
-        If it is empty or damaged, or its ending is unknown.
+        If it is empty or damaged, or its ending is unknown; if a sheet is named where there are none.
     """
     module = _module(path)
+    options = {} if sheet is None else {"sheet": sheet}
+    if options and READERS[path.suffix.casefold()] != "xlsx":
+        problem, remedy = "only spreadsheets have sheets", "leave it out"
+        raise DataError(problem, file=path, parameter="sheet", remedy=remedy)
     with refusing(path):
         if not file.peek(1):
             remedy = "give a file with a header and samples"
             raise DataError("there is nothing in it", file=path, remedy=remedy)
-        return [distinct(printable(table)) for table in module.read(file, path)]
+        return [distinct(printable(table)) for table in module.read(file, path, **options)]
 
 
 def laid_out(

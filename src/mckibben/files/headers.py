@@ -146,9 +146,10 @@ def by_units(units: Mapping[str, str]) -> dict[str, str]:
     """Return channels by units for columns named u1, output or similar."""
     found = {}
     for name, unit in units.items():
-        unnamed = re.fullmatch(r"(?:[a-z]|input|output)(?:_?(\d+))?", name)
+        unnamed = re.fullmatch(r"(?:[a-z]|input|output|column)(?:_?(\d+))?", name)
         if unnamed and unit in QUANTITIES:
-            found[name] = QUANTITIES[unit] + (f"_{unnamed[1]}" if unnamed[1] else "")
+            alone = name.startswith("column_") and [*units.values()].count(unit) == 1
+            found[name] = QUANTITIES[unit] + (f"_{unnamed[1]}" if unnamed[1] and not alone else "")
     names = Counter(found.get(name, name) for name in units)
     return {name: new for name, new in found.items() if names[new] == 1}
 

@@ -104,9 +104,9 @@ class Request(ReadOptions):
     def check(self, path: Path, *, text: bool = True) -> None:
         """Raise an error for options that are invalid for any file, or for what is no ``text``."""
         error = partial(DataError, file=path)
-        for name in () if text else ("header", "skip", "encoding"):
+        for name in () if text else ("header", "skip", "encoding", "sheet"):
             if getattr(self, name):
-                raise error("it is of text files", parameter=name, remedy="leave it out")
+                raise error("it is of files", parameter=name, remedy="leave it out")
         possible = self.rate is None or 0 < self.rate < math.inf
         require(possible, "rate", self.rate, "a positive number of samples a second", error)
         possible = self.sample_time is None or 0 < self.sample_time < math.inf

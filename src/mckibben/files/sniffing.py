@@ -1,73 +1,173 @@
-"""Layout of a text table from its first lines: encoding, separator, decimal mark, header, units."""
+"""Layout of a text table from its first lines: separator, decimal mark, header, units.
+
+`RULES` are tried in order on what is above the samples; the first that finds names gives the header.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
+
+import numpy as np
 
 from mckibben.errors import DataError
 from mckibben.files.cells import Dialect
-from mckibben.files.headers import foreign_words, is_standard
+from mckibben.files.headers import is_standard, is_time
 from mckibben.files.notices import warn
-from mckibben.files.units import find, find_listed
+from mckibben.files.units import convert, find, find_listed
 
 SEPARATORS = ("\t", ";", "|", ",", None)
 """Separators in order of preference; None is whitespace."""
 
-_ENCODINGS = ("cp1252", "cp932", "gb18030", "cp949", "latin-1")
-_CONTROL = bytes([*range(0x09), *range(0x0E, 0x20), 0x7F])
-_LOOKED_AT = 2**16  # bytes by which the encoding is recognised
+Row = tuple[int, list[str]]
+"""A line, counted from 0, and its cells."""
+
+_IDENTIFIER = re.compile(r"[0-9A-F]{16,}")
+_STATED = {
+    mark: re.compile(
+        r"(?<![A-Za-z])(?P<name>(?P<rate>(?:sampl(?:e|ing)|frame|scan|acquisition)[ _]?"
+        r"(?:rate|freq(?:uency)?)|samples per second"
+        r"|(?-i:fs|Fs|Trajectories|NO_OF_FRAMES[\s\S]*?\nFREQUENCY))"
+        r"|(?:sampling|sample|time)[ _]?(?:interval|increment|step|period)|sample[ _]?time"
+        r"|x?[ _]?increment|delta[ _]?x|(?-i:dt|Ts))"
+        r"\b[ \"]*[\[(]?(?P<in>[A-Za-zµμ]*)[\])]?[\s\",;:=|]+"
+        rf"(?P<value>\d+(?:[{mark}]\d+)?(?:e[+-]?\d+)?)(?![.,']?\d)[ ]?(?P<unit>[A-Za-zµμ]*)",
+        re.IGNORECASE,
+    )
+    for mark in ".,"
+}
+"""Decimal mark -> a rate or sample time: ``Sample Interval,4e-4``, ``sampling rate [kHz]: 2``."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """First line of samples, counted from 0, and the column names."""
+    """First line of samples, counted from 0, the first below them, and the column names.
+
+    A line of samples has at least ``least`` cells. ``rates`` are rates and sample times that the lines
+    above state.
+    """
 
     dialect: Dialect
     headers: list[str]
     units: list[str | None]
     first: int
+    least: int
+    stop: int | None = None
+    rates: Mapping[str, float] = field(default_factory=dict)
+    start_time: float = 0.0
 
 
-def decoded(data: bytes, path: Path) -> bytes:
-    """Return a text in UTF-8 with line feeds; raise a `DataError` for binary data."""
-    start = data[:_LOOKED_AT]
-    zeros = [start[at::2].count(0) * 4 > len(start) for at in (0, 1)]
-    wide = "utf-16-be" if zeros[0] else "utf-16-le" if zeros[1] else "utf-8"
-    try:
-        text = data.decode("utf-16" if start.startswith((b"\xff\xfe", b"\xfe\xff")) else wide)
-    except UnicodeDecodeError:
-        text = _foreign(data, path)
-    data = text.lstrip("\ufeff").rstrip("\x1a").encode()
-    data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    if len(data.translate(None, _CONTROL)) < len(data):
-        better = "give the file the ending of its format, or export it as CSV"
-        raise DataError("this is not text", file=path, remedy=better)
-    return data
+@dataclass(frozen=True)
+class Names:
+    """The names of columns, their units or blanks, and the line of names and the last of the header."""
+
+    headers: list[str]
+    units: Sequence[str]
+    at: int = -1
+    last: int = -1
 
 
-def _foreign(data: bytes, path: Path) -> str:
-    """Decode text in a non-Unicode encoding: the one in which its header has words of `names`."""
-    texts = {}
-    for encoding in _ENCODINGS:
-        with suppress(UnicodeDecodeError):
-            texts[encoding] = data.decode(encoding)
-    words = {encoding: foreign_words(text[:_LOOKED_AT]) for encoding, text in texts.items()}
-    best = max(words, key=words.__getitem__)
-    if not words[best]:
-        warn(path, f"its encoding shows by no word; it was read as {best}, so names may be garbled")
-    return texts[best]
+@dataclass(frozen=True)
+class Head:
+    """What is above the samples: rows and comments; and the number of columns.
+
+    The samples have ``width`` cells, of which the first ``used`` are not all blank.
+    """
+
+    dialect: Dialect
+    width: int
+    used: int
+    above: Sequence[Row]
+    comments: Sequence[Row]
+
+    @cached_property
+    def rows(self) -> list[Row]:
+        """Rows of the samples' width, but for blanks at their ends; comments if no row has words."""
+        rows, notes = (
+            [
+                (at, [*row[: self.width], *[""] * (self.width - len(row))])
+                for at, row in each
+                if len(row) >= self.used and not any(row[self.width :])
+            ]
+            for each in (self.above, self.comments)
+        )
+        return rows if any(self.dialect.balance(row) < 0 for _, row in rows) else notes
+
+
+def units_alone(head: Head) -> Names | None:
+    """Take a first row of units: the columns are called column_1, and known by their units."""
+    at, row = head.rows[0] if head.rows else (-1, [])
+    cells = [_bare(cell) for cell in row if cell]
+    if len(cells) < 2 or not all(map(_is_unit, cells)) or max(map(len, row)) < 2:
+        return None
+    return Names(_numbered(head.width), row, at, at)
+
+
+def named(head: Head) -> Names | None:
+    """Take a row of words: that with the most standard channels, and of several the last."""
+    return _named(head.rows, head)
+
+
+def markers(head: Head) -> Names | None:
+    """Take names of markers, each with three columns of samples, as Qualisys writes them."""
+    for at, (first, *names) in head.above:
+        if first == "MARKER_NAMES" and head.used - 3 * len(names) in (0, 2):
+            before = ["Frame", "Time"] if head.used % 3 else []
+            headers = [*before, *(f"{name} {axis}" for name in names for axis in "XYZ")]
+            headers += [""] * (head.width - head.used)  # lines end with a separator
+            return Names(headers, [""] * len(headers), at, at)
+    return None
+
+
+def longer(head: Head) -> Names | None:
+    """Take a row with more names than the samples have columns: the last names have no samples."""
+    return _named([(at, row) for at, row in head.above if len(row) > head.used], head)
+
+
+def numbered(head: Head) -> Names:
+    """Count the columns; with names of another number above the samples they are refused."""
+    others = [row for _, row in head.above if len(row) not in (1, head.width)]
+    headers = others[-1] if others else _numbered(head.width)
+    return Names(headers, [""] * len(headers))
+
+
+RULES: tuple[Callable[[Head], Names | None], ...] = (units_alone, named, markers, longer, numbered)
+"""Where names of columns are sought; the last always answers."""
 
 
 def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) -> Layout:
-    """Return the layout of a table; raise a `DataError` for comments and blanks only.
+    """Return the layout of a table; raise a `DataError` for comments and blanks only."""
+    head, first = _head(lines, path, separators)
+    names = next(found for rule in RULES if (found := rule(head)) is not None)
+    if names.headers == _numbered(head.width) and not any(names.units):
+        warn(path, f"no line of names: the columns are called column_1 to column_{head.width}")
+    for at, row in reversed(head.above):  # damaged samples
+        fits = names.last >= 0 or len(row) == head.width
+        if at > names.last and fits and any(map(head.dialect.is_value, row)):
+            first = at
+    headers = _merged(names, head)
+    beyond = [*zip(headers, names.units, strict=True)][head.used :]
+    text = "\n".join([*lines[:first], *(f"{name} {cell}" for name, cell in beyond if cell)])
+    start = dict(beyond).get("Start", "")
+    units = [_bare(cell) or None for cell in names.units]
+    if metric := re.search(r"Length Units\W+(\w+)", text):  # of Motive
+        units = [metric[1] if "Position" in h else u for h, u in zip(headers, units, strict=True)]
+    return Layout(
+        head.dialect,
+        headers,
+        units,
+        first,
+        head.width if any(headers[head.used : head.width]) else min(head.used, head.width),
+        rates=dict(filter(None, map(_stated, _STATED[head.dialect.decimal].finditer(text)))),
+        start_time=head.dialect.value(head.dialect.form(start)[1]) if start else 0.0,
+    )
 
-    The header is a row of words before the samples, or else a comment there: that with the most names
-    of standard channels, and of several the last. Units are in the row below it.
-    """
+
+def _head(lines: Sequence[str], path: Path, separators: Sequence[str | None]) -> tuple[Head, int]:
+    """Return what is above the samples, and their first line."""
     dialects = [Dialect(s, d) for s in separators for d in ".," if s != d]
     *_, width, dialect = max((_fitness(each, lines) for each in dialects), key=lambda fit: fit[:3])
     comments = [at for at, line in enumerate(lines) if dialect.is_comment(line)]
@@ -78,40 +178,66 @@ def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
         raise DataError(problem, file=path, remedy=remedy)
     later = [row for _, row in rows[len(rows) // 2 :] if len(row) == width]
     solid = [i for i in range(width) if dialect.balance([row[i] for row in later]) > 0]
+    used = max((i + 1 for i in range(width) if any(row[i] for row in later)), default=width)
     samples = [
         len(row) == width and dialect.balance([row[i] for i in solid]) > 0 for _, row in rows
     ]
     # one row of numbers between words is a part of the header
     n_above = next((k for k in range(len(rows)) if all(samples[k : k + 2])), int(not solid))
-    above, first = rows[:n_above], [*filled, len(lines)][n_above]
-    for _, row in above:  # which may end with a separator that the samples lack, or lack theirs
-        if len(row) == width + 1 and not row[-1]:
-            row.pop()
-        elif len(row) == width - 1 and not any(sample[-1] for sample in later):
-            row.append("")
-    heads = [(at, row) for at, row in above if len(row) == width]
-    if not any(dialect.balance(row) < 0 for _, row in heads):
-        notes = [(at, dialect.split(lines[at].lstrip("#%/; \t"), width)) for at in comments]
-        heads = [(at, row) for at, row in notes if at < first and len(row) == width]
-    units = [k for k in range(1, len(heads)) if _are_units(heads[k][1], heads[k - 1][1])]
+    first = [*filled, len(lines)][n_above]
+    notes = [(at, dialect.split(lines[at].lstrip("#%/; \t"), width)) for at in comments]
+    notes = [(at, row) for at, row in notes if at < first]
+    return Head(dialect, width, used, rows[:n_above], notes), first
+
+
+def _named(rows: Sequence[Row], head: Head) -> Names | None:
+    """Return the names in rows, with the units in a row below them."""
+    cells = [row[: head.used] for _, row in rows]
+    units = [k for k in range(1, len(cells)) if _are_units(cells[k], cells[k - 1])]
     names = [
         k
-        for k, (_, row) in enumerate(heads)
-        if k not in units and (k + 1 in units or dialect.balance(row) < 0)
+        for k, row in enumerate(cells)
+        if k not in units and (k + 1 in units or head.dialect.balance(row) < 0)
     ]
-    best = max(names, key=lambda k: (_known(heads[k][1]), k), default=-1)
-    last = heads[best + (best + 1 in units)][0] if names else -1  # line of the header
-    for at, row in reversed(above):  # damaged samples
-        if at > last and (names or len(row) == width) and any(map(dialect.is_value, row)):
-            first = at
-    others = [row for at, row in above if at < first and len(row) > 1]
-    # without names, a header of more or fewer cells than the samples is refused with these
-    headers = heads[best][1] if names else others[-1] if others else []
-    if not headers:
-        headers = [f"column_{i}" for i in range(1, width + 1)]
-        warn(path, f"no line of names: the columns are called column_1 to column_{width}")
-    stated = heads[best + 1][1] if best + 1 in units else [""] * len(headers)
-    return Layout(dialect, headers, [cell.strip("[]() ") or None for cell in stated], first)
+    if not names:
+        return None
+    best = max(names, key=lambda k: (_known(cells[k]), k))
+    headers = rows[best][1]
+    last = next((k for k in units if k > best), best)
+    below = rows[last][1] if last > best else []
+    stated = [*below, *[""] * (len(headers) - len(below))][: len(headers)]
+    return Names(headers, stated, rows[best][0], rows[last][0])
+
+
+def _merged(names: Names, head: Head) -> list[str]:
+    """Return names that are repeated with those of merged cells above them, as ``M1 X``."""
+    headers = names.headers
+    for at, row in reversed(head.above):
+        several = [name for name in headers if name and not is_time(name)]
+        if len(set(several)) == len(several):
+            break
+        over = [cell.rpartition(":")[2] for cell in row]
+        words = {cell for cell in over if cell}
+        if at >= names.at or len(words) < 2 or len(row) > len(headers):
+            continue
+        if any(map(_IDENTIFIER.fullmatch, words)) or head.dialect.balance(row) >= 0:
+            continue
+        filled = [next(filter(None, reversed(over[: i + 1])), "") for i in range(len(headers))]
+        both = zip(filled, headers, strict=True)
+        headers = [name if not name or is_time(name) else f"{a} {name}".strip() for a, name in both]
+    return headers
+
+
+def _stated(found: re.Match[str]) -> tuple[str, float] | None:
+    """Return a rate [Hz] or sample time [s] with its name; None if its unit is of another kind."""
+    value, text = float(found["value"].replace(",", ".")), found["unit"] or found["in"]
+    target = "Hz" if found["rate"] else "s"
+    unit = find(text) if text else None
+    if text and (unit is None or unit.target != target):
+        return None
+    name = " ".join(found["name"].rpartition("\n")[2].split())
+    size = convert(np.array([value]), unit.name, target) if unit else [value]
+    return f"{name}/{'sample_rate' if found['rate'] else 'dt'}", float(size[0])
 
 
 def _fitness(dialect: Dialect, lines: Sequence[str]) -> tuple[float, bool, bool, int, Dialect]:
@@ -140,11 +266,22 @@ def _fitness(dialect: Dialect, lines: Sequence[str]) -> tuple[float, bool, bool,
 
 def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
     """Return whether a row of words has units that are not names."""
-    cells = [cell.strip("[]() ") for cell in row if cell]
-    found = [find_listed(cell) or (re.search(r"[/*·^]", cell) and find(cell)) for cell in cells]
-    return _known(row) <= _known(above) and 2 * sum(map(bool, found)) >= len(cells)
+    cells = [_bare(cell) for cell in row if cell]
+    return _known(row) <= _known(above) and 2 * sum(map(_is_unit, cells)) >= len(cells)
+
+
+def _is_unit(cell: str) -> bool:
+    return bool(find_listed(cell) or (re.search(r"[/*·^]", cell) and find(cell)))
+
+
+def _bare(cell: str) -> str:
+    return cell.strip("[]() ")
 
 
 def _known(row: Sequence[str]) -> int:
-    """Return the number of cells in a row that name a standard channel."""
-    return sum(map(is_standard, row))
+    """Return the number of standard channels that cells of a row name."""
+    return len({cell for cell in row if is_standard(cell)})
+
+
+def _numbered(width: int) -> list[str]:
+    return [f"column_{i}" for i in range(1, width + 1)]

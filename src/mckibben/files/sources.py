@@ -117,7 +117,8 @@ def tables(path: Path, request: Request) -> tuple[list[Table], str]:
         else:
             for each, file in files.items():
                 lines = request.header, request.skip, request.encoding
-                found[each] = formats.read(formats.laid_out(file, each, *lines), each)
+                text = formats.laid_out(file, each, *lines)
+                found[each] = formats.read(text, each, request.sheet)
         for (each, file), state in zip(files.items(), before, strict=True):
             file.seek(0)
             digests.append(hashlib.file_digest(file, "sha256").hexdigest())

@@ -10,6 +10,7 @@ import io
 import os
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from io import BufferedReader, BytesIO
 from pathlib import Path
 from typing import Any
@@ -20,15 +21,18 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files import own
 from mckibben.files.cells import MISSING, Dialect, column
-from mckibben.files.headers import is_time
+from mckibben.files.decoding import decoded
+from mckibben.files.headed import keyed, labview
 from mckibben.files.instants import may_be_instant
+from mckibben.files.lines import samples
 from mckibben.files.notices import listed, warn
-from mckibben.files.sniffing import SEPARATORS, Layout, decoded, sniff
+from mckibben.files.sniffing import SEPARATORS, Layout, sniff
+from mckibben.files.stacked import stack, unstacked
 from mckibben.files.table import Column, Table
 from mckibben.system.atomic import digest
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
 
-_SNIFFED = 2**18  # bytes by which the layout of a table is recognised
+_SNIFFED = 2**18  # bytes of a line by which the layout of a table is recognised
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -36,7 +40,10 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     data = file.read()
     if os.path.lexists(own.sidecar(path)) and (found := _own(data, path)):
         return [found]
-    return [parsed(decoded(data, path), path)]
+    data = decoded(data, path)
+    if segments := labview(data):
+        return [replace(_table(*each, path), name=name) for name, each in segments.items()]
+    return [parsed(data, path)]
 
 
 def laid_out(
@@ -47,9 +54,12 @@ def laid_out(
     The others have the same numbers as before. Errors are those of `mckibben.read`.
     """
     try:
-        lines = file.read().decode("utf-8" if encoding is None else encoding).splitlines()
+        data = file.read()
+        if encoding is not None:
+            data = data.decode(encoding).encode()
+        lines = decoded(data, path).decode().split("\n")
     except (LookupError, ValueError):
-        problem = f"it is no text in {encoding or 'utf-8'}"
+        problem = f"it is no text in {encoding}"
         raise DataError(problem, file=path, parameter="encoding", remedy="choose another") from None
     first = max(header, 1)
     text = "\n".join(
@@ -102,14 +112,20 @@ def parsed(data: bytes, path: Path, separators: Sequence[str | None] = SEPARATOR
     if named:
         separators = (named[1].decode(),)
         data = b"\n" + data[named.end() :]  # so that lines have the same numbers
-    start = data[:_SNIFFED].decode("utf-8", "replace").split("\n")
-    return _table(data, sniff(start[:400], path, separators), path)
+    if (found := keyed(data)) is not None:
+        return _table(*found, path)
+    rows = data.split(b"\n")
+    start = [row[:_SNIFFED].decode("utf-8", "replace") for row in rows[:400]]
+    return _table(rows, sniff(start, path, separators), path)
 
 
-def _table(data: bytes, layout: Layout, path: Path) -> Table:
-    """Return the table of the samples of a text; lines may end before a last column without header."""
+def _table(rows: Sequence[bytes], layout: Layout, path: Path) -> Table:
+    """Return the table of the samples of a text."""
     dialect, headers = layout.dialect, layout.headers
-    numbers, body = _samples(data, layout, path)
+    numbers, lines = samples(rows, layout, path)
+    missing = len(headers) - len(dialect.split(lines[0].decode("utf-8", "replace")))
+    lines[0] += (dialect.separator or " nan").encode() * missing  # by which pandas counts columns
+    body = b"\n".join(lines).replace("−".encode(), b"-")
     options: dict[str, Any] = {"names": range(len(headers)), "na_values": list(MISSING)}
     frame = _frame(body, dialect, low_memory=False, **options)
     if len(frame) != len(numbers):  # so that no sample has the number of another line
@@ -117,24 +133,32 @@ def _table(data: bytes, layout: Layout, path: Path) -> Table:
     marked = [i for i in frame if frame[i].dtype.kind == "f" and frame[i].notna().any()]
     unclear = [i for i in marked if not _shows_decimals(frame[i].to_numpy())]
     texts = _frame(body, dialect, dtype=object, usecols=unclear, **options) if unclear else {}
-    columns: list[Column] = []
-    unread: dict[str, str] = {}
     decimals: dict[str, str] = {}  # column -> a number that has three digits after the mark, as all
-    for i, (header, unit) in enumerate(zip(headers, layout.units, strict=True)):
-        cells, name = frame[i], header or f"column_{i + 1}"
+
+    def made(i: int, name: str, unit: str | None, some: Any = slice(None)) -> Column:
+        cells = frame[i].iloc[some]
         if i in unclear or (cells.dtype.kind not in "iufb" and cells.notna().any()):
-            found, cell = column(name, unit, texts[i] if i in unclear else cells, dialect)
-            first = next(filter(None, found.texts), "")
-            if found.values is None and not may_be_instant(first):
-                unread[name] = f"text, such as {first[:40]!r}"
-            if cell:
-                decimals[name] = cell
-            columns.append(found)
-        elif cells.notna().any():
-            columns.append(Column(name, cells.to_numpy(np.float64), unit))
-        elif header:
-            columns.append(Column(name, None, unit, texts=[""]))
-            unread[name] = "no number in it"
+            cells = texts[i].iloc[some] if i in unclear else cells
+            found, cell = column(name, unit, cells, dialect)
+            decimals.update({name: cell} if cell else {})
+            return found
+        values = cells.to_numpy(np.float64) if cells.notna().any() else None
+        return Column(name, values, unit, texts=[""] * len(cells) if values is None else ())
+
+    if (found := stack(headers, frame)) is not None:
+        clock = made(found.time, headers[found.time], layout.units[found.time])
+        return unstacked(found, frame, clock, made, numbers, path)
+    named = zip(range(len(headers)), headers, layout.units, strict=True)
+    columns = [
+        made(i, header or f"column_{i + 1}", unit)
+        for i, header, unit in named
+        if header or frame[i].notna().any()
+    ]
+    unread = {}
+    for each in columns:
+        first = next(filter(None, each.texts), "")
+        if each.values is None and not may_be_instant(first):
+            unread[each.header] = f"text, such as {first[:40]!r}" if first else "no number in it"
     if decimals and unclear == marked:
         names, cell = listed([repr(name) for name in decimals], 10), next(iter(decimals.values()))
         mark = dialect.decimal
@@ -144,59 +168,8 @@ def _table(data: bytes, layout: Layout, path: Path) -> Table:
             f"taken for the decimal mark: {cell} is {float(cell.replace(mark, '.')):.6g}, "
             f"not {cell.replace(mark, '')}",
         )
-    return Table(tuple(columns), lines=np.array(numbers), unread=unread)
-
-
-def _samples(data: bytes, layout: Layout, path: Path) -> tuple[list[int], bytes]:
-    """Return the numbers of the lines of samples and their text, with a cell per header.
-
-    Blank lines, comments, and words or separators alone at the end are left out.
-    """
-    dialect, headers, rows = layout.dialect, layout.headers, data.split(b"\n")
-    separator = (dialect.separator or " ").encode()
-    blanks = rb" \v\f" if separator == b"\t" else rb" \t\v\f"
-    skipped = re.compile(rb"[%s]*(?:$|%s)" % (blanks, dialect.comment.encode())).match
-    start = layout.first
-    numbers = [k for k, row in enumerate(rows[start:], start + 1) if not skipped(row)]
-    while numbers and not rows[numbers[-1] - 1].strip(b' \t\v\f"' + separator):
-        numbers.pop()
-    if not numbers:
-        remedy = "give a file with samples"
-        raise DataError("there is a header and no samples", file=path, remedy=remedy)
-    lines = bare = [rows[number - 1] for number in numbers]
-    if b'"' in data:
-        bare = re.sub(rb'"[^"\n]*"', b"_", b"\n".join(lines)).split(b"\n")
-        for number, line in zip(numbers, bare, strict=True):
-            if b'"' in line:
-                problem, remedy = "a quotation mark is not closed", "write no line breaks in cells"
-                raise DataError(problem, file=path, row=number, remedy=remedy)
-    if dialect.separator is None:
-        counts = np.array([len(line.split()) for line in bare])
-    else:
-        counts = np.array([line.count(separator) + 1 for line in bare])
-    named = re.compile(
-        rb"[%s\"]*[A-Za-z\x80-\xff]" % blanks
-    ).match  # as "Maximum" behind a blank line
-    if not named(lines[0]):
-        behind = np.flatnonzero(np.diff(numbers) > 1) + 1
-        at = next((int(k) for k in behind if named(lines[k])), len(numbers))
-        if at < len(numbers):
-            rest = lines[at].decode("utf-8", "replace")
-            warn(path, f"from row {numbers[at]} on it is no table, left out: {rest[:60]!r}")
-            numbers, lines, counts = numbers[:at], lines[:at], counts[:at]
-    wrong = np.flatnonzero((counts > len(headers)) | (counts < len(headers) - (not headers[-1])))
-    if wrong.size:
-        at = int(wrong[0])
-        rest = " ".join(b" ".join(lines[at:]).decode("utf-8", "replace").split())
-        if at == 0 or re.search(r"\d", rest, re.ASCII):
-            problem = f"there are {counts[at]} cells where the header has {len(headers)}"
-            remedy = "complete or delete that line, or give the line of names with `header`"
-            raise DataError(problem, file=path, row=numbers[at], remedy=remedy)
-        warn(path, f"from row {numbers[at]} on there are words alone, left out: {rest[:60]!r}")
-        numbers, lines = numbers[:at], lines[:at]
-    if numbers[-1] - numbers[0] >= len(numbers) and not any(map(is_time, headers)):
-        warn(path, "blank or commented lines are left out: without times, what follows moves up")
-    return numbers, b"\n".join(lines).replace("−".encode(), b"-")
+    start, rates = layout.start_time, layout.rates
+    return Table(tuple(columns), np.array(numbers), None, start, rates=rates, unread=unread)
 
 
 def _shows_decimals(values: Array) -> bool:

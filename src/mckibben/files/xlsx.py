@@ -13,50 +13,62 @@ from typing import Any
 
 from mckibben.errors import DataError
 from mckibben.files import text as texts
-from mckibben.files.channels import NAME, about
+from mckibben.files.channels import about
 from mckibben.files.notices import listed
 from mckibben.files.table import Table
 from mckibben.system.extras import demand
 
-_DOUBTFUL = re.compile(r"[+-]?\d{1,3}[.,]\d{3}", re.ASCII)
+_DOUBTFUL = re.compile(r"[+-]?\d{1,3}\.\d{3}", re.ASCII)
 """Text that is a number of thousands to some and one with decimals to others."""
 
+_NUMBER = re.compile(r"[-+.]?\d")
 
-def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Read the first sheet with numbers, or the one of ``channels.toml``."""
+
+def read(file: BufferedReader, path: Path, sheet: str | None = None) -> list[Table]:
+    """Read a sheet: by default the one of ``channels.toml``, or that with the most rows of numbers.
+
+    Raises
+    ------
+    DataError
+        If it is not there, or has no numbers.
+    """
     demand("openpyxl", "xlsx", "spreadsheets", file=path)
     import openpyxl
 
-    wanted = about(path).sheet
+    wanted = sheet or about(path).sheet
     with closing(
         openpyxl.load_workbook(file, read_only=True, data_only=True, keep_links=False)
     ) as book:
-        names = [sheet.title for sheet in book.worksheets]
-        for sheet in book.worksheets:
-            if wanted not in (None, sheet.title):
-                continue
-            sheet.reset_dimensions()  # which are claims
-            if (text := _text(sheet)) is not None:
-                found = texts.parsed(text, path, ("\t",))
-                reason = f"one sheet is read: the first with numbers, or sheet in {NAME}"
-                others = [name for name in names if wanted is None and name != sheet.title]
-                return [replace(found, unread={**found.unread, **dict.fromkeys(others, reason)})]
-    raise DataError(
-        f"there are no numbers in it, in {f'sheet {wanted!r} of ' if wanted else ''}{listed(names)}",
-        file=path,
-        remedy=f"save samples in columns under one line of names, or correct sheet in {NAME}",
-    )
+        names = [one.title for one in book.worksheets]
+        if wanted is not None and wanted not in names:
+            problem, remedy = f"there is no sheet {wanted!r}", f"name one of {listed(names)}"
+            raise DataError(problem, file=path, parameter="sheet", remedy=remedy)
+        texts_of = {one.title: _text(one) for one in book.worksheets if wanted in (None, one.title)}
+    name = max(texts_of, key=lambda name: texts_of[name][1:])
+    text, _, n_numbers = texts_of[name]
+    if not n_numbers:
+        raise DataError(
+            f"there are no numbers in {listed(list(texts_of))}",
+            file=path,
+            remedy="save samples in columns under one line of names, or name a `sheet` with numbers",
+        )
+    found = texts.parsed(text, path, ("\t",))
+    reason = f"one sheet is read, {name!r}: the one with most rows of numbers, or `sheet`"
+    unread = dict.fromkeys((other for other in names if other != name), reason)
+    return [replace(found, unread={**found.unread, **unread})]
 
 
-def _text(sheet: Any) -> bytes | None:
-    """Return a sheet as text, with a line per row and tabs between; None without numbers."""
-    rows = list(sheet.iter_rows(values_only=True))
-    if not any(isinstance(value, (int, float)) for row in rows for value in row):
-        return None
-    lines = ["\t".join(map(_cell, row)).rstrip("\t") for row in rows]
-    width = max(line.count("\t") for line in lines)
-    filled = (line and line + "\t" * (width - line.count("\t")) for line in lines)
-    return ("\n".join(filled) + "\n").encode()
+def _text(sheet: Any) -> tuple[bytes, int, int]:
+    """Return a sheet as text, a line per row and tabs between; its rows of numbers; and all numbers."""
+    sheet.reset_dimensions()  # which are claims
+    rows = [[_cell(value) for value in row] for row in sheet.iter_rows(values_only=True)]
+    numbers = [sum(_NUMBER.match(cell) is not None for cell in row) for row in rows]
+    filled = [sum(map(bool, row)) for row in rows]
+    of_numbers = sum(2 * n > m for n, m in zip(numbers, filled, strict=True))
+    lines = ["\t".join(row).rstrip("\t") for row in rows]
+    width = max((line.count("\t") for line in lines), default=0)
+    lines = [line and line + "\t" * (width - line.count("\t")) for line in lines]
+    return ("\n".join(lines) + "\n").encode(), of_numbers, sum(numbers)
 
 
 def _cell(value: object) -> str:

@@ -67,6 +67,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     """
     request, source = source.request, _with_clocks(source)
     columns, left_out = assign(source)
+    columns = _of_messages(columns, source)
     columns, dropped = clocks.on_one(columns, source)
     left_out |= dict.fromkeys(dropped, "it does not cover the times of the others")
     clock = columns.pop("time", None)
@@ -154,6 +155,21 @@ def _with_clocks(source: Source) -> Source:
             values = None if column.values is None else column.values[known]
             columns.append(replace(column, values=values, times=seconds[known]))
     return replace(source, table=replace(table, columns=tuple(columns), lines=None))
+
+
+def _of_messages(columns: dict[str, Column], source: Source) -> dict[str, Column]:
+    """Return columns each with the times of its samples, if there is no row with all of them."""
+    clock, others = columns.get("time"), {n: c for n, c in columns.items() if n != "time"}
+    sampled = {n: np.isfinite(c.values) for n, c in others.items() if c.values is not None}
+    held = [each for each in sampled.values() if each.any()]
+    if clock is None or source.table.own or len(held) < 2 or np.all(held, axis=0).any():
+        return columns
+    times = times_of(clock, source)
+    seconds = convert(times.values, times.unit, "s")
+    for name, known in sampled.items():
+        values = np.asarray(others[name].values)[known]
+        others[name] = replace(others[name], values=values, times=seconds[known])
+    return others
 
 
 def times_of(column: Column, source: Source) -> Times:

@@ -86,8 +86,8 @@ def _of_table(found: Mapping[str, Node], group: Any) -> Iterator[tuple[str, Node
 def _index(values: Node, name: Any, kind: Any) -> Iterator[tuple[str, Node]]:
     """Yield the index, unless it counts the rows."""
     values, name = _typed(values, kind), _text(name)
-    counts = isinstance(values, np.ndarray) and values.dtype.kind in "iu"
-    if not (name is None and counts and np.array_equal(values, np.arange(len(values)))):
+    counts = isinstance(values, np.ndarray) and np.array_equal(values, np.arange(values.size))
+    if name is not None or not counts:
         yield name or ("time" if "time" in str(_text(kind)) else "index"), values
 
 

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import mckibben
+from mckibben.files.headers import channel_of, parse
+from mckibben.files.names import UNITS, plain, words_of
+from mckibben.files.units import find
 from tests.files.made import one, place, put, refused
 
 FACTORS = {
@@ -49,6 +52,56 @@ def test_temperatures_have_an_offset(tmp_path: Path, unit: str, gain: float, zer
     cells = 300 + np.arange(20)
     found = one(put(tmp_path / "a.csv", "temperature", cells), units={"temperature": unit})
     assert found["temperature"] == pytest.approx(gain * cells + zero)
+
+
+LABS = {  # headers as labs write them -> channel and factor to the package's unit
+    "Zeit (Sekunden)": ("time", 1), "Temps écoulé [secondes]": ("time", 1),
+    "tiempo_milisegundos": ("time", 1e-3), "时间（毫秒）": ("time", 1e-3), "시간(초)": ("time", 1),
+    "Innendruck (Kilopascal)": ("pressure", 0.01), "presion_mmHg": ("pressure", 0.00133322387),
+    "Pression [mm Hg]": ("pressure", 0.00133322387), "气压（兆帕）": ("pressure", 10),
+    "圧力 [キロパスカル]": ("pressure", 0.01), "Pressão (quilopascal)": ("pressure", 0.01),
+    "Déplacement (millimètres)": ("displacement", 1), "deplacement_millimetre": ("displacement", 1),
+    "Hub (Zentimeter)": ("displacement", 10), "Spostamento (centimetri)": ("displacement", 10),
+    "변위 (밀리미터)": ("displacement", 1), "変位（ミリメートル）": ("displacement", 1),
+    "KRAFT (KILONEWTON)": ("force", 1e3), "Effort (newtons)": ("force", 1),
+    "effort_2_N": ("force_2", 1), "cable tension [N]": ("cable_tension", 1),
+    "拉力（牛顿）": ("force", 1), "Tension (volts)": ("voltage", 1), "電圧（ボルト）": ("voltage", 1),
+    "Winkel in Grad": ("angle", np.pi / 180), "angulo_graus": ("angle", np.pi / 180),
+    "角度（度）": ("angle", np.pi / 180), "Velocità (metri/secondo)": ("velocity", 1e3),
+    "velocidad (milímetros por segundo)": ("velocity", 1), "速度（毫米/秒）": ("velocity", 1),
+    "Drehmoment (Newton·Meter)": ("torque", 1), "contracción (por ciento)": ("contraction", 0.01),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("header", LABS)
+def test_headers_of_labs_in_their_languages(tmp_path: Path, header: str) -> None:
+    channel, factor = LABS[header]
+    cells = RIGHT / factor
+    columns = [RIGHT, cells] if channel != "time" else [cells, RIGHT]
+    names = ["time_s", header] if channel != "time" else [header, "force_N"]
+    recording = one(put(tmp_path / "a.csv", ";".join(names), *columns, separator=";"))
+    found = recording.time if channel == "time" else recording[channel]
+    assert found == pytest.approx(RIGHT)
+
+
+def test_every_word_is_its_unit_in_any_case_and_without_accents() -> None:
+    for word, symbol in words_of(UNITS).items():
+        text = word.replace("_", " ")
+        for form in {text, text.upper(), text.capitalize(), plain(text), f"{text}."}:
+            assert symbol in ("/", "absolute", "gauge") or find(form) == find(symbol) is not None
+
+
+@pytest.mark.parametrize("word", ["Druck absolut [bar]", "pression (bar absolus)", "p (kPa 绝对)"])
+def test_words_for_absolute_pressure(word: str) -> None:
+    header = parse(word)
+    assert channel_of(header) == "pressure"
+    assert header.unit is not None
+    assert getattr(find(header.unit), "reference", None) == "absolute"
+
+
+@pytest.mark.parametrize("name", ["pressure_second", "pressure_grad", "forza_pollice"])
+def test_words_that_are_units_elsewhere_stay_names(name: str) -> None:
+    assert parse(name).unit is None
 
 
 NONE = ["foo", "NM", "9**9**9", "10^10^10", "__import__", "bar;", "a" * 1000, "(", "1e9"]

@@ -8,6 +8,7 @@ are refused.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -106,6 +107,16 @@ def load(path: str | Path) -> Block:
             "give a model first; recordings are read with mckibben.read",
         )
     raise ModelError(problem, file=path, remedy=remedy)
+
+
+def is_saved(path: Path) -> bool:
+    """Return whether a file of JSON is one that this package saved, and no recording."""
+    try:
+        return (
+            re.search(r'"format"\s*:\s*"mckibben-', read_text(path, most=LARGEST_FILE)) is not None
+        )
+    except DataError:
+        return False
 
 
 def _tuples(value: Any) -> Any:

@@ -24,6 +24,9 @@ READERS: dict[str, str] = {
     ".dat": "text",
     ".log": "text",
     ".lvm": "text",
+    ".json": "jsontext",
+    ".jsonl": "jsontext",
+    ".ndjson": "jsontext",
     ".parquet": "parquet",
     ".mat": "matlab",
     ".h5": "hdf5",
@@ -36,8 +39,8 @@ READERS: dict[str, str] = {
 }
 """Ending of the file's name -> module of this folder with ``read(file, path) -> list[Table]``."""
 
-SOUGHT = tuple(ending for ending in READERS if ending != ".log")
-"""Endings that a folder is searched for."""
+SOUGHT = tuple(ending for ending in READERS if ending not in (".log", ".json"))
+"""Endings that a folder is searched for; of JSON are also models, results and descriptions."""
 
 
 def tables(path: Path) -> list[Table]:

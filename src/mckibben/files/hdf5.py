@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.errors import DataError
-from mckibben.files import tree
+from mckibben.files import frames, tree
 from mckibben.files.table import Table, plain_meta
 from mckibben.files.tree import INFO, Node, Unread
 from mckibben.system.extras import demand
@@ -61,14 +61,14 @@ class _Tree:
                 continue  # a soft link leads to what is read under its own name, or out of the file
             item = group[name]
             at = h5py.h5o.get_info(item.id).addr
-            if at not in self._seen:
+            about = {key.casefold(): each for key, each in _attributes(item).items()}
+            if at not in self._seen and about.get("class") != "TINDEX":  # of PyTables, to search
                 self._seen.add(at)
                 found[name] = self._node(item)
-                about = {key.casefold(): each for key, each in _attributes(item).items()}
                 unit = about.get("unit") or about.get("units")
                 if isinstance(unit, str) and name + INFO not in group:
                     found[name + INFO] = {"unit": unit}
-        return found
+        return frames.columns(found, group) if "pandas_type" in group.attrs else found
 
     def _node(self, item: Any) -> Node:
         import h5py
@@ -80,13 +80,15 @@ class _Tree:
         if self._matlab and "MATLAB_sparse" in item.attrs:
             return Unread("a sparse matrix")
         found = self.group(item)
+        if not self._matlab:
+            return found
         # a struct array has references in its fields, which unlike those of cells have no class
         arrays: dict[str, Any] = {
             name: node
             for name, node in found.items()
             if isinstance(node, list) and "MATLAB_class" not in item[name].attrs
         }
-        if not self._matlab or not arrays:
+        if not arrays:
             return found
         rows = zip(*arrays.values(), strict=True)
         return [dict(zip(arrays, each, strict=True)) for each in rows]

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
-from mckibben.files.names import CHANNELS, ROLES, words_of
+from mckibben.files.names import AMBIGUOUS, CHANNELS, ROLES, UNITS, words_of
 from mckibben.files.units import COUNTS, GAUGE, find, find_listed, weight
 from mckibben.recording import standard_unit
 
@@ -19,19 +19,19 @@ QUANTITIES = {"mm": "displacement", "N": "force", "bar": "pressure", "V": "volta
 LONGEST = 256
 """Characters of a header."""
 
-_ROLES, _CHANNELS = words_of(ROLES), words_of(CHANNELS)
+_ROLES, _CHANNELS, _UNITS = words_of(ROLES), words_of(CHANNELS), words_of(UNITS)
 _ATTACHED = re.compile("|".join(w for w in sorted(_ROLES, key=len, reverse=True) if w > "\u3000"))
 """Words for the ends of a loop that languages without blanks put before the channel: 目標圧力."""
 _EXTENSOR = {"extensor", "ext"}
 _ABOUT = {"variance", "var", "covariance", "std", "stddev", "status", "valid", "flag", "count"}
 """Words for properties of a channel that do not have its unit: ``pressure_variance``."""
-_DOUBTFUL = {"in", "min", "rev", "turn"}
+_DOUBTFUL = {"in", "min", "rev", "turn", "second", "grad", "pouce", "tour", "pollice", "segundo"}
 """Endings that are units only where the channel suits: ``pressure_in`` is that of an inlet."""
 _LETTERS = {"m", "s", "N", "V"}
 """Single letters that are units after any name but a standard one: ``u1_V``, not ``pressure_A``."""
 _AMOUNTS = {"l", "L", "ml", "g", "kg"}
 """What flows in a time, where it is no name: ``flow_l_s``, but ``muscle_l_mm``."""
-_REFERENCES = {"abs": "absolute", "absolute": "absolute", "gauge": "gauge"}
+_REFERENCES = {word: kind for word, kind in _UNITS.items() if kind in ("absolute", "gauge")}
 """What a pressure is measured from, where it is in the name: ``p_abs [bar]``."""
 
 _BRACKETED = re.compile(r"(?P<name>.*?)[\s_,/]*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?)[\])]")
@@ -105,6 +105,9 @@ def channel_of(header: Header) -> str:
         words = [word for word in _words(name) if _REFERENCES.get(word) != unit.reference]
         name = "_".join(words) or name
     standard = _standard(name)
+    word, number = _numbered(name)
+    if word in AMBIGUOUS and unit is not None and unit.target in QUANTITIES:
+        return QUANTITIES[unit.target] + (f"_{number}" if number else "")
     if standard is None:
         rest, _, about = name.rpartition("_")
         plain = f"{about}_of_{rest}" if unit_of(name) is not None and about in _ABOUT else name
@@ -211,7 +214,8 @@ def foreign_words(text: str) -> int:
     (6, 0)
     """
     text = _plain(text).casefold()
-    words = {word for word in (*_CHANNELS, *_ROLES, "°", "μ") if not word.isascii()}
+    known = (*_CHANNELS, *_ROLES, *_UNITS, "°", "μ")
+    words = {word for word in known if not word.isascii()}
     return sum(text.count(word) * len(word) for word in words)
 
 
@@ -241,12 +245,17 @@ def _standard(name: str) -> str | None:
     others = "_".join(word for word in words if word not in _EXTENSOR)
     if others != name and _CHANNELS.get(re.sub(r"_?\d*$", "", others)) == "pressure":
         return "pressure_extensor"
-    alias, number = re.sub(r"_?\d+$", "", name), re.sub(r".*\D", "", name)
+    alias, number = _numbered(name)
     if name in _CHANNELS or not number:
         return _CHANNELS.get(name)
     channel = _CHANNELS.get(alias, "time")
     several = len(alias) > 1 or alias == "p" or not alias.isascii()
     return f"{channel}_{number}" if several and channel != "time" else None
+
+
+def _numbered(name: str) -> tuple[str, str]:
+    """Return a name without its number, and that."""
+    return re.sub(r"_?\d+$", "", name), re.sub(r".*\D", "", name)
 
 
 def _expected(name: str) -> str | None:
@@ -280,7 +289,7 @@ def _is_doubtful(text: str) -> bool:
 def _referred(unit: str, name: str) -> str:
     """Return a unit with the pressure reference of the name."""
     found = [f"{unit} {word}" for word in _words(name) if word in _REFERENCES]
-    return found[0] if found and GAUGE.fullmatch(found[0]) else unit
+    return found[0] if found and getattr(find(found[0]), "reference", None) else unit
 
 
 def _last(name: str) -> str:

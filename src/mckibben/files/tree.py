@@ -80,7 +80,7 @@ def table(
         if values.ndim == 0:
             if values.dtype.kind in "biuf" and timebase.is_rate(place[-1]):
                 rates[where] = float(values)
-        elif values.dtype.kind not in "biuf":
+        elif values.dtype.kind not in "biufmM":
             complex_ = values.dtype.kind == "c"
             unread[where] = "complex numbers" if complex_ else f"values of type {values.dtype}"
         elif values.ndim > 1 and not is_matrix(values.shape):

@@ -1,7 +1,7 @@
 """Units, converted to the package's: bar, mm, N, s, rad, V, mm/s, degC.
 
-The spellings in common use are listed here, with their dimension; pint does the conversions and
-reads everything that is not listed. It is only imported when there is something to convert.
+The symbols in common use are listed here, with their dimension, and the words for them in `names`;
+pint does the conversions and reads all that is not listed. It is imported when something is converted.
 """
 
 from __future__ import annotations
@@ -13,35 +13,29 @@ from functools import cache, lru_cache
 from typing import Any, Literal
 
 from mckibben.arrays import Array
+from mckibben.files.names import UNITS, words_of
 
 SPELLINGS: dict[str, dict[str, str]] = {
     "bar": {
-        "bar": "bar bars", "mbar": "mbar", "Pa": "Pa 帕", "hPa": "hPa", "kPa": "kPa 千帕",
-        "MPa": "MPa 兆帕", "mPa": "mPa", "psi": "psi lbf/in^2 lbf/in2", "atm": "atm"},
-    "mm": {
-        "mm": "mm millimeter millimeters millimetre millimetres 毫米", "cm": "cm 厘米",
-        "m": "m meter meters metre metres", "inch": "in inch inches",
-        "um": "um micron microns micrometer micrometers 微米"},
-    "N": {
-        "N": "N newton newtons 牛", "kN": "kN", "mN": "mN", "gf": "gf", "kgf": "kgf kp", "lbf": "lbf"},
+        "bar": "bar bars", "mbar": "mbar", "Pa": "Pa", "hPa": "hPa", "kPa": "kPa", "MPa": "MPa",
+        "mPa": "mPa", "psi": "psi lbf/in^2 lbf/in2", "atm": "atm"},
+    "mm": {"mm": "mm", "cm": "cm", "m": "m", "inch": "in inch", "um": "um"},
+    "N": {"N": "N", "kN": "kN", "mN": "mN", "gf": "gf", "kgf": "kgf kp", "lbf": "lbf"},
     "s": {
-        "s": "s sec secs second seconds 秒 초", "ms": "ms msec millisecond milliseconds 毫秒",
-        "us": "us usec microsecond microseconds 微秒", "ns": "ns nsec nanosecond nanoseconds",
-        "min": "min minute minutes", "hour": "h hr hour hours", "day": "day days"},
-    "rad": {
-        "rad": "rad radian radians", "mrad": "mrad", "deg": "° deg degs degree degrees 度 도",
-        "turn": "rev revolution revolutions turn turns"},
-    "V": {"V": "V volt volts", "mV": "mV"},
+        "s": "s sec secs", "ms": "ms msec", "us": "us usec", "ns": "ns nsec nanosecond nanoseconds",
+        "min": "min", "hour": "h hr hour", "day": "day"},
+    "rad": {"rad": "rad", "mrad": "mrad", "deg": "° deg degs", "turn": "rev turn"},
+    "V": {"V": "V", "mV": "mV"},
     "mm/s": {"mm/s": "mm/s mm_s mmps", "cm/s": "cm/s cm_s", "m/s": "m/s m_s mps"},
-    "degC": {"degC": "°C degC C celsius", "K": "K kelvin", "degF": "°F degF fahrenheit"},
+    "degC": {"degC": "°C degC C", "K": "K kelvin", "degF": "°F degF fahrenheit"},
     "": {"": "- 1 none dimensionless mm/mm m/m", "percent": "% percent pct"},
-    "A": {"A": "A amp amps ampere amperes", "mA": "mA"},
+    "A": {"A": "A amp amps", "mA": "mA"},
     "Hz": {"Hz": "Hz", "kHz": "kHz"},
     "N*m": {"N*m": "N*m N·m N-m N.m Nm N_m", "mN*m": "mN*m mN·m mNm", "N*mm": "N*mm N·mm Nmm"},
     "rad/s": {
         "rad/s": "rad/s rad_s", "deg/s": "deg/s deg_s °/s dps", "rpm": "rpm r/min rev/min U/min"},
 }  # fmt: skip
-"""Package unit -> unit as pint calls it -> spellings, separated by blanks; any of them is proposed."""
+"""Package unit -> unit as pint calls it -> symbols, separated by blanks; any of them is proposed."""
 
 RARE: dict[str, dict[str, str]] = {
     "bar": {
@@ -52,11 +46,8 @@ RARE: dict[str, dict[str, str]] = {
 }  # fmt: skip
 """The same for units that are understood and never suggested."""
 
-MASSES = {
-    "gf": ("g", "gram", "grams"), "kgf": ("kg", "kilogram", "kilograms"),
-    "lbf": ("lb", "lbs", "pound", "pounds"),
-}  # fmt: skip
-"""Unit of force -> units of the mass with that weight."""
+MASSES = {"g": "gf", "kg": "kgf", "lb": "lbf", "lbs": "lbf", "pound": "lbf", "pounds": "lbf"}
+"""Unit of mass -> unit of force of that weight."""
 
 COUNTS = frozenset(
     (
@@ -72,6 +63,7 @@ GAUGE = re.compile(
 _WORD = r"[A-Za-zΩ°%]+(?:(?:\*\*|\^)?-?[1-3])?"
 _READABLE = re.compile(rf"{_WORD}(?:[*/· ]\(?{_WORD}\)?)*")
 _POWER = re.compile(r"(?<=[A-Za-z])(?=-?[1-3](?![\d.]))")
+_LETTERS = re.compile(r"[^\W\d_]+")
 _LOOK_ALIKES = str.maketrans({"º": "°", "µ": "u", "μ": "u", "⋅": "·", "∙": "·", "−": "-"})
 
 
@@ -127,7 +119,7 @@ def weight(text: str) -> str:
     >>> weight("kg"), weight("kN")
     ('kgf', 'kN')
     """
-    return next((force for force, mass in MASSES.items() if text.strip() in mass), text)
+    return MASSES.get(_plain(text), text)
 
 
 def convert(samples: Array, unit: str, target: str) -> Array:
@@ -188,6 +180,19 @@ def _ask_pint(text: str) -> Unit | None:
 
 
 def _plain(text: str) -> str:
-    """Replace look-alike characters by one form."""
+    """Replace look-alike characters by one form, and words by symbols.
+
+    >>> _plain("Millimètres"), _plain("milímetros por segundo"), _plain("毫米/秒")
+    ('mm', 'mm/s', 'mm/s')
+    """
     text = unicodedata.normalize("NFKC", text.replace("º", "°")).translate(_LOOK_ALIKES)
-    return re.sub(r" ?([/*·]) ?", r"\1", " ".join(text.split()))
+    text = " ".join(text.split()).rstrip(".")
+    words = _words()
+    whole = words.get(text.casefold().replace(" ", "_"))
+    text = whole or _LETTERS.sub(lambda word: words.get(word[0].casefold(), word[0]), text)
+    return re.sub(r" ?([/*·]) ?", r"\1", text)
+
+
+@cache
+def _words() -> dict[str, str]:
+    return words_of(UNITS)

@@ -22,7 +22,7 @@ def info(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
-    from mckibben.blocks.saving import load
+    from mckibben.blocks.saving import is_saved, load
     from mckibben.blocks.setting import summary
     from mckibben.estimators.catalogue import described
     from mckibben.report import results, text
@@ -36,7 +36,7 @@ def info(
         installed = versions()
         show(installed, lambda: text.lines(results.versions(installed)), as_json)
         return
-    if len(files) == 1 and files[0].suffix.lower() == ".json":
+    if len(files) == 1 and files[0].suffix.lower() == ".json" and is_saved(files[0]):
         about = summary(load(files[0]))
         show(about, lambda: text.lines(results.model(about)), as_json)
         return

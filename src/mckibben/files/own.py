@@ -180,7 +180,7 @@ def conflict(
     problem: str = "does not describe it as this package wrote it",
     remedy: str = "copy both again",
 ) -> DataError:
-    """Return the error for a description that is not to be believed."""
+    """Return the error for a description that is not used."""
     beside = sidecar(path).name
     remedy = f"{remedy}; or, to read it by its header alone, remove {beside}"
     return DataError(f"{beside} {problem}", file=path, remedy=remedy)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,10 @@ import pytest
 
 from mckibben import GPI, PI, DataError, ModelError, load
 from mckibben.blocks import saving
+from mckibben.blocks.base import VERSION
 from mckibben.blocks.laws import examples
 from mckibben.blocks.parameters import plain
+from tests.golden.models import all_models
 
 EXAMPLES = examples()
 GOOD: dict[str, Any] = GPI.example().to_dict()
@@ -49,7 +52,8 @@ def with_(**fields: object) -> Callable[[dict[str, Any]], object]:
 DAMAGES: dict[str, Callable[[dict[str, Any]], object]] = {
     "another format": with_(format="onnx"),
     "no format": without("format"),
-    "a later version": with_(version=2),
+    "a later version": with_(version=3),
+    "no version": without("version"),
     "an unknown kind": with_(kind="unheard-of"),
     "a kind that is a location": with_(kind="os:system"),
     "a kind that is a path": with_(kind="../gpi"),
@@ -112,6 +116,53 @@ def test_no_block_takes_an_unknown_field(kind: str) -> None:
     for surplus in ("kernel", "__init__"):
         with pytest.raises(ModelError):
             saving.from_dict({**EXAMPLES[kind].to_dict(), surplus: 1.0})
+
+
+SAVED = {**EXAMPLES, **all_models()}
+
+
+def parts_of(content: Any) -> Iterator[dict[str, Any]]:
+    """Yield a saved model and all of its parts."""
+    if isinstance(content, dict):
+        yield content
+    for each in content.values() if isinstance(content, dict) else content:
+        if isinstance(each, dict | list):
+            yield from parts_of(each)
+
+
+@pytest.mark.parametrize("name", SAVED)
+def test_no_field_may_be_missing_but_those_added_since(name: str) -> None:
+    for version in range(1, VERSION + 1):
+        content = json.loads(json.dumps(SAVED[name].to_dict() | {"version": version}))
+        for part in parts_of(content):
+            default = defaults_of(part.get("kind"), version)
+            for field in tuple(part):
+                value = part.pop(field)
+                found = answer(content)
+                if field in default:
+                    part[field] = default[field]
+                    assert found == answer(content), (name, field)
+                else:
+                    assert isinstance(found, str), (name, field)
+                    assert field in found
+                part[field] = value
+
+
+def defaults_of(kind: str | None, version: int) -> dict[str, Any]:
+    """Return the values of what a part may lack in a file of a version."""
+    cls: Any = type(EXAMPLES.get(kind or ""))
+    added = [name for name, since in getattr(cls, "added", {}).items() if version < since]
+    return (
+        {one.name: plain(one.default) for one in fields(cls) if one.name in added} if added else {}
+    )
+
+
+def answer(content: Mapping[str, Any]) -> Any:
+    """Return the block of a saved model, or why it is none."""
+    try:
+        return saving.from_dict(content)
+    except ModelError as error:
+        return error.problem
 
 
 def test_inverses_that_had_kinds_of_their_own_still_load() -> None:

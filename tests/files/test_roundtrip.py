@@ -1,5 +1,6 @@
 """What is written is read back equal, to the last bit."""
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -80,15 +81,14 @@ def test_csv_is_plain_to_other_programs(tmp_path: Path) -> None:
     assert (about["format"], about["units"]) == ("mckibben-recording", UNITS)
 
 
-OTHERS = [
-    *("", "{", "[]", "null", "[" * 100_000, "9" * 5000),
-    {"format": "other"},
-    {"units": {"pressure\x1b[31m": "bar", "displacement_model": "mm", "y": "cm"}},
-    *({"sample_time": 1e-320}, {"sample_time": 0.0}),
-]
+OTHERS = ["", "{", "[]", "null", "[" * 100_000, "9" * 5000, {"format": "other"}]
 CHANGED: list[Any] = [
-    *({"sha256": "0" * 64}, {"units": {"pressure": "bar"}}, {"sample_time": None}),
+    *({"sha256": "0" * 64}, {"units": {"pressure": "bar"}}, {"units": UNITS | {"y": "mm"}}),
     *({"units": UNITS | {"force": "N"}}, {"units": dict(reversed(UNITS.items()))}),
+    {"units": {"pressure\x1b[31m": "bar", "displacement_model": "mm", "y": "cm"}},
+    *({"sample_time": step} for step in (1e-320, 0.0, None, 1 / 31, 1 / 30 + 1e-15)),
+    *({"start_time": 0.2}, {"meta": {"rig": "bench 2"}}, {"meta": {}}, {"more": 1}),
+    *({"version": version} for version in (0, 1, 3, True)),
 ]
 
 
@@ -107,12 +107,45 @@ def test_a_description_that_is_not_by_this_package_is_ignored_with_a_note(
     assert np.array_equal(back["pressure"], RECORDING["pressure"])
 
 
-@pytest.mark.parametrize("other", CHANGED, ids=lambda other: str(other)[:40])
-def test_a_description_of_other_samples_is_refused(tmp_path: Path, other: Any) -> None:
-    path, beside = tmp_path / "a.csv", tmp_path / "a.csv-metadata.json"
-    mckibben.write(RECORDING, path)
+def put_beside(path: Path, **other: Any) -> None:
+    """Change a description."""
+    beside = path.with_name(f"{path.name}-metadata.json")
     beside.write_text(json.dumps(json.loads(beside.read_text(encoding="utf-8")) | other))
-    assert refused(path).file == path
+
+
+@pytest.mark.parametrize("other", CHANGED, ids=lambda other: str(other)[:40])
+def test_a_description_never_overrules_its_samples(tmp_path: Path, other: Any) -> None:
+    path = tmp_path / "a.csv"
+    mckibben.write(RECORDING, path)
+    put_beside(path, **other)
+    error = refused(path)
+    assert error.file == path
+    assert ("newer" in error.problem) == (other == {"version": 3})
+    assert "remove a.csv-metadata.json" in error.remedy
+    path.with_name("a.csv-metadata.json").unlink()
+    assert one(path, units=UNITS).sample_time == pytest.approx(1 / 30)
+
+
+def test_the_description_of_another_recording_is_refused(tmp_path: Path) -> None:
+    for name, gain in (("a", 1.0), ("b", 2.0)):
+        doubled = RECORDING.with_channels(pressure=gain * RECORDING["pressure"])
+        mckibben.write(doubled, tmp_path / f"{name}.csv")
+    (tmp_path / "b.csv-metadata.json").replace(tmp_path / "a.csv-metadata.json")
+    assert refused(tmp_path / "a.csv").file == tmp_path / "a.csv"
+
+
+@pytest.mark.parametrize(
+    "other", [{}, {"sample_time": 1 / 31}, {"sample_time": 1 / 30 + 1e-12}, {"start_time": 0.2}]
+)
+def test_of_version_1_the_times_are_checked(tmp_path: Path, other: Any) -> None:
+    path = tmp_path / "a.csv"
+    mckibben.write(RECORDING, path)
+    samples = hashlib.sha256(path.read_bytes()).hexdigest()
+    put_beside(path, version=1, sha256=samples, **other)
+    if other:
+        assert refused(path).file == path
+    else:
+        assert one(path) == RECORDING
 
 
 @pytest.mark.parametrize(
@@ -157,12 +190,13 @@ def test_other_endings_and_missing_folders_are_refused(tmp_path: Path, name: str
 
 
 ONES = np.ones(10)
+UNWRITABLE = [{1, 2}, float("nan"), "\udcff", "x" * 2**22]
 BAD = [Recording({name: ONES}) for name in ("a\nb", " ")]
-BAD += [Recording({"x": ONES}, meta={"a": value}) for value in ({1, 2}, float("nan"))]
+BAD += [Recording({"x": ONES}, meta={"a": value}) for value in UNWRITABLE]
 BAD += [Recording({"x": ONES}, units={"x": "\x1b[2J"})]
 
 
-@pytest.mark.parametrize("bad", BAD, ids=str)
+@pytest.mark.parametrize("bad", BAD, ids=lambda bad: str(bad)[:60])
 def test_what_cannot_be_read_back_is_not_written_and_nothing_is_lost(
     tmp_path: Path, bad: Recording
 ) -> None:

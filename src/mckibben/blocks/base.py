@@ -40,7 +40,7 @@ from mckibben.system.threads import on_all_cores
 Advance = Callable[[], None]
 Start = Callable[..., None]
 
-FORMAT, VERSION = "mckibben-model", 1
+FORMAT, VERSION = "mckibben-model", 2
 """First fields of a saved block; see `mckibben.blocks.saving`."""
 
 VIRGIN = {"first_sample": False, "virgin": True}
@@ -133,6 +133,11 @@ class Block(Hinted, DrawsItself, Parametrised):
     settable: ClassVar[Mapping[str, str | None]] = {}
     """Fields that are not identified and can be set on a saved model: each with the field of the
     lowest and highest value in its identification, or None; see `mckibben.blocks.setting`.
+    """
+
+    added: ClassVar[Mapping[str, int]] = {}
+    """Fields that files had not from the first: each with the first version of the format that has it.
+    They have their defaults where an older file lacks them; whoever adds one raises `VERSION`.
     """
 
     retired: ClassVar[Mapping[str, Any]] = {}

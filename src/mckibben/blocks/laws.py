@@ -279,6 +279,9 @@ def _saves(trial: Trial) -> None:
     trial.demand(copy.to_dict() == trial.block.to_dict(), "a copy saves as the block does")
     trial.same(trial.run(trial.inputs, block=copy), trial.outputs, "a copy simulates the same")
     trial.refused(ModelError, "surplus", saving.from_dict, {**content, "surplus": 1})
+    for name in content:
+        less = {key: value for key, value in content.items() if key != name}
+        trial.refused(ModelError, name, saving.from_dict, less)
 
 
 def _takes_recordings(trial: Trial) -> None:

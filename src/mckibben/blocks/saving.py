@@ -1,8 +1,8 @@
 """Reading saved blocks: JSON that is data only, never code. `Block.save` writes it.
 
 A file starts with ``format`` and ``version``; every block names its ``kind``, which the registry
-turns into a class. Unknown kinds and fields, numbers that are not finite and values of the wrong type
-are refused.
+turns into a class. Unknown kinds, unknown and missing fields, numbers that are not finite and values of
+the wrong type are refused. An older file may lack what was ``added`` to a class since, and no more.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
+from contextvars import ContextVar
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ from mckibben.system.ordinary import read_text
 LARGEST_FILE = 64 * 2**20
 """Largest model file [bytes]; a larger one is refused before parsing."""
 
+_READ: ContextVar[int | None] = ContextVar("version of the file that is read", default=None)
+
 
 def from_dict(content: Mapping[str, Any]) -> Block:
     """Return the block of a dict from `Block.to_dict`; raise an error for invalid content."""
@@ -32,21 +35,29 @@ def from_dict(content: Mapping[str, Any]) -> Block:
             remedy="give a file that `fit()` or Block.save wrote",
         )
     version = content.get("version")
-    if type(version) is not int or version != VERSION:
+    if type(version) is not int or not 1 <= version <= VERSION:
+        newer = type(version) is int and version > VERSION
+        problem = f"it is of version {version!r:.60} of its format, and not of 1 to {VERSION}"
         raise ModelError(
-            f"the model has format version {version!r:.60}, this package reads version {VERSION}",
-            remedy="save it again with a matching release of mckibben",
+            f"it was written by a newer mckibben: {problem}" if newer else problem,
+            remedy="update mckibben" if newer else "save it again",
         )
     described = {key: value for key, value in content.items() if key not in ("format", "version")}
+    token = _READ.set(version)
     try:
         block: Block = part_from_dict(described)
     except RecursionError:
         raise ModelError("nested too deeply", remedy="compose fewer blocks in each other") from None
+    finally:
+        _READ.reset(token)
     return block
 
 
 def part_from_dict(content: Any, group: str = "blocks") -> Any:
-    """Return the block (or other plug-in of ``group``) of a dict from `plain`."""
+    """Return the block (or other plug-in of ``group``) of a dict from `plain`.
+
+    Of a saved file all fields must be there; what is written by hand may leave out those with defaults.
+    """
     if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str):
         raise ModelError('a block without a "kind"', remedy="save the model again")
     kind = content["kind"]
@@ -63,10 +74,14 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
     for name, unused in getattr(cls, "retired", {}).items():
         if values.get(name) == unused:
             values.pop(name, None)
-    unknown = sorted(set(values) - {field.name for field in fields(cls)}, key=str)
-    if unknown:
-        remedy = getattr(cls, "made_again", "save the model again")
+    known, read = {field.name for field in fields(cls)}, _READ.get()
+    remedy = getattr(cls, "made_again", "save the model again")
+    if unknown := sorted(values.keys() - known, key=str):
         raise ModelError(f"{kind!r} has no field {unknown[0]!r}", remedy=remedy)
+    since = getattr(cls, "added", {})
+    lacking = (name for name in known - values.keys() if read and read >= since.get(name, 1))
+    if missing := sorted(lacking):
+        raise ModelError(f"{kind!r} lacks the field {missing[0]!r}", remedy=remedy)
     return cls(**values)
 
 

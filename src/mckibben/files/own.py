@@ -5,41 +5,70 @@ from __future__ import annotations
 import json
 import warnings
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files.formats import tables
+from mckibben.files.notices import warn
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
-from mckibben.system import ordinary
 from mckibben.system.atomic import digest, replacing
+from mckibben.system.ordinary import DESCRIPTION, read_bytes
 from mckibben.system.validation import reason
+
+VERSION: Final = 2
+"""Version of the description that is written; of version 1, ``sha256`` is of the samples alone."""
+
+Plain = Annotated[str, Field(pattern=r"^[^\p{Cc}\p{Cf}\p{Zl}\p{Zp}]*$")]
+"""A text that can be printed."""
 
 
 class Stored(BaseModel):
     """Description of a recording in a CSV's sidecar.
 
-    ``sha256`` is of the samples as they are on disk, to see whether they were changed since; ``units``
-    are in the order of the columns. With a sample time, the first column is the time.
+    ``sha256`` is of all else in it and the samples as they are on disk; ``units`` are in the order of
+    the columns. With a sample time, the first column is the time.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
-    format: Literal["mckibben-recording"] = "mckibben-recording"
-    version: Literal[1] = 1
+    format: Literal["mckibben-recording"]
+    version: Literal[1, 2]
     sha256: str
     sample_time: Annotated[float, Field(ge=1e-12, lt=1e11)] | None
     start_time: float
-    units: dict[str, str]
+    units: dict[Plain, Plain]
     meta: dict[str, Any]
 
-    def table(self, values: dict[str, Array]) -> Table:
-        """Return the table of the samples described, by channel."""
+    def digest(self, samples: bytes) -> str:
+        """Return what ``sha256`` is to be, for these bytes of samples."""
+        if self.version == 1:
+            return digest(samples)
+        rest = json.dumps(self.model_dump(exclude={"sha256"}), allow_nan=False)
+        return digest(rest.encode() + b"\n" + samples)
+
+    @property
+    def header(self) -> list[str]:
+        """Names of the columns."""
+        return [*([] if self.sample_time is None else ["time"]), *self.units]
+
+    def table(self, values: dict[str, Array], path: Path) -> Table:
+        """Return the table of the samples described; raise an error if their times are others."""
+        if self.sample_time is not None:
+            times = on_grid(self.sample_time, self.start_time, values["time"].size)
+            if not np.allclose(values["time"], times, rtol=1e-15, atol=1e-12):
+                raise conflict(path)
         columns = tuple(Column(name, values[name], unit) for name, unit in self.units.items())
         return Table(columns, None, self.sample_time, self.start_time, self.meta, own=True)
+
+
+def on_grid(step: float, start: float, n: int) -> Array:
+    """Return the times in a file: 1.38, not 1.3800000000000001, as the description has the step."""
+    return (start + step * np.arange(n, dtype=np.float64)).round(12)
 
 
 def write(recording: Recording, path: str | Path) -> None:
@@ -62,15 +91,15 @@ def write(recording: Recording, path: str | Path) -> None:
 
     path = Path(path)
     require_csv(path)
-    # 1.38, not 1.3800000000000001: the description has the exact step
-    time = {} if recording.sample_time is None else {"time": recording.time.round(12)}
+    step, start, n = recording.sample_time, recording.start_time, recording.n_samples
+    time = {} if step is None else {"time": on_grid(step, start, n)}
     columns = {**time, **recording.channels}
     data = pd.DataFrame(columns).to_csv(index=False, lineterminator="\n").encode()
-    description = describe(recording, data, path) + "\n"
+    description = describe(recording, data, path)
     with replacing(path) as new:
         new.write_bytes(data)
     with replacing(sidecar(path)) as new:
-        new.write_text(description, encoding="utf-8")
+        new.write_bytes(description)
 
 
 def require_csv(path: Path) -> None:
@@ -79,7 +108,7 @@ def require_csv(path: Path) -> None:
         raise DataError("recordings are written as CSV", file=path, remedy="end it in .csv")
 
 
-def describe(recording: Recording, samples: bytes, path: Path) -> str:
+def describe(recording: Recording, samples: bytes, path: Path) -> bytes:
     """Return the description, in JSON, of a recording with these bytes of samples.
 
     Raises
@@ -99,37 +128,62 @@ def describe(recording: Recording, samples: bytes, path: Path) -> str:
             )
     step = recording.sample_time
     stored = Stored.model_construct(
-        sha256=digest(samples),
+        format="mckibben-recording",
+        version=VERSION,
+        sha256="",
         sample_time=None if step is None else float(step),
         start_time=float(recording.start_time),
         units=dict(recording.units),
         meta=dict(recording.meta),
     )
     try:
-        return json.dumps(stored.model_dump(), indent=2, allow_nan=False, ensure_ascii=False)
+        stored.sha256 = stored.digest(samples)
+        text = json.dumps(stored.model_dump(), indent=2, ensure_ascii=False)
+        found = f"{text}\n".encode()
     except (TypeError, ValueError, RecursionError) as error:
         problem = f"the recording's meta cannot be written as JSON ({error})"
         remedy = "use only text, finite numbers, lists and dicts in meta"
         raise DataError(problem, file=path, remedy=remedy) from None
+    if len(found) > DESCRIPTION:
+        problem = f"the recording's meta has {len(found)} bytes, of at most {DESCRIPTION}"
+        raise DataError(problem, file=path, remedy="leave samples out of meta")
+    return found
 
 
-def parse(text: str | bytes) -> Stored | str:
-    """Return the description in a JSON text, or why it is invalid."""
+def described(path: Path) -> Stored | None:
+    """Return the description beside a CSV; None, with a note, if it is not by this package.
+
+    Raises
+    ------
+    DataError
+        If it is by this package, and was changed or is of a newer version.
+    """
+    beside = sidecar(path)
     try:
-        found = Stored.model_validate_json(text)
+        return Stored.model_validate_json(read_bytes(beside, most=DESCRIPTION))
+    except DataError as error:
+        why = error.problem
     except ValidationError as error:
-        return reason(error)
-    words = (*found.units, *found.units.values())
-    return found if all(map(str.isprintable, words)) else "its names cannot be printed"
+        why, wrong = reason(error), {each["loc"]: each["input"] for each in error.errors()}
+        if not {(), ("format",)} & wrong.keys():
+            version = wrong.get(("version",))
+            if type(version) is int and version > VERSION:
+                by = f"was written by a newer mckibben, in version {version} of its format"
+                raise conflict(path, by, "update mckibben") from None
+            raise conflict(path) from None
+    warn(path, f"{beside.name} is ignored, as it is not by mckibben ({why})")
+    return None
 
 
-def changed(path: Path) -> DataError:
-    """Return the error for samples that are not those described."""
-    return DataError(
-        "its samples are not those that this package wrote",
-        file=path,
-        remedy=f"to read it by its header alone, remove {sidecar(path).name}",
-    )
+def conflict(
+    path: Path,
+    problem: str = "does not describe it as this package wrote it",
+    remedy: str = "copy both again",
+) -> DataError:
+    """Return the error for a description that is not used."""
+    beside = sidecar(path).name
+    remedy = f"{remedy}; or, to read it by its header alone, remove {beside}"
+    return DataError(f"{beside} {problem}", file=path, remedy=remedy)
 
 
 def sidecar(path: Path) -> Path:
@@ -146,18 +200,10 @@ def description(path: Path) -> Path | None:
     return sidecar(path) if path.suffix.casefold() == ".csv" else None
 
 
-def describes(path: Path) -> bool:
-    """Return whether a file is a description written by this package."""
-    try:
-        return isinstance(parse(ordinary.read_bytes(path, most=ordinary.DESCRIPTION)), Stored)
-    except MckibbenError:
-        return False
-
-
 def is_own(path: Path) -> bool:
     """Return whether a file is an unchanged recording written by this package."""
     beside = description(path)
-    if path.is_symlink() or (beside is not None and not describes(beside)):
+    if path.is_symlink() or (beside is not None and not beside.is_file()):
         return False
     try:
         with warnings.catch_warnings():

@@ -38,7 +38,7 @@ class Request(ReadOptions):
     @property
     def layout(self) -> tuple[object, ...]:
         """What determines the tables of a file, without what is read of them."""
-        return self.header, self.skip, self.encoding
+        return self.header, self.skip, self.encoding, self.sheet
 
     @property
     def fewest(self) -> int:

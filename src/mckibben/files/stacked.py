@@ -69,7 +69,7 @@ def unstacked(
     """Return a table with a column for each signal, and their times: one column if all are alike."""
     if clock.values is None:
         whole = Table((clock,), np.array(numbers))
-        since = seconds(clock.texts, Source(whole, Request(), path))
+        since, _ = seconds(clock.texts, Source(whole, Request(), path))
         clock = Column("time", since, "s")
     times = clock.values
     assert times is not None

@@ -29,8 +29,6 @@ from mckibben.files.notices import listed, warn
 from mckibben.files.sniffing import SEPARATORS, Layout, sniff
 from mckibben.files.stacked import stack, unstacked
 from mckibben.files.table import Column, Table
-from mckibben.system.atomic import digest
-from mckibben.system.ordinary import DESCRIPTION, read_bytes
 
 _SNIFFED = 2**18  # bytes of a line by which the layout of a table is recognised
 
@@ -71,21 +69,15 @@ def laid_out(
 
 def _own(data: bytes, path: Path) -> Table | None:
     """Return the table that a sidecar describes, or None if that is not by this package."""
-    try:
-        description = own.parse(read_bytes(own.sidecar(path), most=DESCRIPTION))
-    except DataError as error:
-        description = error.problem
-    if isinstance(description, str):
-        warn(path, f"{own.sidecar(path).name} is ignored, as it is not by mckibben ({description})")
+    description = own.described(path)
+    if description is None:
         return None
     header = data.partition(b"\n")[0].decode("utf-8", "replace")
-    dialect = Dialect(",", ".")
-    names = next(csv.reader([header], delimiter=","), [])
-    named = [*([] if description.sample_time is None else ["time"]), *description.units]
-    if description.sha256 != digest(data) or names != named:
-        raise own.changed(path)
-    frame = _frame(data, dialect, names, skiprows=1, dtype=np.float64)
-    return description.table({name: frame[name].to_numpy() for name in description.units})
+    names = next(csv.reader([header]), [])
+    if description.sha256 != description.digest(data) or names != description.header:
+        raise own.conflict(path)
+    frame = _frame(data, Dialect(",", "."), names, skiprows=1, dtype=np.float64)
+    return description.table({name: frame[name].to_numpy() for name in names}, path)
 
 
 def _frame(data: bytes, dialect: Dialect, names: Sequence[Any], **options: Any) -> Any:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.saving import from_dict
+from mckibben.blocks.saving import part_from_dict
 from mckibben.errors import DataError, ModelError
 from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import GROUPS, PLACES, traits
@@ -22,9 +22,6 @@ from mckibben.system.ordinary import DESCRIPTION, named_toml, read_text
 from mckibben.system.validation import invalid
 
 FORMAT, VERSION = "mckibben-muscle", 1
-
-HEADING = ("format", "version", "kind")
-"""Fields of a saved balance that a muscle's file leaves out."""
 
 FOLDER = Path(__file__).parent / "library"
 
@@ -160,8 +157,7 @@ def _load(path: Path) -> Muscle:
         )
     try:
         found = _File.model_validate(content)
-        example = Balance.example().to_dict()
-        balance = from_dict({name: example[name] for name in HEADING} | found.balance)
+        balance = part_from_dict(found.balance | {"kind": Balance.kind})
     except ValidationError as error:
         raise invalid(error, path, "correct it, as files of the library have it") from None
     except ModelError as error:
@@ -206,7 +202,7 @@ def described(muscle: Muscle) -> str:
     """Return a muscle as the text of its file."""
     block = muscle.balance.to_dict()
     channels = {"driven", "scheduled", "given"}
-    left = {*HEADING, "pressure_range", *channels}
+    left = {"format", "version", "kind", "pressure_range", *channels}
     left |= {
         each.name for each in fields(Balance) if getattr(muscle.balance, each.name) == each.default
     }

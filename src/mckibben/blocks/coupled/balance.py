@@ -195,6 +195,21 @@ class Balance(Invertible):
     """
 
     kind: ClassVar[str] = "balance"
+    added: ClassVar[Mapping[str, int]] = dict.fromkeys(
+        (
+            *("lines", "bladders", "pushes", "tare", "settled", "pressure_range", "mass", "known"),
+            *(
+                "asymmetry",
+                "friction_slopes",
+                "obstacles",
+                "directions",
+                "preload",
+                "drive",
+                "held",
+            ),
+        ),
+        2,
+    )
     ports: ClassVar[Ports] = SEVERAL
     kernel: ClassVar[Step] = balance_step
     start_kernel: ClassVar[Start] = start_balance

@@ -12,8 +12,9 @@ The form is this package's own; it is linear in its parameters but for lags and 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from itertools import combinations_with_replacement
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import Interval
@@ -112,6 +113,7 @@ class CoupledMemory(Block):
     """
 
     kind = "coupled-memory"
+    added: ClassVar[Mapping[str, int]] = {"crossed": 2}
     ports = SEVERAL
     kernel = coupled_memory_step
     start_kernel = coupled_memory_start

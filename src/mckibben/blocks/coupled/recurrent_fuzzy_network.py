@@ -18,7 +18,8 @@ PI-NARMAX Model", Section 3.
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Interval
@@ -132,6 +133,7 @@ class RecurrentFuzzyNetwork(Block):
     """
 
     kind = "recurrent-fuzzy-network"
+    added: ClassVar[Mapping[str, int]] = {"constants": 2}
     sample_time = same_as("own_time")
     n_scratch = same_as("n_regressors")
     ports = SEVERAL

@@ -8,7 +8,8 @@ a_k = exp(-T / tau_k), so the output answers at once and the inverse is in close
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic.dataclasses import dataclass
@@ -108,6 +109,7 @@ class Creep(Invertible):
     """
 
     kind = "creep"
+    added: ClassVar[Mapping[str, int]] = {"initial": 2}
     kernel = creep_step
     start_kernel = creep_start
     inverse_kernel = creep_inverse_step

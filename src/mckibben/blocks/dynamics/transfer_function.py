@@ -9,7 +9,8 @@ output answers at once (b_0 is not zero) and all zeros of B lie within the unit 
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +83,7 @@ class TransferFunction(fields.WithMemory, Block):
     """
 
     kind = "transfer-function"
+    added: ClassVar[Mapping[str, int]] = {"input_range": 2}
     kernel = filter_step
     start_kernel = filter_start
     rate_dependent = True

@@ -129,6 +129,7 @@ class ActivationPressure(Activation):
     """
 
     kind = "activation-pressure"
+    added: ClassVar[Mapping[str, int]] = {"frequency_range": 2}
     settable: ClassVar[Mapping[str, str | None]] = {
         "frequency": "frequency_range",
         "rate_time_constant": None,

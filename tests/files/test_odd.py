@@ -49,10 +49,11 @@ def is_true(options: Mapping[str, Any], file: Odd) -> bool:
 
 
 def known(file: Odd, channel: str) -> dict[str, dict[str, str]]:
-    """Return what the person at the rig states of a channel that no header names."""
-    column, unit = file.facts["columns"][channel], file.facts["units"][channel]
+    """Return what the person at the rig states of a channel or a unit that no header names."""
+    column = file.facts["columns"].get(channel, file.facts["time"])
     header = column if isinstance(column, str) else f"column_{column}"
-    return {"columns": {channel: header}, "units": {channel: unit}}
+    units = {} if channel == "time" else {"units": {channel: file.facts["units"][channel]}}
+    return {"columns": {channel: header}, **units}
 
 
 def with_more(options: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
@@ -68,25 +69,37 @@ def followed(file: Odd) -> tuple[Recording | DataError, dict[str, Any]]:
     (path,) = file.paths
     options: dict[str, Any] = {}
     stated = 0
-    for _ in range(STEPS + 1 + len(file.channels)):
+    for _ in range(STEPS + 2 + len(file.channels)):
         try:
             found = read(path, options)
         except DataError as error:
             if not error.options:
                 return error, options
             right = [one for one in error.options if is_true(one, file)]
+            if not right and {*error.options[0]} == {"units"}:  # a question to the one at the rig
+                right = [{"units": {c: file.facts["units"][c] for c in error.options[0]["units"]}}]
             if not right:
                 raise WrongError(f"no remedy is right: {error}") from None
             if stated >= STEPS:
                 raise WrongError(f"after {stated} remedies: {error}") from None
             options, stated = with_more(options, right[0]), stated + 1
             continue
-        unnamed = [channel for channel in file.channels if channel not in found]
-        if not unnamed:
+        unsure = [channel for channel in file.channels if channel not in found]
+        counted = "sample number" in file.about or file.facts["time"] is None
+        if found.sample_time is None and not counted:
+            unsure.append("time")
+        stated_units = options.get("units", {})
+        unsure += [
+            c
+            for c in found.meta.get("assumed_units", ())
+            if c in set(file.channels) - set(stated_units)
+        ]
+        if not unsure:
             return found, options
-        if unnamed[0] in options.get("columns", {}):
-            raise WrongError(f"{unnamed[0]} is left out")
-        options = with_more(options, known(file, unnamed[0]))
+        more = known(file, unsure[0])
+        if with_more(options, more) == options:
+            raise WrongError(f"{unsure[0]} is left out")
+        options = with_more(options, more)
     raise WrongError("it goes in a circle")
 
 

@@ -132,14 +132,21 @@ def column(name: str, unit: str | None, cells: Any, dialect: Dialect) -> tuple[C
         "write numbers without marks between thousands, with one decimal mark in the whole file, and "
         "whole numbers with it too, such as 2.0 for 2"
     )
-    if not wrong.any():
+    bridgeable = not wrong.any()
+    if bridgeable:
         wrong, problem = filled & (kinds != usual), "is not a number like the others"
-        remedy = "correct that cell, or leave it blank and use `gaps=split` or `gaps=interpolate`"
+        remedy = "correct that cell"
+    values = np.array(
+        [
+            math.nan if f in ("grouped", "spaced") else dialect.value(m)
+            for f, m in zip(forms, matches, strict=True)
+        ]
+    )
     if wrong.any():
         at = int(np.argmax(wrong))
-        flaw = Flaw(at, f"{words[codes[at]][:40]!r} {problem}", remedy)
-        return Column(name, np.full(codes.size, np.nan), unit, flaw=flaw), ""
-    values = np.array([dialect.value(match) for match in matches])
+        flaw = Flaw(at, f"{words[codes[at]][:40]!r} {problem}", remedy, bridgeable)
+        bad = wrong | (not bridgeable)
+        return Column(name, np.where(bad, np.nan, values[codes]), unit, flaw=flaw), ""
     cell = next((w for w, f in zip(words, forms, strict=True) if f == "three digits"), "")
     return Column(name, values[codes], unit), "" if plain else cell
 

@@ -15,7 +15,7 @@ from mckibben.files.channels import NAME, Channel, Time
 from mckibben.files.choosing import assign
 from mckibben.files.headers import is_clock, parse, snake_case, time_unit, unit_of, unknown_ending
 from mckibben.files.notices import listed
-from mckibben.files.request import Source
+from mckibben.files.request import GAPS_BRIDGED, Source
 from mckibben.files.table import Column
 from mckibben.files.timebase import Times
 from mckibben.files.units import COUNTS, Unit, convert, find, weight
@@ -52,12 +52,15 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     request, source = source.request, _with_clocks(source)
     columns, left_out = assign(source)
     columns, source, sampled = _apart(columns, source)
+    separate = any(column.times is not None for column in columns.values())
     columns, dropped = clocks.on_one(columns, source)
     left_out |= dict.fromkeys(dropped, "it does not cover the times of the others")
     clock = columns.pop("time", None)
     if clock is not None and clock.values is None and request.step is not None:
         left_out[clock.header], clock = "the rate is given", None
     times = None if clock is None else times_of(clock, source)
+    if clock is not None and clock.values is not None and separate:  # in seconds already
+        times = Times(clock.values)
     signals: dict[str, Signal] = {}
     derived = source.derived(columns)
     for name, column in columns.items():
@@ -224,9 +227,13 @@ def _numbers(channel: str, column: Column, source: Source) -> Array:
     if column.values is None:
         remedy = f"name a column of numbers with `columns[{channel}]=COLUMN`"
         raise source.error(f"column {column.header!r} holds text", remedy, channel, 0)
-    if column.flaw is not None:
-        flaw = column.flaw
-        raise source.error(flaw.problem, flaw.remedy, channel, flaw.sample)
+    if (flaw := column.flaw) is None:
+        return column.values
+    if not flaw.bridgeable or source.request.gaps == "error":
+        options = GAPS_BRIDGED[:2] if flaw.bridgeable else ()
+        raise source.error(flaw.problem, flaw.remedy, channel, flaw.sample, options)
+    row = source.table.row(flaw.sample)
+    source.warn(f"channel {channel!r}, row {row}: {flaw.problem}, so it is a missing sample")
     return column.values
 
 

@@ -10,15 +10,12 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array, Mask, true_runs
 from mckibben.files import timebase
 from mckibben.files.notices import listed
-from mckibben.files.request import Source
+from mckibben.files.request import GAPS_BRIDGED, Source
 from mckibben.files.timebase import Times
 from mckibben.files.units import convert
 from mckibben.recording import FEWEST_SAMPLES
 
 Channels = dict[str, Array]
-
-GAPS_BRIDGED = ({"gaps": "interpolate"}, {"gaps": "split"}, {"raw": True})
-"""Remedies of missing samples and of gaps."""
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ from mckibben.arrays import Array
 from mckibben.channels import by_name
 from mckibben.errors import DataError
 from mckibben.files.clocks import on_one
-from mckibben.files.gaps import GAPS_BRIDGED
-from mckibben.files.request import Request, Source
+from mckibben.files.request import GAPS_BRIDGED, Request, Source
 from mckibben.files.table import Column, Table
 from mckibben.recording import SAME_TIME, Recording
 

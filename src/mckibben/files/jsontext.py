@@ -18,9 +18,9 @@ import numpy as np
 
 from mckibben.errors import DataError
 from mckibben.files import cells, tree
+from mckibben.files.decoding import decoded
 from mckibben.files.headers import is_time
 from mckibben.files.instants import may_be_instant
-from mckibben.files.decoding import decoded
 from mckibben.files.table import Table, plain_meta
 from mckibben.files.tree import UNITS, Node, Unread
 

@@ -130,7 +130,8 @@ def question_size(
     size = f"it reaches {suspect:.6g} {target}".rstrip()
     problem = f"{size}{', without a unit' if assumed else ''}: is it in {' or '.join(units)}?"
     at = int(np.argmax(values == suspect))
-    raise source.error(problem, "correct that cell", channel, at, options)
+    remedy = f"name another unit with `units[{channel}]=UNIT`, or correct that cell"
+    raise source.error(problem, remedy, channel, at, options)
 
 
 def in_mm(channel: str, column: Column, source: Source) -> dict[str, dict[str, str | None]]:

@@ -271,7 +271,8 @@ def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
 
 
 def _is_unit(cell: str) -> bool:
-    return bool(find_listed(cell) or (re.search(r"[/*·^]", cell) and find(cell)))
+    composed = find(cell) if re.search(r"[/*·^]", cell) else None
+    return bool(find_listed(cell) or (composed and composed.target))
 
 
 def _bare(cell: str) -> str:

@@ -19,11 +19,15 @@ WIDEST = 64
 
 @dataclass(frozen=True)
 class Flaw:
-    """Why a column of numbers cannot be used, as in a `DataError`, and the first bad sample."""
+    """Why a column of numbers cannot be used, as in a `DataError`, and the first bad sample.
+
+    Samples of a column that is ``bridgeable`` are missing (NaN) where they are bad.
+    """
 
     sample: int
     problem: str
     remedy: str
+    bridgeable: bool = False
 
 
 @dataclass(frozen=True)

@@ -104,10 +104,11 @@ def _of_rounded(times: Times) -> Iterator[float]:
     """Yield the sample time [s] of times that were rounded when they were saved."""
     time = times.values
     mean = (time[-1] - time[0]) / (time.size - 1)
-    for size in _shortest_first(mean) if mean > 0 else ():
-        if agrees(time, size):
-            yield times.seconds(size)
-            return
+    for digits in (1, 2) if mean > 0 else ():  # rates and steps that are set have few
+        for size in (float(f"{mean:.{digits}g}"), 1.0 / float(f"{1.0 / mean:.{digits}g}")):
+            if agrees(time, size):
+                yield times.seconds(size)
+                return
 
 
 def stated_step(source: Source) -> float | None:
@@ -285,6 +286,11 @@ def _shortest_first(step: float) -> Iterator[float]:
 
 
 def agrees(time: Array, step: float) -> bool:
-    """Return whether times have a given step, within the recorded digits."""
+    """Return whether times have a given step, within their rounding and half a step.
+
+    Times that are repeated were rounded to the smallest step between them.
+    """
+    steps = np.diff(time)
+    grain = steps[steps > 0].min() if np.any(steps == 0) else resolution(time)
     deviation = np.abs(time - time[0] - step * np.arange(time.size))
-    return bool(np.all(deviation <= max(resolution(time), 1e-3 * step)))
+    return bool(np.all(deviation <= grain + 0.5 * step))

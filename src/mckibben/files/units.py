@@ -25,7 +25,7 @@ SPELLINGS: dict[str, dict[str, str]] = {
         "s": "s sec secs", "ms": "ms msec", "us": "us usec", "ns": "ns nsec nanosecond nanoseconds",
         "min": "min", "hour": "h hr hour", "day": "day"},
     "rad": {"rad": "rad", "mrad": "mrad", "deg": "° deg degs", "turn": "rev turn"},
-    "V": {"V": "V", "mV": "mV"},
+    "V": {"V": "V", "kV": "kV", "mV": "mV"},
     "mm/s": {"mm/s": "mm/s mm_s mmps", "cm/s": "cm/s cm_s", "m/s": "m/s m_s mps"},
     "degC": {"degC": "°C degC C", "K": "K kelvin", "degF": "°F degF fahrenheit"},
     "": {"": "- 1 none dimensionless mm/mm m/m", "percent": "% percent pct"},

@@ -86,7 +86,7 @@ def lags(recording: Recording) -> dict[str, Lag]:
 
     The drive of ``displacement_2`` is ``pressure_2``, or the only one.
     """
-    moving = {name: x for name, x in recording.channels.items() if np.ptp(x) > 0}
+    moving = {name: x for name, x in recording.channels.items() if (x != x[0]).any()}
     drives = [name for name in by_name([recording])[0] if name in moving]
     found = {}
     for name, samples in moving.items():

@@ -422,6 +422,21 @@ def test_complex_numbers_without_an_imaginary_part_are_refused(tmp_path: Path) -
     assert refused(path).file == path
 
 
+@pytest.mark.parametrize("change", [{16: 15}, {16: 4, 28: 1}, {12: 16}], ids=str)
+def test_arrays_in_which_scipy_would_read_on_are_refused(
+    tmp_path: Path, change: dict[int, int]
+) -> None:
+    path = tmp_path / "a.mat"
+    savemat(path, {"run": {"c": cell(np.empty((0, 1), object), X), "p_kPa": P}})
+    assert one(path)["pressure"] == pytest.approx(P / 100)
+    content = bytearray(path.read_bytes())
+    empty = content.index(struct.pack("<IIIII", 14, 40, 6, 8, 1))  # class, size of the shape, flags
+    for at, value in change.items():
+        content[empty + at] = value
+    path.write_bytes(content)
+    assert refused(path).file == path
+
+
 def test_variables_of_one_name_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.mat"
     savemat(path, {"p": P})

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.errors import DataError
-from mckibben.files import frames, tree
+from mckibben.files import frames, objects, tree
 from mckibben.files.table import Table, plain_meta
 from mckibben.files.tree import INFO, Node, Unread
 from mckibben.system.extras import demand
@@ -33,7 +33,23 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     with h5py.File(file, "r") as root:
         found = _Tree(path, matlab).group(root)
         meta = _attributes(root)
+        has_objects = matlab and "#subsystem#" in root and not _leads_out(root)
+    if has_objects and (decoded := objects.variables(path)) is not None:
+        found = decoded
     return [tree.table(found, path, dot="." if matlab else "/", meta=meta)]
+
+
+def _leads_out(root: Any) -> bool:
+    """Return whether a file has links to names, or samples in other files, as MATLAB writes none."""
+    import h5py
+
+    def leads(_: str, item: Any) -> bool | None:
+        if isinstance(item, h5py.Dataset):
+            return (item.is_virtual or bool(item.external)) or None
+        links = [item.get(name, getlink=True) for name in getattr(item, "keys", list)()]
+        return any(not isinstance(link, h5py.HardLink) for link in links) or None
+
+    return bool(leads("", root) or root.visititems(leads))
 
 
 class _Tree:
@@ -108,7 +124,7 @@ class _Tree:
         about = _attributes(data)
         kind = about.get("MATLAB_class") if self._matlab else None
         if "MATLAB_object_decode" in data.attrs:
-            return Unread(f"an object of class {kind}")
+            return objects.unread(str(kind), data.name.rpartition("/")[2])
         if h5py.check_string_dtype(data.dtype) is not None:
             text = data.asstr("utf-8", "replace")[()]
             return text if isinstance(text, str) else [str(each) for each in text.reshape(-1)]

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 from scipy.io import loadmat
-from scipy.io.matlab import MatlabFunction, MatlabOpaque
-from scipy.sparse import issparse
+from scipy.io.matlab import MatlabOpaque
 
-from mckibben.files import hdf5, tree
+from mckibben.files import hdf5, objects, tree
 from mckibben.files.table import Table
 from mckibben.files.tree import Node, Unread
 
@@ -24,42 +23,57 @@ _TYPES = {*range(1, 8), 9, *range(12, 19)}
 _MATRIX, _COMPRESSED = 14, 15
 _OUTER = {_MATRIX, _COMPRESSED}
 
-_OF_MATRICES = {1, 2, 3, 16, 17}
+_NUMBERS = {**dict.fromkeys((4, *range(6, 16)), 1), 5: 3}
+"""Classes of arrays -> the elements with their numbers, of which complex arrays have one more."""
+
+_COMPLEX, _OPAQUE = 0x800, 17
+_OF_MATRICES = {1, 2, 3, 16, _OPAQUE}
 """Classes of arrays that hold arrays: cells, structs, objects, functions, opaque ones."""
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the vectors of a MAT file, of version 4 to 7.3."""
-    if file.peek(10).startswith((b"MATLAB 7.3", b"\x89HDF")):
+    start = file.peek(520)
+    if b"\x89HDF\r\n\x1a\n" in (start[:8], start[512:520]):
         return hdf5.read(file, path)
     data = file.read()
-    if data[126:128] not in (b"IM", b"MI"):  # version 4
-        parts: Iterable[bytes] = [data]
-    else:  # each variable alone, as SciPy returns the last of one name, and objects have none there
-        elements = _checked(data[128:], "<" if data[126:128] == b"IM" else ">")
-        parts = (data[:128] + element for element in elements)
     found: dict[str, Node] = {}
-    variables = (loadmat(BytesIO(part)) for part in parts)  # type: ignore[arg-type]  # stubs without files
-    for name, value in (item for each in variables for item in each.items()):
-        if isinstance(value, MatlabOpaque):
-            last = value.reshape(-1)[0]
-            name, kind = (last[field].decode("latin-1") for field in ("s0", "s2"))
-            node: Node = Unread(f"an object of class {kind}")
-        elif name.startswith("__"):
-            continue
-        else:  # a str is SciPy's reason why it cannot read a variable
-            node = Unread(value) if isinstance(value, str) else _node(value)
-        if name in found:
-            raise ValueError("two variables have one name")
-        found[name] = node
-    return [tree.table(found, path)]
+    decoded = None
+    for name, value, at in _variables(data):
+        order = "<" if data[126:128] == b"IM" else ">"
+        if name == "__function_workspace__" and at == struct.unpack_from(f"{order}Q", data, 116)[0]:
+            inside = np.asarray(value).tobytes()  # what is in objects
+            list(_checked(inside[8:], "<" if inside[2:4] == b"IM" else ">"))
+            decoded = objects.variables(path)
+        elif not name.startswith("__"):
+            if name in found:
+                raise ValueError("two variables have one name")
+            # a str is SciPy's reason why it cannot read a variable
+            found[name] = Unread(value) if isinstance(value, str) else objects.node(value, name)
+    return [tree.table(found if decoded is None else decoded, path)]
+
+
+def _variables(data: bytes) -> Iterator[tuple[str, Any, int]]:
+    """Yield the variables by their names, and where each starts."""
+    elements: Iterable[bytes] = [data[128:]]
+    if data[126:128] in (b"IM", b"MI"):  # else it is version 4
+        elements = _checked(data[128:], "<" if data[126:128] == b"IM" else ">")
+    at = 128
+    for element in elements:
+        # each alone, as SciPy returns the last of one name, and objects have none there
+        part = BytesIO(data[:128] + element)
+        for name, value in loadmat(part).items():  # type: ignore[arg-type]  # stubs without files
+            if isinstance(value, MatlabOpaque):
+                name = value.reshape(-1)[0]["s0"].decode("latin-1")
+            yield name, value, at
+        at += len(element)
 
 
 def _checked(data: bytes, order: str, outer: Collection[int] = _OUTER) -> Iterator[bytes]:
     """Yield the elements of version 5; raise an error for an element of an invalid type.
 
-    SciPy indexes a C array by the type unchecked, so that a received file could make it follow a pointer
-    of its choice; see scipy/scipy#25829.
+    SciPy and mat-io index a C array by the type unchecked, so that a received file could make them
+    follow a pointer of its choice; see scipy/scipy#25829.
     """
     at = 0
     while at < len(data):
@@ -71,32 +85,20 @@ def _checked(data: bytes, order: str, outer: Collection[int] = _OUTER) -> Iterat
             raise ValueError(f"it has an element of type {kind} where none can be")
         inside = data[start : start + size]
         if kind == _COMPRESSED:
-            inside = zlib.decompressobj().decompress(inside)
-        if kind == _COMPRESSED:
-            list(_checked(inside, order, {_MATRIX}))
+            list(_checked(zlib.decompressobj().decompress(inside), order, {_MATRIX}))
         elif kind == _MATRIX and inside:
-            flags = struct.unpack_from(f"{order}I", inside, 8)[0]
-            list(_checked(inside, order, {_MATRIX} if flags & 0xFF in _OF_MATRICES else ()))
+            _check_array(inside, order)
         yield data[at:end]
         at = end
 
 
-def _node(value: Any) -> Node:
-    """Return a variable as a plain tree."""
-    if value is None or isinstance(value, MatlabFunction):  # a struct without fields is None
-        return ""
-    if isinstance(value, MatlabOpaque) or issparse(value):
-        return Unread("a sparse matrix" if issparse(value) else "an object")
-    array = np.asarray(value)
-    if array.dtype.names is not None:
-        names = array.dtype.names
-        structs = [{name: _node(each[name]) for name in names} for each in array.ravel(order="F")]
-        return structs[0] if len(structs) == 1 else structs
-    if array.dtype.kind == "O":
-        if min(array.shape, default=0) > 1:
-            return [[_node(each) for each in column.ravel(order="F")] for column in array.T]
-        return [_node(each) for each in array.reshape(-1)]
-    if array.dtype.kind in "US":
-        lines = [str(line) for line in array.reshape(-1)]
-        return lines if len(lines) > 1 else "".join(lines)
-    return array
+def _check_array(data: bytes, order: str) -> None:
+    """Raise an error for an array that SciPy would read on in what follows it, or without dimensions."""
+    *tag, flags = struct.unpack_from(f"{order}III", data)
+    kind = flags & 0xFF
+    parts = list(_checked(data, order, {_MATRIX} if kind in _OF_MATRICES else ()))
+    of, size = struct.unpack_from(f"{order}II", parts[1]) if len(parts) > 1 else (0, 0)
+    shaped = kind == _OPAQUE or (of in (5, 6) and size >= 8 and size % 4 == 0)
+    numbers = _NUMBERS.get(kind, -3) + bool(flags & _COMPLEX)
+    if tag != [6, 8] or not shaped or len(parts) < 3 + numbers:
+        raise ValueError("it has an array without dimensions or numbers")

@@ -87,7 +87,7 @@ def table(
             unread[where] = f"an array of {' x '.join(map(str, leaf.shape))}"
         else:
             arrays[place] = values
-    columns, own = _vectors(arrays, leaves, dot)
+    columns, own = _vectors(_since_first(arrays), leaves, dot)
     for place, stated in _units(columns, own, leaves).items():
         if len(stated) > 1:
             unread[dot.join(place)] = f"its units are {listed(sorted(stated))}"
@@ -114,6 +114,14 @@ def table(
             columns[place] = replace(each, header=full, alias=alias, place=full)
     found = (*columns.values(), *texts)
     return Table(found, meta=meta or {}, rates=rates, unread=unread)
+
+
+def _since_first(arrays: Mapping[Place, NDArray[Any]]) -> dict[Place, NDArray[Any]]:
+    """Return instants as the time since the first of all, which clocks have in common."""
+    instants = [values for values in arrays.values() if values.dtype.kind == "M"]
+    known = [values[~np.isnat(values)] for values in instants]
+    first = min((values.min() for values in known if values.size), default=np.datetime64(0, "ns"))
+    return {at: x - first if x.dtype.kind == "M" else x for at, x in arrays.items()}
 
 
 def without_numbers(unread: Mapping[str, str], path: Path) -> DataError:

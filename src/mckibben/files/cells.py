@@ -78,12 +78,12 @@ class Dialect:
         return "text" if cell and cell not in MISSING else "missing", None
 
     def value(self, found: re.Match[str] | None) -> float:
-        """Return the number of a cell of that form, NaN for a missing one."""
+        """Return the number of a cell of that form; NaN for a missing one, and what may be several."""
         if found is None:
             return math.nan
         if found["hexadecimal"]:
             return int(found["hexadecimal"], 16)
-        plain = (found["number"] or found["three_digits"]).replace(self.decimal, ".")
+        plain = (found["number"] or found["three_digits"] or "nan").replace(self.decimal, ".")
         return float(re.sub("[dD]", "e", plain))
 
     def is_value(self, cell: str) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.files import clocks, instants, quality, timebase
+from mckibben.files import clocks, instants, quality, timebase, wrapping
 from mckibben.files.channels import NAME, Channel, Time
 from mckibben.files.choosing import assign
 from mckibben.files.headers import is_clock, parse, snake_case, time_unit, unit_of, unknown_ending
@@ -207,7 +207,7 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
     samples = convert(values, read_in.name, unit)
     if not own and not source.request.raw:
         if not channel.startswith(("voltage", COMMAND)):  # a sawtooth can be commanded
-            quality.refuse_wraps(channel, raw, source)
+            wrapping.refuse_wraps(channel, raw, source)
         samples = quality.without_codes(channel, samples, raw, source)
     if not own and not _is_stated(channel, column, source):
         quality.question_size(channel, column, samples, read_in.name, source, assumed=assumed)

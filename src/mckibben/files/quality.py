@@ -1,4 +1,4 @@
-"""Data quality: codes for missing samples, wraps, impossible values."""
+"""Data quality: codes for missing samples, impossible values."""
 
 from __future__ import annotations
 
@@ -22,44 +22,6 @@ TOO_SMALL = {"bar": (1e-12, 1e-7)}
 _SIZES = (0.0, *(10.0**k - 1 for k in range(3, 8)), *(2.0**k - 1 for k in (15, 16)), 2.0**15)
 CODES = np.array([sign * size for size in _SIZES for sign in (1.0, -1.0)])
 """Codes of instruments for a missing sample, even a single one."""
-
-WRAPS = (2.0**8, 2.0**10, 2.0**12, 2.0**16, 2.0**32)
-"""Ranges of integer counters, which wrap around."""
-
-
-def wraps(values: Array) -> tuple[float, Array] | None:
-    """Return the range of a wrapping integer counter, and its upward wraps at each of n - 1 steps.
-
-    None where the n values, all finite, are no whole numbers of one of the ranges `WRAPS`, or do not
-    wrap: where steps are not alike once they go on beyond the end of the range.
-    """
-    steps = np.diff(values)
-    sizes = np.abs(steps)
-    largest = sizes.max(initial=0.0)
-    for size in WRAPS:
-        if not size / 2 < largest < size:
-            continue
-        jumps = sizes > size / 2
-        usual = sizes[~jumps].max(initial=0.0)
-        alike = size - sizes[jumps].min() <= 2 * usual < 0.2 * size
-        low, high = values.min(), values.max()
-        within = -size / 2 <= low and high < size and high - low < size
-        if alike and within and np.array_equal(values, np.rint(values)):
-            return size, -np.sign(steps) * jumps
-    return None
-
-
-def refuse_wraps(channel: str, recorded: Array, source: Source) -> None:
-    """Raise an error for samples of a wrapping integer counter."""
-    finite = np.isfinite(recorded)
-    found = wraps(recorded[finite])
-    if found is not None:
-        raise source.error(
-            f"it jumps by almost {found[0]:.0f} there: an integer counter that wraps",
-            f"add {found[0]:.0f} after each wrap, or use `raw` where that was measured",
-            channel,
-            int(np.flatnonzero(finite)[np.flatnonzero(found[1])[0] + 1]),
-        )
 
 
 def without_codes(channel: str, values: Array, recorded: Array, source: Source) -> Array:

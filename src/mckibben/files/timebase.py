@@ -13,9 +13,9 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files.headers import snake_case
 from mckibben.files.notices import listed
-from mckibben.files.quality import wraps
 from mckibben.files.request import Source
 from mckibben.files.units import convert
+from mckibben.files.wrapping import wraps
 
 Spans = NDArray[np.intp]
 """Start and stop of each span of samples, stop excluded, shape (m, 2)."""
@@ -84,7 +84,7 @@ def increasing(times: Times, source: Source) -> Times:
     if wrapped is not None:
         size, upwards = wrapped
         row = source.table.row(int(np.flatnonzero(upwards)[0]) + 1)
-        source.warn(f"the time wraps at {size:.0f}, first in row {row}, and was unwrapped")
+        source.warn(f"the time wraps at {size:.10g}, first in row {row}, and was unwrapped")
         time = time + size * np.cumsum([0.0, *upwards])
     steps = np.diff(time)
     wrong = np.flatnonzero(steps <= 0)

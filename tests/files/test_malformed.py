@@ -157,6 +157,7 @@ CASES: list[Case] = [
     Case("header_only.csv", b"time_s,pressure_bar,displacement_mm\n"),
     Case("short_header.csv", CSV.replace(b",displacement_mm", b""), row=2, names="3 cells"),
     Case("quote.csv", CSV.replace(b"\n0.4", b'\n"0.4'), row=6),
+    Case("title.csv", b"Bench 3,by A,room 5,Monday\n" + CSV.partition(b"\n")[2], row=2, names="has 4"),
     Case("wider.csv", WIDER, row=WIDER[: WIDER.index(b",7\n")].count(b"\n") + 1, names="4 cells"),
     Case("two_times.csv", partial(csv, t_ms=1.0), T, names="'time_s' and 't_ms'"),
     # Time, and options

@@ -385,6 +385,11 @@ OTHERS: dict[str, tuple[str, dict[str, tuple[str, list[float]]]]] = {
     "units two rows below": ("t,p,Weg\nA1,B1,C1\ns,bar,mm\n" + rows(T, P, X), TIMED),
     **{f"names in each line: {form}": ("".join(form.format(*each) + "\n" for each in EACH),
         {"pressure": ("bar", P), "x": ("", X)}) for form in PAIRS},
+    "a logger's lines": ("".join(
+        f"2026-01-31 12:00:{t:06.3f} [{'INFO' if p < 3 else 'WARNING'}] rig: p={p} x={x}\n"
+        for t, p, x in EACH), {"pressure": ("bar", P), "x": ("", X)}),
+    "a serial monitor": ("".join(f"12:00:{t:06.3f} -> {p},{x}\n" for t, p, x in EACH),
+        {"column_2": ("", P), "column_3": ("", X)}),
     "names and units in each line": ("boot\n" + "".join(
         f"12:00:{t:05.2f} -> P: {p} bar  D: {x} mm\n" for t, p, x in EACH), TIMED),
     "Fortran": (HEADER + "".join(

@@ -8,11 +8,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from mckibben.files.cells import Dialect
-from mckibben.files.instants import may_be_instant
 from mckibben.files.sniffing import Layout
 
 Found = tuple[Sequence[bytes], Layout]
 """The lines of a text, and their layout."""
+
+_INSTANT = re.compile(r"(?:\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?")
+
+_NAME = r"[^\W\d][^\s:=,;|]*"
+_PAIR = re.compile(rf"(?:^|[,;|\s]+)({_NAME})\s*[:=]\s*(?!{_NAME}\s*[:=])")
 
 
 def keyed(data: bytes) -> Found | None:
@@ -40,16 +44,16 @@ def keyed(data: bytes) -> Found | None:
 
 
 def _pairs(row: bytes) -> dict[str, str] | None:
-    """Return name -> text of a line of such pairs, which an instant may precede; None for others."""
+    """Return name -> text of a line of such pairs, perhaps behind an instant and words; or None."""
     line = row.decode("utf-8", "replace").replace('"', "").strip("{};,| \t")
-    before, *parts = re.split(r"(?:^|[,;|\s]+)([^\W\d][^\s:=,;|]*)\s*[:=]\s*", line)
+    before, *parts = _PAIR.split(line)
     found = {
         name: " ".join(cell.split()) for name, cell in zip(parts[::2], parts[1::2], strict=True)
     }
-    before = before.strip().removesuffix("->").strip()
-    if not found or len(parts) > 2 * len(found) or (before and not may_be_instant(before)):
+    instant = _INSTANT.search(before)
+    if not found or len(parts) > 2 * len(found):
         return None
-    return {"time": before, **found} if before and "time" not in found else found
+    return {"time": instant[0], **found} if instant and "time" not in found else found
 
 
 def labview(data: bytes) -> dict[str | None, Found]:

@@ -55,7 +55,7 @@ def samples(rows: Sequence[bytes], layout: Layout, path: Path) -> tuple[list[int
             np.flatnonzero(again), "the same as the row before, and left out", rows, numbers, path
         )
         numbers, lines = _without(again, numbers, lines)
-    elif numbers[-1] - numbers[0] >= len(numbers):
+    elif layout.stop is None and numbers[-1] - numbers[0] >= len(numbers):
         warn(path, "blank or other lines are left out: without times, what follows moves up")
     return numbers, lines
 

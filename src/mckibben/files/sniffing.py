@@ -31,8 +31,8 @@ _STATED = {
         r"(?<![A-Za-z])(?P<name>(?P<rate>(?:sampl(?:e|ing)|frame|scan|acquisition)[ _]?"
         r"(?:rate|freq(?:uency)?)|samples per second"
         r"|(?-i:fs|Fs|Trajectories|NO_OF_FRAMES[\s\S]*?\nFREQUENCY))"
-        r"|(?:sampling|sample|time)[ _]?(?:interval|increment|step|period)|sample[ _]?time"
-        r"|x?[ _]?increment|delta[ _]?x|(?-i:dt|Ts))"
+        r"|sampl(?:e|ing)[ _]?(?:interval|increment|step|period)|sample[ _]?time"
+        r"|time[ _]?(?:interval|increment|step)|x[ _]?increment|delta[ _]?x|(?-i:dt|Ts))"
         r"\b[ \"]*[\[(]?(?P<in>[A-Za-zµμ]*)[\])]?[\s\",;:=|]+"
         rf"(?P<value>\d+(?:[{mark}]\d+)?(?:e[+-]?\d+)?)(?![.,']?\d)[ ]?(?P<unit>[A-Za-zµμ]*)",
         re.IGNORECASE,
@@ -123,8 +123,13 @@ def markers(head: Head) -> Names | None:
 
 
 def longer(head: Head) -> Names | None:
-    """Take a row with more names than the samples have columns: the last names have no samples."""
-    return _named([(at, row) for at, row in head.above if len(row) > head.used], head)
+    """Take a row with more names than the samples have columns: the last names have no samples.
+
+    Some are known, or have units below; others may be a title.
+    """
+    found = _named([(at, row) for at, row in head.above if len(row) > head.used], head)
+    sure = found and (any(found.units) or _known(found.headers[: head.used]))
+    return found if sure and head.dialect.separator else None
 
 
 def numbered(head: Head) -> Names:
@@ -150,17 +155,19 @@ def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
             first = at
     headers = _merged(names, head)
     beyond = [*zip(headers, names.units, strict=True)][head.used :]
-    text = "\n".join([*lines[:first], *(f"{name} {cell}" for name, cell in beyond if cell)])
+    text = "\n".join([*lines[:first], *(f"x {name} {cell}" for name, cell in beyond if cell)])
     start = dict(beyond).get("Start", "")
     units = [_bare(cell) or None for cell in names.units]
     if metric := re.search(r"Length Units\W+(\w+)", text):  # of Motive
         units = [metric[1] if "Position" in h else u for h, u in zip(headers, units, strict=True)]
+    least = head.width if any(headers[head.used : head.width]) else head.used
+    least = len(headers) if names.at < 0 else least
     return Layout(
         head.dialect,
         headers,
         units,
         first,
-        head.width if any(headers[head.used : head.width]) else min(head.used, head.width),
+        least,
         rates=dict(filter(None, map(_stated, _STATED[head.dialect.decimal].finditer(text)))),
         start_time=head.dialect.value(head.dialect.form(start)[1]) if start else 0.0,
     )

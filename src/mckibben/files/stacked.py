@@ -46,6 +46,8 @@ def stack(headers: Sequence[str], frame: Any) -> Stack | None:
     times = [i for i, header in enumerate(headers) if is_clock(header)]
     values = [i for i, name in enumerate(names) if name in VALUES.split()]
     units = [i for i, name in enumerate(names) if name in UNITS.split()]
+    if not len(times) == len(values) == 1:
+        return None
     words = [
         i
         for i in range(len(headers))
@@ -53,9 +55,8 @@ def stack(headers: Sequence[str], frame: Any) -> Stack | None:
         and frame[i].dtype.kind not in "iufb"
         and 2 <= frame[i].nunique() <= min(WIDEST, len(frame) / 2)
     ]
-    if len(times) == len(values) == len(words) == 1 and len(units) <= 1:
-        return Stack(times[0], words[0], values[0], next(iter(units), None))
-    return None
+    alone = len(words) == 1 and len(units) <= 1
+    return Stack(times[0], words[0], values[0], next(iter(units), None)) if alone else None
 
 
 def unstacked(

@@ -9,7 +9,7 @@ import csv
 import io
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from io import BufferedReader, BytesIO
 from pathlib import Path
@@ -30,6 +30,7 @@ from mckibben.files.sniffing import SEPARATORS, Layout, sniff
 from mckibben.files.stacked import stack, unstacked
 from mckibben.files.table import Column, Table
 
+_ARROW = re.compile(rb"(?m)^(\d\d:\d\d:\d\d\.\d+) -> (?=.*?([\t;|,]|$))")  # of Arduino's monitor
 _SNIFFED = 2**18  # bytes of a line by which the layout of a table is recognised
 
 
@@ -51,14 +52,13 @@ def laid_out(
 
     The others have the same numbers as before. Errors are those of `mckibben.read`.
     """
+    data = file.read()
     try:
-        data = file.read()
-        if encoding is not None:
-            data = data.decode(encoding).encode()
-        lines = decoded(data, path).decode().split("\n")
+        data = data if encoding is None else data.decode(encoding).encode()
     except (LookupError, ValueError):
         problem = f"it is no text in {encoding}"
         raise DataError(problem, file=path, parameter="encoding", remedy="choose another") from None
+    lines = decoded(data, path).decode().split("\n")
     first = max(header, 1)
     text = "\n".join(
         "" if at < first or first < at <= first + skip else line
@@ -104,6 +104,8 @@ def parsed(data: bytes, path: Path, separators: Sequence[str | None] = SEPARATOR
     if named:
         separators = (named[1].decode(),)
         data = b"\n" + data[named.end() :]  # so that lines have the same numbers
+    if _ARROW.search(data[:_SNIFFED]):
+        data = _ARROW.sub(lambda found: found[1] + (found[2] or b" "), data)
     if (found := keyed(data)) is not None:
         return _table(*found, path)
     rows = data.split(b"\n")
@@ -117,20 +119,15 @@ def _table(rows: Sequence[bytes], layout: Layout, path: Path) -> Table:
     numbers, lines = samples(rows, layout, path)
     missing = len(headers) - len(dialect.split(lines[0].decode("utf-8", "replace")))
     lines[0] += (dialect.separator or " nan").encode() * missing  # by which pandas counts columns
-    body = b"\n".join(lines).replace("−".encode(), b"-")
-    options: dict[str, Any] = {"names": range(len(headers)), "na_values": list(MISSING)}
-    frame = _frame(body, dialect, low_memory=False, **options)
+    frame, texts, shown = _frames(b"\n".join(lines).replace("−".encode(), b"-"), layout)
     if len(frame) != len(numbers):  # so that no sample has the number of another line
         raise DataError("its lines are not those of a table", file=path, remedy="export it again")
-    marked = [i for i in frame if frame[i].dtype.kind == "f" and frame[i].notna().any()]
-    unclear = [i for i in marked if not _shows_decimals(frame[i].to_numpy())]
-    texts = _frame(body, dialect, dtype=object, usecols=unclear, **options) if unclear else {}
     decimals: dict[str, str] = {}  # column -> a number that has three digits after the mark, as all
 
     def made(i: int, name: str, unit: str | None, some: Any = slice(None)) -> Column:
         cells = frame[i].iloc[some]
-        if i in unclear or (cells.dtype.kind not in "iufb" and cells.notna().any()):
-            cells = texts[i].iloc[some] if i in unclear else cells
+        if i in texts or (cells.dtype.kind not in "iufb" and cells.notna().any()):
+            cells = texts[i].iloc[some] if i in texts else cells
             found, cell = column(name, unit, cells, dialect)
             decimals.update({name: cell} if cell else {})
             return found
@@ -139,29 +136,53 @@ def _table(rows: Sequence[bytes], layout: Layout, path: Path) -> Table:
 
     if (found := stack(headers, frame)) is not None:
         clock = made(found.time, headers[found.time], layout.units[found.time])
-        return unstacked(found, frame, clock, made, numbers, path)
-    named = zip(range(len(headers)), headers, layout.units, strict=True)
+        table = unstacked(found, frame, clock, made, numbers, path)
+    else:
+        table = _in_columns(made, frame, layout, numbers)
+    if decimals and not shown:
+        _note_decimals(decimals, dialect.decimal, path)
+    return table
+
+
+def _in_columns(
+    made: Callable[[int, str, str | None], Column], frame: Any, layout: Layout, numbers: list[int]
+) -> Table:
+    """Return a table with a column for each one that has a name or samples."""
+    named = zip(range(len(layout.headers)), layout.headers, layout.units, strict=True)
     columns = [
         made(i, header or f"column_{i + 1}", unit)
         for i, header, unit in named
         if header or frame[i].notna().any()
     ]
-    unread = {}
+    unread: dict[str, str] = {}
     for each in columns:
         first = next(filter(None, each.texts), "")
         if each.values is None and not may_be_instant(first):
             unread[each.header] = f"text, such as {first[:40]!r}" if first else "no number in it"
-    if decimals and unclear == marked:
-        names, cell = listed([repr(name) for name in decimals], 10), next(iter(decimals.values()))
-        mark = dialect.decimal
-        warn(
-            path,
-            f"all numbers of column(s) {names} have three digits after the mark {mark!r}, which was "
-            f"taken for the decimal mark: {cell} is {float(cell.replace(mark, '.')):.6g}, "
-            f"not {cell.replace(mark, '')}",
-        )
     start, rates = layout.start_time, layout.rates
     return Table(tuple(columns), np.array(numbers), None, start, rates=rates, unread=unread)
+
+
+def _frames(body: bytes, layout: Layout) -> tuple[Any, Any, bool]:
+    """Return the cells of samples, those as text whose mark may be of thousands, and if one is not."""
+    options: dict[str, Any] = {"names": range(len(layout.headers)), "na_values": list(MISSING)}
+    frame = _frame(body, layout.dialect, low_memory=False, **options)
+    marked = [i for i in frame if frame[i].dtype.kind == "f" and frame[i].notna().any()]
+    unclear = [i for i in marked if not _shows_decimals(frame[i].to_numpy())]
+    if not unclear:
+        return frame, {}, bool(marked)
+    texts = _frame(body, layout.dialect, dtype=object, usecols=unclear, **options)
+    return frame, texts, unclear != marked
+
+
+def _note_decimals(decimals: Mapping[str, str], mark: str, path: Path) -> None:
+    names, cell = listed([repr(name) for name in decimals], 10), next(iter(decimals.values()))
+    warn(
+        path,
+        f"all numbers of column(s) {names} have three digits after the mark {mark!r}, which was taken "
+        f"for the decimal mark: {cell} is {float(cell.replace(mark, '.')):.6g}, "
+        f"not {cell.replace(mark, '')}",
+    )
 
 
 def _shows_decimals(values: Array) -> bool:

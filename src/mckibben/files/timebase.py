@@ -182,7 +182,8 @@ def unit_by_size(time: Array, source: Source) -> str | None:
                 "use `units[time]=UNIT` where that is wrong"
             )
             return unit
-    if np.median(steps) >= 1 and np.array_equal(time, np.rint(time)):
+    moving = steps[steps > 0]
+    if moving.size and np.median(moving) >= 1 and np.array_equal(time, np.rint(time)):
         raise doubtful_unit("it has no unit and counts in whole numbers", time, source)
     return None
 
@@ -200,7 +201,8 @@ def plausible_units(time: Array) -> list[str]:
     >>> plausible_units(np.arange(600.0)), plausible_units(20 * np.arange(600.0))
     (['s', 'ms'], ['ms'])
     """
-    step, duration = float(np.median(np.diff(time))), float(time[-1] - time[0])
+    steps, duration = np.diff(time), float(time[-1] - time[0])
+    step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     sizes = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
     units = [unit for unit, size in sizes.items() if 1e-4 <= size * step <= 5.0]
     return sorted(units, key=lambda unit: not 2.0 <= sizes[unit] * duration <= 86_400.0) or ["ms"]

@@ -11,7 +11,15 @@ import numpy as np
 
 from mckibben.errors import DataError
 from mckibben.files.channels import NAME
-from mckibben.files.headers import by_units, channel_of, parse, snake_case, time_unit, unit_of
+from mckibben.files.headers import (
+    by_units,
+    by_words,
+    channel_of,
+    parse,
+    snake_case,
+    time_unit,
+    unit_of,
+)
 from mckibben.files.instants import may_be_instant
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
@@ -128,12 +136,13 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
         used = {*request.columns, *request.units, *request.calibration, *(request.channels or ())}
         used |= request.described.channels.keys()
         units = {name: "" if name in used else _target(column) for name, column in named.items()}
-        renamed = by_units(units)  # channels without a known name, such as u1
+        renamed = by_words(units)
+        renamed |= by_units({renamed.get(name, name): unit for name, unit in units.items()})
         notes = [f"{named[name].header!r} as {channel}" for name, channel in renamed.items()]
         named = {renamed.get(name, name): column for name, column in named.items()}
         if notes:
             source.warn(
-                f"no name identifies these columns, so they are read by their units: {listed(notes)}; "
+                f"these columns are read by their units, or by a word in their names: {listed(notes)}; "
                 "use `columns[CHANNEL]=COLUMN` where that is wrong"
             )
     _require(named, source)

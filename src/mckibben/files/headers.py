@@ -63,12 +63,20 @@ def parse(text: str) -> Header:
     (Header(name='Pressure', unit='kPa'), Header(name='length', unit='mm'))
     >>> parse("valve_voltage_V"), parse("pressure_in")
     (Header(name='valve_voltage', unit='V'), Header(name='pressure_in', unit=None))
+    >>> parse("/pam/pressure_bar/data")
+    Header(name='pam pressure', unit='bar')
     >>> parse("current (2)")
     Header(name='current 2', unit=None)
     """
     text = " ".join(_plain(text).split())
     if len(text) > LONGEST:  # the forms below take time by the square of the length
         return Header(text, None)
+    if text.startswith("/"):  # a topic of ROS, whose last word but these has the unit
+        *path, last = [word for word in text.split("/") if word not in ("", "data", "value")] or [
+            ""
+        ]
+        inner = parse(last)
+        return Header(" ".join([*path, inner.name]), inner.unit)
     bracketed = _BRACKETED.fullmatch(text)
     if bracketed and bracketed["name"] and not _EXTENSOR & set(_words(bracketed["unit"])):
         name, unit = bracketed["name"], bracketed["unit"].strip()
@@ -145,11 +153,49 @@ def _of_loop(name: str, header: Header) -> str | None:
     return f"{'command' if channel.startswith(('pressure', 'voltage')) else role}_{channel}"
 
 
+def by_words(units: Mapping[str, str]) -> dict[str, str]:
+    """Return channels by a word in longer names, where it is the only one and the unit is its.
+
+    Several that are numbered are the channels of these numbers.
+
+    >>> by_words({"zylinderdruck": "bar", "loadcell_force_z": "N", "motor_temp": "A"})
+    {'zylinderdruck': 'pressure', 'loadcell_force_z': 'force'}
+    >>> by_words({"pam1_pressure": "bar", "pam2_pressure": "bar", "관절각도": "rad"})
+    {'pam1_pressure': 'pressure_1', 'pam2_pressure': 'pressure_2', '관절각도': 'angle'}
+    """
+    found: dict[str, list[str]] = {}
+    for name, unit in units.items():
+        meant = {*filter(None, map(_in_word, name.split("_")))}
+        other = {*_ABOUT, *_ROLES, *_REFERENCES} & {*name.split("_")}
+        if unit_of(name) is None and len(meant) == 1 and not other:
+            (channel,) = meant
+            if unit == unit_of(channel) and channel not in units:
+                found.setdefault(channel, []).append(name)
+    renamed = {}
+    for channel, names in found.items():
+        numbers = [re.findall(r"\d+", name)[-1:] for name in names]
+        several = ["_".join([channel, *number]) for number in numbers]
+        if len(names) == 1:
+            renamed[names[0]] = channel
+        elif all(numbers) and len(set(several)) == len(names):
+            renamed |= dict(zip(names, several, strict=True))
+    return renamed
+
+
+def _in_word(word: str) -> str | None:
+    """Return the channel that a word names, alone or at its end, as in Zylinderdruck and 관절각도."""
+    word = word.rstrip("0123456789")
+    ends = (word[at:] for at in range(len(word)))
+    spelt = (end for end in ends if end in _CHANNELS and (len(end) >= 4 or not end.isascii()))
+    channel = _CHANNELS.get(next(spelt, ""))
+    return None if channel == "time" else channel
+
+
 def by_units(units: Mapping[str, str]) -> dict[str, str]:
     """Return channels by units for columns named u1, output or similar."""
     found = {}
     for name, unit in units.items():
-        unnamed = re.fullmatch(r"(?:[a-z]|input|output|column)(?:_?(\d+))?", name)
+        unnamed = re.fullmatch(r"(?:[a-z]|in|out|input|output|column)(?:_?(\d+))?", name)
         if unnamed and unit in QUANTITIES:
             alone = name.startswith("column_") and [*units.values()].count(unit) == 1
             found[name] = QUANTITIES[unit] + (f"_{unnamed[1]}" if unnamed[1] and not alone else "")

@@ -17,12 +17,12 @@ CHANNELS: dict[str, dict[str, str]] = {
         "ja": "時間 時刻 経過時間 計測時間", "zh": "时间 时刻 時間 采样时间",
         "ko": "시간 시각 경과시간"},
     "pressure": {
-        "en": "p press pressure", "de": "druck luftdruck innendruck muskeldruck",
+        "en": "p press pressure", "de": "druck überdruck luftdruck innendruck muskeldruck",
         "fr": "pression", "it": "pressione", "es": "presión", "pt": "pressão",
         "ja": "圧力 圧 空気圧 空気圧力 内圧", "zh": "压力 压强 气压 壓力 氣壓 内压",
         "ko": "압력 공기압 공압"},
     "voltage": {
-        "en": "u voltage valve_voltage command_voltage", "de": "spannung ventilspannung",
+        "en": "u volt voltage valve_voltage command_voltage", "de": "spannung ventilspannung",
         "fr": "voltage tension_électrique", "it": "tensione", "es": "tensión voltaje",
         "pt": "tensão voltagem", "ja": "電圧", "zh": "电压 電壓", "ko": "전압"},
     "displacement": {

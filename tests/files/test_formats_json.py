@@ -182,5 +182,5 @@ def test_what_this_package_writes_is_no_recording(tmp_path: Path) -> None:
     put(run, ",".join(NAMED), *NAMED.values())
     mckibben.write(one(run), run)
     for path in (model, Path(f"{run}-metadata.json")):
-        assert "mckibben" in refused(path).problem
+        assert "saved" in refused(path).problem
     assert len(mckibben.read(tmp_path)) == 1  # and not sought in folders

@@ -38,8 +38,10 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     about = content if isinstance(content, dict) else {}
     if str(about.get("format")).startswith("mckibben-"):
         kind = about["format"].removeprefix("mckibben-")
-        problem = f"it is no recording: mckibben wrote it as a {kind}"
-        raise DataError(problem, file=path, remedy="give a recording; a model is read as a model")
+        problem = f"it is no recording: this package saved a {kind} in it"
+        raise DataError(
+            problem, file=path, remedy="give a recording; models are read with mckibben.load"
+        )
     node = _node(content)
     found = node if isinstance(node, Mapping) else {"data": node}
     return [tree.table(found, path, meta=plain_meta(about))]

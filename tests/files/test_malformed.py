@@ -188,7 +188,7 @@ CASES: list[Case] = [
     Case("blank.xlsx", partial(xlsx, pressure_bar=HOLE), P, 6, "1 of 30"),
     # Bags
     Case("garbage.mcap", b"\x89MCAP0\r\n" + GARBAGE),
-    Case("no_topic.mcap", MCAP, P, names="/rig/pressure"),
+    Case("no_topic.mcap", MCAP, "displacement", names="/rig/pressure"),
     Case("no_column.db3", DB3, "force", names="'/s/data'", options={"columns": {"force": "/s/data"}}),
 ]  # fmt: skip
 

@@ -22,7 +22,7 @@ CHANNELS: dict[str, dict[str, str]] = {
         "ja": "圧力 圧 空気圧 空気圧力 内圧", "zh": "压力 压强 气压 壓力 氣壓 内压",
         "ko": "압력 공기압 공압"},
     "voltage": {
-        "en": "u volt voltage valve_voltage command_voltage", "de": "spannung ventilspannung",
+        "en": "u voltage valve_voltage command_voltage", "de": "spannung ventilspannung",
         "fr": "voltage tension_électrique", "it": "tensione", "es": "tensión voltaje",
         "pt": "tensão voltagem", "ja": "電圧", "zh": "电压 電壓", "ko": "전압"},
     "displacement": {

@@ -109,35 +109,25 @@ def read(
         else:
             found += _read(one, request)[0]
     if chosen.join:
-        found = joined(found, request)
-    return observe(_prepared(_noted(found), chosen))
+        found = [_with_notes(one, [*one.notes, *_early(one)]) for one in joined(found, request)]
+    for before, after in pieces_of_one(found):
+        text = f"it begins where {before.name} ends; if both are one run, use `join`"
+        warn(Path(after.source or after.name), text)
+    return observe(_prepared(found, chosen))
 
 
 def _request(options: ReadOptions, **more: Any) -> Request:
     return Request(**{one.name: getattr(options, one.name) for one in fields(options)}, **more)
 
 
-def _noted(recordings: list[Recording]) -> list[Recording]:
-    """Return recordings with notes on what continues another, or moves before what drives it."""
-    told: dict[int, list[str]] = {}
-    for before, after in pieces_of_one(recordings):
-        text = f"it begins where {before.name} ends; if both are one run, use `join`"
-        told.setdefault(id(after), []).append(text)
-    for one in recordings:
-        for name, late in lags(one).items():
-            if comes_first(late):
-                unit = "samples" if one.sample_time is None else "s"
-                text = (
-                    f"channel {name!r} moves {-late.samples * one.step:.3g} {unit} before "
-                    "what should drive it: columns are swapped, or clocks differ"
-                )
-                told.setdefault(id(one), []).append(text)
-    for one in recordings:
-        for text in told.get(id(one), ()):
-            warn(Path(one.source or one.name), text)
+def _early(recording: Recording) -> list[str]:
+    """Return notes on channels that move before what should drive them."""
+    unit = "samples" if recording.sample_time is None else "s"
     return [
-        one.with_meta(notes=[*one.notes, *told[id(one)]]) if id(one) in told else one
-        for one in recordings
+        f"channel {name!r} moves {-late.samples * recording.step:.3g} {unit} before what should "
+        "drive it: columns are swapped, or clocks differ"
+        for name, late in lags(recording).items()
+        if comes_first(late)
     ]
 
 
@@ -248,10 +238,17 @@ def _interpreted(loaded: _Loaded, request: Request) -> tuple[list[Recording], li
     recordings = []
     for recording in found:
         earlier = [note for note in recording.notes if not (stated and note.startswith(ASSUMED))]
-        both = [*dict.fromkeys([*earlier, *loaded.notes, *notes])]
-        same = both == list(recording.notes)
-        recordings.append(recording if same else recording.with_meta(notes=both))
+        early = [] if of_each[0].table.own else _early(recording)
+        for text in early:
+            of_each[0].warn(text)
+        recordings.append(_with_notes(recording, [*earlier, *loaded.notes, *notes, *early]))
     return recordings, of_each
+
+
+def _with_notes(recording: Recording, notes: Sequence[str]) -> Recording:
+    """Return a recording with these notes, once each; itself if it has them."""
+    each = [*dict.fromkeys(notes)]
+    return recording if each == list(recording.notes) else recording.with_meta(notes=each)
 
 
 def _recordings(source: Source, origin: Mapping[str, Any]) -> list[Recording]:
@@ -266,7 +263,9 @@ def _recordings(source: Source, origin: Mapping[str, Any]) -> list[Recording]:
     start = table.start_time if clock is None else clock.seconds(clock.values[0])
     times = clock if step is None else None
     if times is not None:
-        times = timebase.increasing(times, source)
+        kept = timebase.without_repeats(times, channels, source)
+        channels = {name: samples[kept] for name, samples in channels.items()}
+        times = timebase.increasing(replace(times, values=times.values[kept]), source)
     pieces = gaps_in.pieces(channels, times, step, start, source)
     if request.informative:
         _refuse_constant(pieces, source)

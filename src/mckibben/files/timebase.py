@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -16,6 +16,9 @@ from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.units import convert
 from mckibben.files.wrapping import wraps
+
+Rows = NDArray[np.intp]
+"""Numbers of rows, counted from 0, shape (m,)."""
 
 Spans = NDArray[np.intp]
 """Start and stop of each span of samples, stop excluded, shape (m, 2)."""
@@ -64,6 +67,27 @@ class Step(NamedTuple):
 
     size: float
     jitter: tuple[float, float] | None
+
+
+def without_repeats(times: Times, channels: Mapping[str, Array], source: Source) -> Rows:
+    """Return the rows that differ, in time or in a sample, from all before them; with a note on others.
+
+    None is left out where times increase, or begin anew as counters do.
+    """
+    time = times.values
+    every = np.arange(time.size)
+    if np.all(np.diff(time) > 0) or wraps(time) is not None:
+        return every
+    table = np.column_stack([time, *channels.values()])
+    _, first = np.unique(table, axis=0, return_index=True, equal_nan=True)
+    repeats = np.setdiff1d(every, first)
+    if not repeats.size:
+        return every
+    row = source.table.row(int(repeats[0]))
+    source.warn(
+        f"{repeats.size} row(s) are exact repeats and were left out, the first in row {row}"
+    )
+    return np.sort(first)
 
 
 def increasing(times: Times, source: Source) -> Times:

@@ -28,7 +28,7 @@ from tests.files.made import columns, one, refused, table, tdms
 
 K = np.arange(40.0)
 P = 100 * (1 + np.sin(K / 6))
-X = 2 * np.cos(K / 6)
+X = 2 * np.sin(K / 6 - 0.5)
 T = K / 50
 BOTH = np.column_stack([P, X])
 

@@ -148,7 +148,7 @@ CASES: list[Case] = [
     Case("pipe.csv", os.mkfifo),
     Case("device.mat", lambda path: path.symlink_to("/dev/zero")),
     Case("book.xls", b"\xd0\xcf\x11\xe0", names="'.xls'"),
-    Case("no_ending", csv),
+    Case("no_ending", b"\xd0\xcf\x11\xe0"),
     # Content of another kind
     Case("parquet.csv", parquet),
     Case("mcap.bag", MCAP),

@@ -79,8 +79,11 @@ def followed(file: Odd) -> tuple[Recording | DataError, dict[str, Any]]:
             if not error.options:
                 return error, options
             right = [one for one in error.options if is_true(one, file)]
-            if not right and {*error.options[0]} == {"units"}:  # a question to the one at the rig
-                right = [{"units": {c: file.facts["units"][c] for c in error.options[0]["units"]}}]
+            if not right and "units" in error.options[0]:  # a question to the one at the rig
+                units = {
+                    c: file.facts["units"].get(c, u) for c, u in error.options[0]["units"].items()
+                }
+                right = [{**error.options[0], "units": units}]
             if not right:
                 raise WrongError(f"no remedy is right: {error}") from None
             if stated >= STEPS:

@@ -188,12 +188,21 @@ def test_marks_of_thousands_are_not_read_as_anything(
 
 
 @pytest.mark.parametrize("separator", [",", ";"])
-@pytest.mark.parametrize("cell", ["", "1,234,567", "1.234.567", "12,34,567", "1,234.5", "1.234,5"])
+@pytest.mark.parametrize("cell", ["", "1,234,567", "1.234.567", "12,34,567", "1.234,5"])
 def test_marks_in_quoted_cells_are_refused(tmp_path: Path, separator: str, cell: str) -> None:
     cells = [f'"{cell or format(size, ",")}"' for size in SIZES]
     error = refused(file(tmp_path, marked("pressure (mbar)", cells, separator)))
     assert (error.channel, error.row) == ("pressure", 2 if cell else 12)
     assert (cell or "1,000") in error.problem
+
+
+@pytest.mark.parametrize("mark", [".", "'", " ", "\xa0"])
+def test_thousands_before_the_decimal_mark_of_the_table_are_read(tmp_path: Path, mark: str) -> None:
+    values = [995.5 + k for k in range(N)]
+    cells = [f"{value:,.1f}".translate({ord(","): mark, ord("."): ","}) for value in values]
+    times = [f"{t:.2f}".replace(".", ",") for t in T]
+    found = one(file(tmp_path, "time_s;pressure (mbar)\n" + rows(times, cells, separator=";")))
+    assert found["pressure"] == pytest.approx(np.array(values) / 1000)
 
 
 DECIMALS = {

@@ -21,14 +21,16 @@ MISSING = (
 """Cells of missing samples, or of samples beyond the instrument's range."""
 
 _COMMENT = r"#(?!N/?A\b|DIV/0|VALUE!|REF!|NUM!|NAME\?|NULL!)|%|//"  # not the errors of spreadsheets
+_GROUPING = r".,'’`_ \xa0\u2009\u202f"
 _FORMS = {
     mark: re.compile(
         r"(?P<hexadecimal>[+-]?0[xX][0-9a-fA-F]+)"
         rf"|(?P<three_digits>[+-]?0*[1-9]\d{{0,2}}[{mark}]\d{{3}})"  # one, or a thousand: 1,000
         rf"|(?P<number>[+-]?(?:\d+(?:[{mark}]\d*)?|[{mark}]\d+)(?:[eEdD][+-]?\d+)?)"  # Fortran: 1.5D+00
         r"(?:\s*(?P<unit>[A-Za-z°%µμΩ][^\d,;:]{0,9}\d?))?"
+        rf"|(?P<thousands>[+-]?\d{{1,3}}(?:(?![{mark}])[{_GROUPING}]\d{{3}})+[{mark}]\d+)"
         r"|(?P<spaced>[+-]?\d{1,3}(?: \d{3})+(?:[.,]\d*)?)"
-        r"|(?P<grouped>[+-]?\d{1,3}(?P<mark>[.,'’`_ \xa0\u2009\u202f])(?:\d{2,3}(?P=mark))*\d{3}"
+        rf"|(?P<grouped>[+-]?\d{{1,3}}(?P<mark>[{_GROUPING}])(?:\d{{2,3}}(?P=mark))*\d{{3}}"
         r"(?:[.,]\d*)?|[+-]?\d*[.,]\d+)",  # or a number with the other decimal mark
         re.ASCII,
     )
@@ -83,6 +85,8 @@ class Dialect:
             return math.nan
         if found["hexadecimal"]:
             return int(found["hexadecimal"], 16)
+        if found["thousands"]:
+            return float(re.sub(rf"[^-\d{self.decimal}]", "", found[0]).replace(self.decimal, "."))
         plain = (found["number"] or found["three_digits"] or "nan").replace(self.decimal, ".")
         return float(re.sub("[dD]", "e", plain))
 
@@ -114,6 +118,7 @@ def column(name: str, unit: str | None, cells: Any, dialect: Dialect) -> tuple[C
     plain = [word for word, form in zip(words, forms, strict=True) if form == "number"]
     decimal = not plain or any(dialect.decimal in word for word in plain)
     other = {"three digits": "number" if decimal else "grouped", "spaced": "grouped"}
+    other["thousands"] = "number"
     each = zip(forms, matches, strict=True)
     kinds = np.array([f"in {m['unit']}" if f == "unit" else other.get(f, f) for f, m in each])[
         codes

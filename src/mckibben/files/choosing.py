@@ -95,11 +95,14 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
         If a channel asked for is missing, or two columns are one channel.
     """
     request, own, clocks = source.request, source.table.own, source.table.has_clocks
-    fixed = {
-        channel: find_column(wanted, channel, source)
-        for channel, wanted in request.columns.items()
-        if not (channel == "time" and clocks)
-    }
+    fixed: dict[str, Column] = {}
+    for channel, given in request.columns.items():
+        if not (channel == "time" and clocks):
+            try:
+                fixed[channel] = find_column(given, channel, source)
+            except DataError:
+                if not request.join:  # where another file may have it
+                    raise
     source, left_out = _of_one_length(source, fixed)
     fixed = _described(source) | fixed
     taken = {id(column) for column in fixed.values()}
@@ -109,6 +112,9 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
             continue
         header = parse(column.label)
         channel = column.header if own else channel_of(header)
+        named_alone = channel_of(replace(header, unit=None))
+        if not own and named_alone in request.units:  # whatever the header says of its unit
+            channel = named_alone
         if (channel in fixed and not own) or (
             channel in named and channel.startswith((REFERENCE, COMMAND))
         ):
@@ -257,7 +263,7 @@ def _target(column: Column) -> str:
 def _require(named: Mapping[str, Column], source: Source) -> None:
     """Raise an error for requested channels that are missing."""
     request, table = source.request, source.table
-    for channel in request.channels or ():
+    for channel in () if request.join else request.channels or ():
         if channel not in named and channel not in source.derived(named):
             problem = f"there is no such channel; the columns are {_headers(table)}"
             remedy = f"name its column with `columns[{channel}]=COLUMN`"
@@ -266,7 +272,7 @@ def _require(named: Mapping[str, Column], source: Source) -> None:
             raise source.error(problem, remedy, channel)
     for option, given in (("calibration", request.calibration), ("units", request.units)):
         for channel in given:
-            if channel not in named:
+            if channel not in named and not request.join:
                 problem = f"it is not there; there are {', '.join(named)}"
                 raise source.error(problem, f"give `{option}` of one of them", channel)
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.channels import ALONG, PULLS, TURNED
-from mckibben.files.headers import unit_of
+from mckibben.files.headers import names_channel, parse, unit_of
 from mckibben.files.request import Source
 from mckibben.files.table import Column
 from mckibben.files.timebase import GAP
+from mckibben.files.units import find
 
 Spots = NDArray[np.intp]
 """Rows, counted from 0."""
@@ -24,6 +24,9 @@ FEWEST_RENEWALS = 20
 
 REGULAR = 0.9
 """Share of the changes of a channel that are on a grid of its own, at least."""
+
+WAYS, PULLS = ("mm", "rad", ""), ("N", "N*m")
+"""Units of what muscles move, and of what they pull."""
 
 CAUSES = ("pressure", "voltage", "command")
 """Quantities that drive muscles, and may be held for several rows as they were commanded."""
@@ -61,7 +64,8 @@ def apart(named: Mapping[str, Column], time: Array) -> tuple[dict[str, Column], 
         rows = there
     else:
         drives = [values for name, values in numbers.items() if name.partition("_")[0] in CAUSES]
-        found = {name: _renewals(x, drives) for name, x in numbers.items() if _is_output(name)}
+        outputs = {name: x for name, x in numbers.items() if _is_output(name, named[name])}
+        found = {name: _renewals(x, drives) for name, x in outputs.items()}
         rows = {name: at for name, at in found.items() if at is not None}
         renewed = {name: time.size / at.size for name, at in rows.items()}
     if not rows:
@@ -73,8 +77,10 @@ def apart(named: Mapping[str, Column], time: Array) -> tuple[dict[str, Column], 
     return columns, renewed
 
 
-def _is_output(channel: str) -> bool:
-    return channel.partition("_")[0] in (*ALONG, *TURNED, *PULLS)
+def _is_output(name: str, column: Column) -> bool:
+    """Return whether a column is a length, an angle, a force or a torque, by name or by unit."""
+    unit = find(column.unit or parse(column.label).unit or "")
+    return bool({unit_of(name), unit and unit.target} & {"mm", "rad", *PULLS})
 
 
 def _renewals(values: Array, drives: Sequence[Array]) -> Spots | None:
@@ -124,6 +130,10 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
     long = {name: times for name, times in clocks.items() if times.size > 1}
     meant = {*request.columns, *request.described.channels}
     meant |= {name for name in long if unit_of(name) not in (None, "degC")}
+    if not request.names_channels:
+        meant |= {name for name in long if names_channel(name)}
+    if any(unit_of(name) in WAYS for name in meant):  # then a force is a load, as a temperature is
+        meant -= {name for name in meant if unit_of(name) in PULLS and not request.asks_for(name)}
     meant |= {name for name in long if request.asks_for(name)}
     needed = {name: times for name, times in long.items() if name in meant} or long
     if not needed:
@@ -171,12 +181,16 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
 
 
 def _spans(times: Array, grid: Array) -> bool:
-    within = times.size > 1 and times[0] <= grid[0] and times[-1] >= grid[-1]
-    return bool(within and np.all(np.diff(times) > 0))
+    """Return whether increasing times cover a grid, but for one of their steps at its ends."""
+    steps = np.diff(times)
+    if not steps.size or steps.min() <= 0:
+        return False
+    step = float(np.median(steps))
+    return bool(times[0] <= grid[0] + step and times[-1] >= grid[-1] - step)
 
 
 def _at(column: Column, times: Array, grid: Array) -> Array:
-    """Return a column at other times, NaN outside its own."""
+    """Return a column at other times, NaN outside its own, but for one of its steps."""
     if column.values is None or column.flaw is not None:
         return np.full(grid.size, np.nan)
     if np.array_equal(times, grid):
@@ -184,8 +198,12 @@ def _at(column: Column, times: Array, grid: Array) -> Array:
     before = np.clip(np.searchsorted(times, grid, side="right") - 1, 0, times.size - 1)
     if column.held:
         return np.where((grid >= times[0]) & (grid <= times[-1]), column.values[before], np.nan)
-    found: Array = np.interp(grid, times, column.values, left=np.nan, right=np.nan)
+    found: Array = np.interp(grid, times, column.values)
     steps = np.append(np.diff(times), 0.0)
+    step = float(np.median(np.diff(times)))
+    found[(grid <= times[0] - step) | (grid >= times[-1] + step)] = (
+        np.nan
+    )  # a sample holds that long
     widest = max(GAP * float(np.median(np.diff(times))), float(np.median(np.diff(grid))))
     found[(steps[before] > widest) & (grid > times[before])] = np.nan
     return found

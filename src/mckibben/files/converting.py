@@ -51,7 +51,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     """
     request, source = source.request, _with_clocks(source)
     columns, left_out = assign(source)
-    columns, source, sampled = _apart(columns, source)
+    columns, source, sampled, began = _apart(columns, source)
     separate = any(column.times is not None for column in columns.values())
     columns, dropped = clocks.on_one(columns, source)
     left_out |= dict.fromkeys(dropped, "it does not cover the times of the others")
@@ -60,7 +60,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         left_out[clock.header], clock = "the rate is given", None
     times = None if clock is None else times_of(clock, source)
     if clock is not None and clock.values is not None and separate:  # in seconds already
-        times = Times(clock.values)
+        times = Times(clock.values, began=began)
     signals: dict[str, Signal] = {}
     derived = source.derived(columns)
     for name, column in columns.items():
@@ -149,24 +149,24 @@ def _with_clocks(source: Source) -> Source:
 
 def _apart(
     columns: dict[str, Column], source: Source
-) -> tuple[dict[str, Column], Source, dict[str, float]]:
+) -> tuple[dict[str, Column], Source, dict[str, float], str | None]:
     """Return columns with times of their own where not all were sampled in every row.
 
-    Then the rates of slow sensors [Hz], by channel.
+    Then the rates of slow sensors [Hz], by channel, and the date at time 0.
     """
     table, step, clock = source.table, source.request.step, columns.get("time")
     if table.own or table.has_clocks or (clock is None and step is None):
-        return columns, source, {}
-    if step is not None:
-        seconds = step * np.arange(table.n_samples, dtype=np.float64)
-    elif clock is not None:
+        return columns, source, {}, None
+    times = Times(np.arange(table.n_samples, dtype=np.float64))
+    seconds = (step or 1.0) * times.values
+    if step is None and clock is not None:
         times = times_of(clock, source)
         seconds = convert(times.values, times.unit, "s")
     if not np.all(np.diff(seconds) >= 0):
-        return columns, source, {}
+        return columns, source, {}, None
     found, renewed = clocks.apart(columns, seconds)
     if all(column.times is None for column in found.values()):
-        return columns, source, {}
+        return columns, source, {}, None
     rate = (seconds.size - 1) / (seconds[-1] - seconds[0])
     sampled = {name: float(f"{rate / rows:.4g}") for name, rows in renewed.items()}
     for name, rows in renewed.items():
@@ -174,7 +174,7 @@ def _apart(
             f"channel {name!r} is renewed every {rows:.4g} rows, {sampled[name]:g} times a second, "
             "so it is read at these rows"
         )
-    return found, replace(source, table=replace(table, lines=None)), sampled
+    return found, replace(source, table=replace(table, lines=None)), sampled, times.began
 
 
 def times_of(column: Column, source: Source) -> Times:
@@ -196,18 +196,19 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
     """Return a channel in the package's unit, NaN for missing samples."""
     raw = _numbers(channel, column, source)
     calibration = _calibration(channel, column, source)
+    own, standard = source.table.own, unit_of(channel)
+    cleaned = not own and not source.request.raw
+    if cleaned and not channel.startswith(("voltage", COMMAND)):  # a sawtooth can be commanded
+        raw = wrapping.unwrapped(channel, raw, source)
     values = raw
     if "gain" in calibration:
         with np.errstate(over="ignore"):
             values = calibration["gain"] * raw + calibration["offset"]
     read_in, assumed = _unit(channel, column, values, source)
-    own, standard = source.table.own, unit_of(channel)
     unit = standard if own or standard is not None else read_in.target
     unit = read_in.name if unit is None else unit
     samples = convert(values, read_in.name, unit)
-    if not own and not source.request.raw:
-        if not channel.startswith(("voltage", COMMAND)):  # a sawtooth can be commanded
-            wrapping.refuse_wraps(channel, raw, source)
+    if cleaned:
         samples = quality.without_codes(channel, samples, raw, source)
     if not own and not _is_stated(channel, column, source):
         quality.question_size(channel, column, samples, read_in.name, source, assumed=assumed)

@@ -59,14 +59,22 @@ def read(file: BufferedReader, path: Path, sheet: str | None = None) -> list[Tab
     """
     module = _module(path)
     options = {} if sheet is None else {"sheet": sheet}
-    if options and READERS[path.suffix.casefold()] != "xlsx":
+    if options and _reader(path) != "xlsx":
         problem, remedy = "only spreadsheets have sheets", "leave it out"
         raise DataError(problem, file=path, parameter="sheet", remedy=remedy)
     with refusing(path):
         if not file.peek(1):
             remedy = "give a file with a header and samples"
             raise DataError("there is nothing in it", file=path, remedy=remedy)
-        return [distinct(printable(table)) for table in module.read(file, path, **options)]
+        try:
+            return [distinct(printable(table)) for table in module.read(file, path, **options)]
+        except DataError as error:
+            if path.suffix.casefold() in READERS:
+                raise
+            ended = f"ending in {path.suffix!r}" if path.suffix else "without an ending"
+            problem = f"files {ended} are read as text, and {error.problem}"
+            remedy = f"if it is none, give one of {', '.join(READERS)}"
+            raise DataError(problem, file=path, row=error.row, remedy=remedy) from None
 
 
 def laid_out(
@@ -75,7 +83,7 @@ def laid_out(
     """Return a text as `mckibben.files.text.laid_out` does; raise a `DataError` for other formats."""
     if header <= 1 and not skip and encoding is None:
         return file
-    if READERS.get(path.suffix.casefold()) != "text":
+    if _reader(path) != "text":
         problem, remedy = "only text has lines and an encoding", "leave both as found"
         raise DataError(problem, file=path, remedy=remedy)
     text = _module(path)
@@ -108,11 +116,10 @@ def refusing(path: Path) -> Iterator[None]:
         raise DataError(problem, file=path, remedy=remedy) from None
 
 
+def _reader(path: Path) -> str:
+    """Return the name of the reader of a file; of an unknown ending, as of instruments, that of text."""
+    return READERS.get(path.suffix.casefold(), "text")
+
+
 def _module(path: Path) -> ModuleType:
-    ending = path.suffix.casefold()
-    if ending not in READERS:
-        ended = f"ending in {ending!r}" if ending else "without an ending"
-        raise DataError(
-            f"files {ended} cannot be read", file=path, remedy=f"give one of {', '.join(READERS)}"
-        )
-    return import_module(f"mckibben.files.{READERS[ending]}")
+    return import_module(f"mckibben.files.{_reader(path)}")

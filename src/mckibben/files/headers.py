@@ -182,6 +182,12 @@ def by_words(units: Mapping[str, str]) -> dict[str, str]:
     return renamed
 
 
+def names_channel(name: str) -> bool:
+    """Return whether a word of a name, which no standard channel has, names one."""
+    words = {*name.split("_")}
+    return not words & {*_ABOUT} and any(map(_in_word, words))
+
+
 def _in_word(word: str) -> str | None:
     """Return the channel that a word names, alone or at its end, as in Zylinderdruck and 관절각도."""
     word = word.rstrip("0123456789")
@@ -197,7 +203,7 @@ def by_units(units: Mapping[str, str]) -> dict[str, str]:
     for name, unit in units.items():
         unnamed = re.fullmatch(r"(?:[a-z]|in|out|input|output|column)(?:_?(\d+))?", name)
         if unnamed and unit in QUANTITIES:
-            alone = name.startswith("column_") and [*units.values()].count(unit) == 1
+            alone = len(name) > 2 and [*units.values()].count(unit) == 1
             found[name] = QUANTITIES[unit] + (f"_{unnamed[1]}" if unnamed[1] and not alone else "")
     names = Counter(found.get(name, name) for name in units)
     return {name: new for name, new in found.items() if names[new] == 1}

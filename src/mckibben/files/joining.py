@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from mckibben.arrays import Array
 from mckibben.channels import by_name
 from mckibben.errors import DataError
 from mckibben.files.clocks import on_one
+from mckibben.files.headers import unit_of
 from mckibben.files.request import GAPS_BRIDGED, Request, Source
 from mckibben.files.table import Column, Table
 from mckibben.recording import SAME_TIME, Recording
@@ -28,12 +30,13 @@ whole.
 """
 
 
-def joined(recordings: Sequence[Recording], request: Request) -> list[Recording]:
+def joined(recordings: Sequence[Recording], request: Request) -> Recording:
     """Return one recording of the pieces of a run, or of the channels of several loggers.
 
     Pieces have the same channels, and follow each other by their times, or else as given. Channels of
     loggers are put on the times of the slowest; these begin at the dates of the files if all state
-    one, or else at their first times.
+    one, or else at their first times. Columns of several that are no standard channels, such as counts
+    of rows, are left out.
 
     Raises
     ------
@@ -41,19 +44,29 @@ def joined(recordings: Sequence[Recording], request: Request) -> list[Recording]
         If recordings share some channels only, pieces differ in sample time or overlap, or loggers
         have no time in common.
     """
+    joint = _joined(recordings, request)
+    asked = {*request.columns, *request.units, *request.calibration, *(request.channels or ())}
+    if missing := sorted(asked - {*joint, "time"}):
+        problem = f"it is in none of the files; there are {', '.join(joint)}"
+        remedy = f"name its column with `columns[{missing[0]}]=COLUMN`"
+        raise DataError(problem, file=joint.source, channel=missing[0], remedy=remedy)
+    return joint
+
+
+def _joined(recordings: Sequence[Recording], request: Request) -> Recording:
     if len(recordings) < 2:
-        return list(recordings)
+        return recordings[0]
     names = [set(one.channels) for one in recordings]
     if all(some == names[0] for some in names):
-        return [_in_sequence(_in_order(_dated(recordings)), request)]
-    shared = sorted(
-        some for k, one in enumerate(names) for other in names[:k] for some in one & other
-    )
+        return _in_sequence(_in_order(_dated(recordings)), request)
+    twice = {some for k, one in enumerate(names) for other in names[:k] for some in one & other}
+    shared = sorted(name for name in twice if unit_of(name) is not None or name in request.columns)
     if shared:
         problem = "it is in several files, but not in all of them"
         remedy = "join pieces with the same channels, or loggers with different ones"
         raise DataError(problem, file=recordings[0].source, channel=shared[0], remedy=remedy)
-    return [_side_by_side(_dated(recordings), request)]
+    own = [one.select([name for name in one if name not in twice]) for one in recordings]
+    return _side_by_side(_dated(own), request)
 
 
 def continues(before: Recording, after: Recording) -> bool:
@@ -153,6 +166,7 @@ def _side_by_side(loggers: list[Recording], request: Request) -> Recording:
             raise DataError("it has no time", file=one.source, remedy=remedy)
         for name, values in one.channels.items():
             columns[name] = Column(name, values, one.units[name], times=one.time)
+    request = replace(request, channels=list(columns))
     source = Source(
         Table(tuple(columns.values())), request, Path(loggers[0].source or "recordings")
     )

@@ -188,9 +188,8 @@ def _cells(values: Sequence[Any]) -> Node:
     found, doubtful = cells.column("", None, np.array(words, object), cells.Dialect(",", "."))
     if found.values is None:
         return words
-    if found.flaw is not None or doubtful:
-        sample, problem = 0, f"{doubtful!r} may mean several numbers"
-        if found.flaw is not None:
-            sample, problem = found.flaw.sample, found.flaw.problem
-        return Unread(f"sample {sample + 1}: {problem}")
+    if doubtful:
+        return Unread(f"sample 1: {doubtful!r} may mean several numbers")
+    if found.flaw is not None and not found.flaw.bridgeable:
+        return Unread(f"sample {found.flaw.sample + 1}: {found.flaw.problem}")
     return found.values if found.unit is None else {"data": found.values, "unit": found.unit}

@@ -116,12 +116,17 @@ def _end(
     Unless a good part of the samples follows.
     """
     named = re.compile(rb"[\s\"]*[A-Za-z\x80-\xff]").match
-    behind = np.flatnonzero(np.diff(numbers) > 1) + 1
+    blank = re.compile(rb"[\s\",;|]*$").match  # separators alone
+    behind = [
+        k for k in range(1, len(lines)) if numbers[k] - numbers[k - 1] > 1 or blank(lines[k - 1])
+    ]
     so_far = np.cumsum(sound)
     for at in map(int, behind) if not named(lines[0]) else ():
         if named(lines[at]) and so_far[-1] - so_far[at] <= MOST * so_far[at]:
             rest = lines[at].decode("utf-8", "replace")
             warn(path, f"from row {numbers[at]} on it is no table, left out: {rest[:60]!r}")
+            while blank(lines[at - 1]):
+                at -= 1
             return at
     return len(lines)
 

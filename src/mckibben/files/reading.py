@@ -109,7 +109,8 @@ def read(
         else:
             found += _read(one, request)[0]
     if chosen.join:
-        found = [_with_notes(one, [*one.notes, *_early(one)]) for one in joined(found, request)]
+        joint = joined(found, request)
+        found = [_with_notes(joint, [*joint.notes, *_early(joint)])]
     for before, after in pieces_of_one(found):
         text = f"it begins where {before.name} ends; if both are one run, use `join`"
         warn(Path(after.source or after.name), text)

@@ -18,17 +18,21 @@ FEWEST, MOST = 2.0**8, 2.0**32
 """Ranges of counters [steps]."""
 
 
-def refuse_wraps(channel: str, recorded: Array, source: Source) -> None:
-    """Raise an error for samples of a counter that wraps."""
-    finite = np.isfinite(recorded)
-    found = wraps(recorded[finite])
-    if found is not None:
-        raise source.error(
-            f"it jumps by almost {found[0]:.10g} there: a counter that wraps",
-            f"add {found[0]:.10g} after each wrap, or use `raw` where that was measured",
-            channel,
-            int(np.flatnonzero(finite)[np.flatnonzero(found[1])[0] + 1]),
-        )
+def unwrapped(channel: str, recorded: Array, source: Source) -> Array:
+    """Return samples of which a counter that wraps goes on, with a note; others as they are."""
+    known = np.flatnonzero(np.isfinite(recorded))
+    found = wraps(recorded[known])
+    if found is None:
+        return recorded
+    size, upwards = found
+    row = source.table.row(int(known[np.flatnonzero(upwards)[0] + 1]))
+    source.warn(
+        f"channel {channel!r} jumps by almost {size:.6g}, first in row {row}, as a counter that wraps: "
+        "it was made to go on; use `raw` where that was measured"
+    )
+    whole = recorded.copy()
+    whole[known] += size * np.cumsum([0.0, *upwards])
+    return whole
 
 
 def wraps(values: Array) -> tuple[float, Array] | None:

@@ -13,6 +13,9 @@ from mckibben.recording import Recording
 LONGEST = 2**15
 """Most samples that are correlated; of longer signals, every so many are."""
 
+NEAREST = 1e-3
+"""Correlation by which the largest lag has to be better than none."""
+
 WIDEST = 0.25
 """Largest lag that is looked for, as a share of the recording."""
 
@@ -65,12 +68,18 @@ def lag(cause: Array, effect: Array, sign: float = 0.0) -> Lag:
     x, y = (some[::every] / np.abs(some).max() for some in (cause, effect))
     x, y = x - x.mean(), y - y.mean()
     n, size = x.size, 2 * x.size
-    product = np.fft.rfft(y, size) * np.fft.rfft(x, size).conj()
     reach = max(1, int(WIDEST * n))
-    found = np.fft.irfft(product, size)
-    found = np.concatenate([found[-reach:], found[: reach + 1]])
-    found /= np.sqrt(np.sum(x**2) * np.sum(y**2))
+    shifts = np.arange(-reach, reach + 1)
+    found = np.fft.irfft(np.fft.rfft(y, size) * np.fft.rfft(x, size).conj(), size)[shifts]
+    whole = [np.append(0.0, np.cumsum(some**2)) for some in (x, y)]  # of those that overlap
+    first, last = np.maximum(0, -shifts), np.minimum(n, n - shifts)
+    energies = [
+        whole[0][last] - whole[0][first],
+        whole[1][last + shifts] - whole[1][first + shifts],
+    ]
+    found /= np.sqrt(np.maximum(energies[0] * energies[1], np.finfo(float).tiny))
     found *= sign or np.sign(found[reach])
+    found -= NEAREST * np.abs(shifts) / reach  # of several periods
     at = int(np.argmax(found))
     shift = 0.0
     if 0 < at < found.size - 1:

@@ -131,7 +131,7 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
     meant = {*request.columns, *request.described.channels}
     meant |= {name for name in long if unit_of(name) not in (None, "degC")}
     if not request.names_channels:
-        meant |= {name for name in long if names_channel(name)}
+        meant |= {name for name in long if unit_of(name) is None and names_channel(name)}
     if any(unit_of(name) in WAYS for name in meant):  # then a force is a load, as a temperature is
         meant -= {name for name in meant if unit_of(name) in PULLS and not request.asks_for(name)}
     meant |= {name for name in long if request.asks_for(name)}

@@ -62,6 +62,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     if clock is not None and clock.values is not None and separate:  # in seconds already
         times = Times(clock.values, began=began)
     signals: dict[str, Signal] = {}
+    flawed: DataError | None = None
     derived = source.derived(columns)
     for name, column in columns.items():
         try:
@@ -71,10 +72,11 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
                 request.needs(name) and (unit_of(name) is not None or request.asks_for(name))
             ):
                 raise
-            left_out[column.header] = error.problem
+            left_out[column.header], flawed = error.problem, flawed or error
     if not signals:
-        problem = "there is no column of numbers"
-        raise source.error(problem, "give a file with samples in columns")
+        raise flawed or source.error(
+            "there is no column of numbers", "give one with samples in columns"
+        )
     each = signals.items()
     references = {name: one.read_in.reference for name, one in each if one.read_in.reference}
     meta = {

@@ -198,12 +198,7 @@ def _vectors(
             columns[place] = _column(header, name, values)
             continue
         rows = values if values.shape[0] < values.shape[1] else values.T
-        titles, stated = (
-            lines
-            if isinstance(lines := texts.get(home), list) and len(lines) == len(rows)
-            else None
-            for texts in (names, units)
-        )
+        titles, stated = (_of_columns(texts.get(home), len(rows)) for texts in (names, units))
         plain = parse(header)
         for i, row in enumerate(rows):
             number = f"[{i + 1}]"
@@ -214,6 +209,16 @@ def _vectors(
             columns[at] = replace(each, unit=stated[i] if stated else None, matrix=True)
             own[at] = ((*home, named), *(() if stated else own[place]))
     return columns, own
+
+
+def _of_columns(texts: Node | None, n: int) -> Sequence[str] | None:
+    """Return the texts for n columns of a matrix: a list, or one text with commas."""
+    listed = texts.split(",") if isinstance(texts, str) else texts
+    return (
+        [str(text).strip() for text in listed]
+        if isinstance(listed, list) and len(listed) == n
+        else None
+    )
 
 
 def _column(header: str, name: str, values: NDArray[Any]) -> Column:

@@ -128,27 +128,27 @@ def describe(recording: Recording, samples: bytes, path: Path) -> bytes:
                 "from the sample time",
             )
     step = recording.sample_time
-    stored = Stored.model_construct(
-        format="mckibben-recording",
-        version=VERSION,
-        sha256="",
-        sample_time=None if step is None else float(step),
-        start_time=float(recording.start_time),
-        units=dict(recording.units),
-        meta=dict(recording.meta),
-    )
+    about = {
+        "format": "mckibben-recording",
+        "version": VERSION,
+        "sha256": "",
+        "sample_time": None if step is None else float(step),
+        "start_time": float(recording.start_time),
+        "units": dict(recording.units),
+        "meta": dict(recording.meta),
+    }
     try:
+        stored = Stored.model_validate(json.loads(json.dumps(about, allow_nan=False)))
         stored.sha256 = stored.digest(samples)
-        text = json.dumps(stored.model_dump(), indent=2, ensure_ascii=False)
-        found = encoded(f"{text}\n")
+        text = encoded(json.dumps(stored.model_dump(), indent=2, ensure_ascii=False) + "\n")
+        if len(text) <= DESCRIPTION:
+            return text
+        why = f"it has {len(text)} bytes, of at most {DESCRIPTION}"
     except (TypeError, ValueError, RecursionError) as error:
-        problem = f"the recording's meta cannot be written as JSON ({error})"
-        remedy = "use only text, finite numbers, lists and dicts in meta"
-        raise DataError(problem, file=path, remedy=remedy) from None
-    if len(found) > DESCRIPTION:
-        problem = f"the recording's meta has {len(found)} bytes, of at most {DESCRIPTION}"
-        raise DataError(problem, file=path, remedy="leave samples out of meta")
-    return found
+        why = reason(error)
+    problem = f"the recording's meta cannot be written as JSON ({why})"
+    remedy = "use only text, finite numbers, lists and dicts in meta, and no samples"
+    raise DataError(problem, file=path, remedy=remedy)
 
 
 def described(path: Path) -> Stored | None:

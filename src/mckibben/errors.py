@@ -20,6 +20,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from mckibben.printing import printable
+
 _NAMED = re.compile(r"`(\w+)(\(\)|\[([^`\]]*)\])?(?:=([^`]*))?`")
 """A parameter or an operation in a remedy."""
 
@@ -131,7 +133,7 @@ def rendered(
     operation: Callable[[str], str] = python_operation,
 ) -> str:
     """Return an error as one paragraph: place, problem and remedy, in the terms of one interface."""
-    where = [] if error.file is None else [str(error.file)]
+    where = [] if error.file is None else [printable(error.file)]
     if error.parameter is not None:
         where.append(parameter(error.parameter, None, None))
     if error.channel is not None:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from mckibben.errors import DataError
+from mckibben.printing import encoded
 from mckibben.system import ordinary
 from mckibben.system.atomic import demand_room, digest, write_json, write_text, written
 
@@ -201,7 +202,7 @@ class Results:
         with written(path):
             path.parent.mkdir(parents=True, exist_ok=True)
         write_text(path, text)
-        self._digests[name] = digest(text.encode())
+        self._digests[name] = digest(encoded(text))
 
     def commit(self) -> None:
         """Move the files to their places, and remove unchanged files of the earlier run.

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array, check_finite
 from mckibben.errors import DataError
+from mckibben.printing import printable
 from mckibben.registry import load
 from mckibben.system.atomic import digest
 from mckibben.system.showing import DrawsItself, Hinted
@@ -351,8 +352,8 @@ class Recording(Hinted, DrawsItself):
         """A short name to show: ``meta["name"]``, or the stem of the source file."""
         given = self.meta.get("name")
         if given is not None:
-            return str(given)
-        return "recording" if self.source is None else Path(self.source).stem
+            return printable(str(given))
+        return "recording" if self.source is None else printable(Path(self.source).stem)
 
     @property
     def notes(self) -> tuple[str, ...]:

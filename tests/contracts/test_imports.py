@@ -14,7 +14,17 @@ import mckibben
 SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
-    {"errors", "hints", "arrays", "registry", "numerals", "version", "system", "numerics"},
+    {
+        "errors",
+        "hints",
+        "arrays",
+        "registry",
+        "numerals",
+        "printing",
+        "version",
+        "system",
+        "numerics",
+    },
     {"recording", "signals", "channels", "metrics", "splits"},
     {"options", "keywords", "parsers"},
     {"files"},
@@ -48,7 +58,7 @@ LAYERS = (
 )
 """Lowest first."""
 
-BASE = {"arrays", "errors"}
+BASE = {"arrays", "errors", "printing"}
 
 STANDS_ON = {
     "numerics": {"numerics", *BASE},

@@ -66,7 +66,7 @@ RECORDING = Recording(
     sample_time=1 / 30,
     units={"y": "cm"},
     start_time=0.1,
-    meta={"rig": "bench 2", "load_N": 12.5},
+    meta={"rig": "bench 2", "load_N": 12.5, "noted in": "run\udcff.txt"},
 )
 UNITS = {"pressure": "bar", "displacement_model": "mm", "y": "cm"}
 
@@ -190,7 +190,7 @@ def test_other_endings_and_missing_folders_are_refused(tmp_path: Path, name: str
 
 
 ONES = np.ones(10)
-UNWRITABLE = [{1, 2}, float("nan"), "\udcff", "x" * 2**22]
+UNWRITABLE = [{1, 2}, float("nan"), "x" * 2**22]
 BAD = [Recording({name: ONES}) for name in ("a\nb", " ")]
 BAD += [Recording({"x": ONES}, meta={"a": value}) for value in UNWRITABLE]
 BAD += [Recording({"x": ONES}, units={"x": "\x1b[2J"})]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.cli.parameters import as_command, as_flag, plainly
 from mckibben.errors import MckibbenError, in_terms_of
+from mckibben.printing import printable
 from mckibben.system.atomic import to_json
 
 if TYPE_CHECKING:
@@ -112,5 +113,5 @@ def show(
             say(in_terms_of(line, as_flag, as_command))
     for one in notes:
         note(one)
-    if paths := [str(path) for path in written if path is not None]:
+    if paths := [printable(str(path)) for path in written if path is not None]:
         say(f"Written: {', '.join(paths)}")

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import click
 
+from mckibben import printing
 from mckibben.errors import DataError, in_terms_of, python_operation, python_parameter
 from mckibben.options import FILES, TEST, Argument, Option, is_mapping, parsed
 
@@ -81,7 +82,7 @@ def chosen_models(models: str | Sequence[str], quick: bool) -> str | Sequence[st
 
 def repeated() -> str:
     """Return the command line as it was typed."""
-    return shlex.join(["mckibben", *sys.argv[1:]])
+    return printing.command(["mckibben", *sys.argv[1:]])
 
 
 def command(run: Callable[..., int | None]) -> click.Command:

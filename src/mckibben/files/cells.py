@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -74,10 +75,7 @@ class Dialect:
 
     def form(self, cell: str) -> tuple[str, re.Match[str] | None]:
         """Return the form of a cell: one of `_FORMS`, missing or text; and the match of a number."""
-        found = _FORMS[self.decimal].fullmatch(cell.replace("−", "-"))
-        if found:
-            return (found.lastgroup or "").replace("_", " "), found
-        return "text" if cell and cell not in MISSING else "missing", None
+        return _form(cell, self.decimal)
 
     def value(self, found: re.Match[str] | None) -> float:
         """Return the number of a cell of that form; NaN for a missing one, and what may be several."""
@@ -98,6 +96,14 @@ class Dialect:
         """Return the number of values minus that of words in cells."""
         filled = [cell for cell in cells if self.form(cell)[0] != "missing"]
         return 2 * sum(map(self.is_value, filled)) - len(filled)
+
+
+@lru_cache(maxsize=2**14)  # a table is tried with several separators
+def _form(cell: str, decimal: str) -> tuple[str, re.Match[str] | None]:
+    found = _FORMS[decimal].fullmatch(cell.replace("−", "-"))
+    if found:
+        return (found.lastgroup or "").replace("_", " "), found
+    return "text" if cell and cell not in MISSING else "missing", None
 
 
 def column(name: str, unit: str | None, cells: Any, dialect: Dialect) -> tuple[Column, str]:

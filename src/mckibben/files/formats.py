@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 
 from mckibben.errors import DataError, MckibbenError
-from mckibben.files.table import Table, distinct, printable
+from mckibben.files.table import Table, distinct, legible
 from mckibben.system.ordinary import opened
 from mckibben.system.validation import reason
 
@@ -67,7 +67,7 @@ def read(file: BufferedReader, path: Path, sheet: str | None = None) -> list[Tab
             remedy = "give a file with a header and samples"
             raise DataError("there is nothing in it", file=path, remedy=remedy)
         try:
-            return [distinct(printable(table)) for table in module.read(file, path, **options)]
+            return [distinct(legible(table)) for table in module.read(file, path, **options)]
         except DataError as error:
             if path.suffix.casefold() in READERS:
                 raise
@@ -94,7 +94,7 @@ def laid_out(
 def bag(folder: Path) -> list[Table]:
     """Return the contents of a ROS 2 bag folder; errors as in `read`."""
     with refusing(folder):
-        return [printable(table) for table in import_module("mckibben.files.bags").folder(folder)]
+        return [legible(table) for table in import_module("mckibben.files.bags").folder(folder)]
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from contextvars import ContextVar
 from pathlib import Path
 
 from mckibben.errors import DataWarning
+from mckibben.printing import printable
 from mckibben.recording import Recording
 
 _HERE = str(Path(__file__).parent)
@@ -63,4 +64,4 @@ def warn(path: Path, text: str, *, quiet: bool = False) -> None:
     frame, level = inspect.currentframe(), 0
     while frame is not None and frame.f_code.co_filename.startswith(_HERE):
         frame, level = frame.f_back, level + 1
-    warnings.warn(f"{path}: {text}", DataWarning, stacklevel=level + 1)
+    warnings.warn(f"{printable(path)}: {text}", DataWarning, stacklevel=level + 1)

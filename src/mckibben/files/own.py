@@ -15,6 +15,7 @@ from mckibben.errors import DataError, MckibbenError
 from mckibben.files.formats import tables
 from mckibben.files.notices import warn
 from mckibben.files.table import Column, Table
+from mckibben.printing import encoded
 from mckibben.recording import Recording
 from mckibben.system.atomic import digest, replacing
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
@@ -42,7 +43,7 @@ class Stored(BaseModel):
     sample_time: Annotated[float, Field(ge=1e-12, lt=1e11)] | None
     start_time: float
     units: dict[Plain, Plain]
-    meta: dict[str, Any]
+    meta: dict[Any, Any]
 
     def digest(self, samples: bytes) -> str:
         """Return what ``sha256`` is to be, for these bytes of samples."""
@@ -127,27 +128,27 @@ def describe(recording: Recording, samples: bytes, path: Path) -> bytes:
                 "from the sample time",
             )
     step = recording.sample_time
-    stored = Stored.model_construct(
-        format="mckibben-recording",
-        version=VERSION,
-        sha256="",
-        sample_time=None if step is None else float(step),
-        start_time=float(recording.start_time),
-        units=dict(recording.units),
-        meta=dict(recording.meta),
-    )
+    about = {
+        "format": "mckibben-recording",
+        "version": VERSION,
+        "sha256": "",
+        "sample_time": None if step is None else float(step),
+        "start_time": float(recording.start_time),
+        "units": dict(recording.units),
+        "meta": dict(recording.meta),
+    }
     try:
+        stored = Stored.model_validate(json.loads(json.dumps(about, allow_nan=False)))
         stored.sha256 = stored.digest(samples)
-        text = json.dumps(stored.model_dump(), indent=2, ensure_ascii=False)
-        found = f"{text}\n".encode()
+        text = encoded(json.dumps(stored.model_dump(), indent=2, ensure_ascii=False) + "\n")
+        if len(text) <= DESCRIPTION:
+            return text
+        why = f"it has {len(text)} bytes, of at most {DESCRIPTION}"
     except (TypeError, ValueError, RecursionError) as error:
-        problem = f"the recording's meta cannot be written as JSON ({error})"
-        remedy = "use only text, finite numbers, lists and dicts in meta"
-        raise DataError(problem, file=path, remedy=remedy) from None
-    if len(found) > DESCRIPTION:
-        problem = f"the recording's meta has {len(found)} bytes, of at most {DESCRIPTION}"
-        raise DataError(problem, file=path, remedy="leave samples out of meta")
-    return found
+        why = reason(error)
+    problem = f"the recording's meta cannot be written as JSON ({why})"
+    remedy = "use only text, finite numbers, lists and dicts in meta, and no samples"
+    raise DataError(problem, file=path, remedy=remedy)
 
 
 def described(path: Path) -> Stored | None:
@@ -160,7 +161,7 @@ def described(path: Path) -> Stored | None:
     """
     beside = sidecar(path)
     try:
-        return Stored.model_validate_json(read_bytes(beside, most=DESCRIPTION))
+        return Stored.model_validate(json.loads(read_bytes(beside, most=DESCRIPTION)))
     except DataError as error:
         why = error.problem
     except ValidationError as error:
@@ -171,6 +172,8 @@ def described(path: Path) -> Stored | None:
                 by = f"was written by a newer mckibben, in version {version} of its format"
                 raise conflict(path, by, "update mckibben") from None
             raise conflict(path) from None
+    except (ValueError, RecursionError) as error:
+        why = reason(error)
     warn(path, f"{beside.name} is ignored, as it is not by mckibben ({why})")
     return None
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
+from mckibben.printing import printable
 
 WIDEST = 64
 """Most columns of a matrix that are read as channels."""
@@ -123,25 +124,16 @@ def is_matrix(shape: Sequence[int]) -> bool:
     return len(shape) == 2 and 2 <= min(shape) <= WIDEST and max(shape) >= 10 * min(shape)
 
 
-def printable(value: Any) -> Any:
-    r"""Return a foreign table, or a part of one, without control characters in its texts.
-
-    Blanks of any kind become plain ones; other characters that cannot be printed are written out.
-
-    >>> print(printable(["\x1b[31mpressure\xa0(bar)"])[0])
-    \x1b[31mpressure (bar)
-    """
+def legible(value: Any) -> Any:
+    """Return a foreign table, or a part of one, with printable texts."""
     if isinstance(value, str):
-        if value.isprintable():
-            return value
-        written = (c if c.isprintable() else " " if c.isspace() else ascii(c)[1:-1] for c in value)
-        return "".join(written)
+        return printable(value)
     if isinstance(value, (list, tuple)):
-        return type(value)(map(printable, value))
+        return type(value)(map(legible, value))
     if isinstance(value, Mapping):
-        return {printable(key): printable(each) for key, each in value.items()}
+        return {legible(key): legible(each) for key, each in value.items()}
     if isinstance(value, (Table, Column)) and not getattr(value, "own", False):
-        return replace(value, **{name: printable(each) for name, each in vars(value).items()})
+        return replace(value, **{name: legible(each) for name, each in vars(value).items()})
     return value
 
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.errors import in_terms_of
 from mckibben.numerals import number, numeral, percent, typeset, typeset_within
+from mckibben.printing import printable
 from mckibben.report import interactive
 from mckibben.report.glossary import definition
 from mckibben.report.mathematics import mathml
@@ -47,6 +48,9 @@ class Text:
     listed: bool = False
     kind: str = "text"
 
+    def __post_init__(self) -> None:  # names in it may hold anything
+        object.__setattr__(self, "sentences", [printable(one) for one in self.sentences])
+
 
 @dataclass(frozen=True)
 class Table:
@@ -66,6 +70,10 @@ class Table:
     summary: str = ""
     """Of a table that is folded: what it is called."""
     kind: str = "table"
+
+    def __post_init__(self) -> None:
+        rows = [[printable(x) if isinstance(x, str) else x for x in row] for row in self.rows]
+        object.__setattr__(self, "rows", rows)
 
     @property
     def figures(self) -> set[int]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from mckibben import registry
+from mckibben import printing, registry
 
 if TYPE_CHECKING:
     from mckibben.recording import Recording
@@ -35,7 +34,7 @@ def commands(study: Study, command: str = "") -> list[tuple[str, str]]:
         }
         load = [] if study.load is None else ["--load", study.load]
         words = ["study", *train, *tests, *named, *load, "--models", ",".join(sorted(models))]
-        command = f"mckibben {shlex.join([*words, '--seed', str(board.seed)])}"
+        command = printing.command(["mckibben", *words, "--seed", str(board.seed)])
     lines.append(("Repeat this study", command))
     best = board.best
     if best is not None and best.block is not None:
@@ -54,7 +53,7 @@ def commands(study: Study, command: str = "") -> list[tuple[str, str]]:
 
 def _files(recordings: Sequence[Recording]) -> list[str]:
     sources = [recording.source or f"{recording.name}.csv" for recording in recordings]
-    return list(dict.fromkeys(sources))
+    return list(dict.fromkeys(f"./{one}" if one.startswith("-") else one for one in sources))
 
 
 def model_file(model: str) -> str:

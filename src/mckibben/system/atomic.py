@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from mckibben.errors import DataError
+from mckibben.printing import encoded
 
 PART = ".mckibben-"
 """How temporary names begin."""
@@ -100,7 +101,7 @@ def digest(content: bytes) -> str:
 def write_text(path: str | Path, text: str) -> None:
     """Write a text file in UTF-8; an earlier file is replaced when all is written."""
     with replacing(path) as new:
-        new.write_text(text, encoding="utf-8", newline="")
+        new.write_bytes(encoded(text))
 
 
 def to_json(value: Any) -> str:

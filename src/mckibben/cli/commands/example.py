@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+from mckibben import printing
 from mckibben.cli.output import say
 from mckibben.cli.parameters import Force, command
 from mckibben.options import Argument
@@ -19,4 +20,5 @@ def example(
 
     count = bundled.copy_to(folder, force=force)
     train, test = folder / bundled.TRAIN.name, folder / bundled.TEST.name
-    say(f"Written: {count} files to {folder}. Next: mckibben study {train} --test {test}")
+    following = printing.command(["mckibben", "study", train, "--test", test])
+    say(f"Written: {count} files to {printing.printable(folder)}. Next: {following}")

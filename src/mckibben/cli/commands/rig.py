@@ -12,6 +12,7 @@ from mckibben.cli.parameters import Force, Json, command
 from mckibben.cli.stopping import stoppable
 from mckibben.options import Argument, Jobs, Option, Seed
 from mckibben.parsers import setting
+from mckibben.printing import printable
 from mckibben.system.progress import telling
 
 Name = Annotated[str, Argument("RIG", "Name of a rig, or its file (.toml).")]
@@ -53,7 +54,7 @@ def show_(
     rig = load_rig(name).changed(changes)
     if out is not None:
         save_rig(rig.changed({"name": out.stem}), out)
-        say(f"Written: {out}")
+        say(f"Written: {printable(out)}")
     elif as_json:
         show(rig.model_dump(mode="json"), list, True)
     else:

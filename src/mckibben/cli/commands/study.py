@@ -27,6 +27,7 @@ from mckibben.cli.parameters import (
 )
 from mckibben.cli.stopping import stop_short, stoppable
 from mckibben.options import Option, ReadOptions, StudyOptions
+from mckibben.printing import printable
 
 if TYPE_CHECKING:
     from mckibben.studying.study import Study
@@ -53,7 +54,7 @@ def study(
             for line in text.lines(results.study_started(so_far)):
                 say(line)
             live = unfinished(out) / "report.html"
-            say(f"Report so far, updated with every model: {live}\n", flush=True)
+            say(f"Report so far, updated with every model: {printable(live)}\n", flush=True)
 
     with stoppable(out), observed() as read:
         found = workflow.study(

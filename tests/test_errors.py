@@ -42,37 +42,48 @@ def commands() -> tuple[Command, ...]:
     return tuple(inside(app))
 
 
-def nodes() -> Iterator[tuple[str, ast.AST]]:
-    """Yield each node of the library's source, with its place."""
+@cache
+def nodes() -> tuple[tuple[str, ast.AST], ...]:
+    """Return what calls or assigns in the library's source, with its place."""
     root = Path(mckibben.__file__).parent
+    found: list[tuple[str, ast.AST]] = []
     for path in sorted(root.rglob("*.py")):
         if path.relative_to(root).parts[0] not in FACES:
             for node in ast.walk(ast.parse(path.read_text())):
-                yield f"{path.relative_to(root)}:{getattr(node, 'lineno', 0)}", node
+                if isinstance(node, ast.Call | ast.Assign) or hasattr(node, "target"):
+                    place = f"{path.relative_to(root)}:{getattr(node, 'lineno', 0)}"
+                    found.append((place, node))
+    return tuple(found)
 
 
-def calls() -> Iterator[tuple[str, str, ast.Call]]:
-    """Yield each call that makes an error or warns: its place, its name and itself."""
+@cache
+def calls() -> tuple[tuple[str, str, ast.Call], ...]:
+    """Return each call that makes an error or warns: its place, its name and itself."""
+    found = []
     for place, node in nodes():
         if isinstance(node, ast.Call):
             name = ast.unparse(node.func).rpartition(".")[2]
             if name in RAISED or any(one.arg == "remedy" for one in node.keywords):
-                yield place, name, node
+                found.append((place, name, node))
+    return tuple(found)
 
 
-def texts() -> Iterator[tuple[str, str]]:
-    """Yield the strings in these calls, and those that become problems and remedies."""
-    found: list[tuple[str, ast.AST]] = [(place, call) for place, _, call in calls()]
+@cache
+def texts() -> tuple[tuple[str, str], ...]:
+    """Return the strings in these calls, and those that become problems and remedies."""
+    parents: list[tuple[str, ast.AST]] = [(place, call) for place, _, call in calls()]
     for place, node in nodes():
         targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
         if any(isinstance(one, ast.Name) and one.id in TEXTS for one in targets):
-            found.append((place, node))
-    for place, parent in found:
+            parents.append((place, node))
+    found = []
+    for place, parent in parents:
         for node in ast.walk(parent):
             if isinstance(node, ast.JoinedStr):
-                yield place, ast.unparse(node)
+                found.append((place, ast.unparse(node)))
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-                yield place, node.value
+                found.append((place, node.value))
+    return tuple(found)
 
 
 def test_the_library_names_no_flag() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -87,8 +87,8 @@ def name_of(path: Path) -> str:
     return ".".join(parts).removesuffix(".__init__")
 
 
-TREES = {
-    name_of(path): ast.parse(path.read_text(encoding="utf-8"))
+MODULES = {
+    name_of(path): path
     for path in sorted(SOURCE.rglob("*.py"))
     # the package's face imports everything when asked for it, and gives the version to all
     if path != SOURCE / "__init__.py"
@@ -102,25 +102,28 @@ def layer(name: str) -> int:
     raise AssertionError(f"{name!r} is in no layer: add it to LAYERS where it belongs")
 
 
-def imported(name: str) -> Iterator[str]:
-    """Give the modules of the package that a module imports, wherever in its text.
+@cache
+def imported(name: str) -> frozenset[str]:
+    """Return the modules of the package that a module imports, wherever in its text.
 
     Imports inside functions and for types alone count: who reads a file needs what it names.
     """
-    for node in ast.walk(TREES[name]):
+    modules: set[str] = set()
+    for node in ast.walk(ast.parse(MODULES[name].read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             found = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{name}: relative imports hide where they point"
             inner = [f"{node.module}.{alias.name}" for alias in node.names]
-            found = [one if one in TREES else node.module or "" for one in inner]
-            assert node.module != "mckibben" or {*inner} <= {*TREES, "mckibben.__version__"}
+            found = [one if one in MODULES else node.module or "" for one in inner]
+            assert node.module != "mckibben" or {*inner} <= {*MODULES, "mckibben.__version__"}
         else:
             continue
-        yield from (one for one in found if one in TREES)
+        modules |= {one for one in found if one in MODULES}
+    return frozenset(modules)
 
 
-@pytest.mark.parametrize("name", TREES)
+@pytest.mark.parametrize("name", MODULES)
 def test_imports_point_down(name: str) -> None:
     own, members = name.split(".")[1], {one.split(".")[1] for one in imported(name)}
     upward = {member for member in members if layer(member) > layer(own)}
@@ -129,7 +132,7 @@ def test_imports_point_down(name: str) -> None:
 
 
 def test_imports_go_round_in_no_circle() -> None:
-    graph = {name: {*imported(name)} for name in TREES}
+    graph = {name: imported(name) for name in MODULES}
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -139,7 +142,7 @@ def test_imports_go_round_in_no_circle() -> None:
 def test_rooms_go_round_in_no_circle() -> None:
     """The files of one folder, or one file beside the folders, are a room."""
     graph: dict[str, set[str]] = {}
-    for name in TREES:
+    for name in MODULES:
         own = name.split(".")[1]
         graph.setdefault(own, set()).update(one.split(".")[1] for one in imported(name))
         graph[own].discard(own)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ STEP, NOISE = 0.01, 0.005
 REGULATOR = Air(0.6, 0.3, 0.08, 0.05, 0.09, 0.03)
 
 
+@cache
 def recorded(air: Air) -> Recording:
     rng = np.random.default_rng(0)
     levels = np.repeat(rng.uniform(1.0, 9.0, 60), rng.integers(5, 60, 60))
@@ -25,6 +27,7 @@ def recorded(air: Air) -> Recording:
     return Recording({"voltage": volts, "pressure": pressure}, STEP)
 
 
+@cache
 def fitted(air: Air) -> tuple[Air, AirEstimator]:
     estimator = AirEstimator().fit(recorded(air))
     assert isinstance(estimator.model_, Air)

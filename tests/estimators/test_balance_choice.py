@@ -1,5 +1,7 @@
 """What a balance is chosen to have, on plants drawn at random from textbook physics."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,15 @@ from mckibben.blocks.coupled.balance_terms import PHENOMENA
 from mckibben.blocks.memoryless import PiecewiseLinear
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.recording import Recording
-from tests.plants.sampled import Plant, clean, with_one
+from tests.plants import sampled
+
+clean = cache(sampled.clean)
+
+
+@cache
+def fitted(seed: int) -> BalanceEstimator:
+    """Return an estimator fitted to a clean plant."""
+    return BalanceEstimator().fit(clean(seed).train)
 
 
 def phenomena(estimator: BalanceEstimator) -> set[str]:
@@ -22,9 +32,9 @@ def scaled(recording: Recording, seed: int, by: float) -> Recording:
     return recording.with_channels({}, displacement=noise * recording["displacement"])
 
 
-@pytest.mark.parametrize("plant", [clean(8), clean(14)], ids=["spring", "load"])
-def test_nothing_is_found_that_is_not_there_and_rounding_changes_nothing(plant: Plant) -> None:
-    estimator = BalanceEstimator().fit(plant.train)
+@pytest.mark.parametrize("seed", [8, 14], ids=["spring", "load"])
+def test_nothing_is_found_that_is_not_there_and_rounding_changes_nothing(seed: int) -> None:
+    plant, estimator = clean(seed), fitted(seed)
     assert not phenomena(estimator)
     other = BalanceEstimator().fit([scaled(run, 1, 1e-12) for run in plant.train])
     assert other.terms_ == estimator.terms_
@@ -35,15 +45,12 @@ def test_nothing_is_found_that_is_not_there_and_rounding_changes_nothing(plant: 
 
 
 @pytest.mark.parametrize(
-    ("plant", "kind"),
-    [
-        (with_one("dead zone", 3), "dead"),
-        (with_one("wall", 0), "obstacle"),
-        (with_one("mass", 3), "mass"),
-    ],
+    ("cause", "seed", "kind"),
+    [("dead zone", 3, "dead"), ("wall", 0, "obstacle"), ("mass", 3, "mass")],
     ids=["dead zone", "wall", "mass"],
 )
-def test_what_is_there_is_found(plant: Plant, kind: str) -> None:
+def test_what_is_there_is_found(cause: str, seed: int, kind: str) -> None:
+    plant = sampled.with_one(cause, seed)
     estimator = BalanceEstimator().fit(plant.train)
     assert kind in phenomena(estimator)
     if kind == "dead":
@@ -55,8 +62,7 @@ def test_what_is_there_is_found(plant: Plant, kind: str) -> None:
 
 
 def test_beyond_its_data_a_muscle_stays_stiff_and_comes_back() -> None:
-    plant = clean(14)
-    model = BalanceEstimator().fit(plant.train).fitted
+    plant, model = clean(14), fitted(14).fitted
     (recorded, *_) = plant.train
     span = np.ptp(np.concatenate([run["displacement"] for run in plant.train]))
     more = {name: 1.3 * recorded[name] for name in ("pressure", "force")}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -189,6 +190,7 @@ class TestHeldLengths:
         return Recording(channels, 0.02, meta={"name": f"{length:g} mm, {seed}"})
 
     @classmethod
+    @cache
     def fitted(cls, noise: float) -> tuple[Any, list[Recording]]:
         train = [cls.run(length, noise, place) for place, length in enumerate(cls.LENGTHS)]
         test = [cls.run(length, noise, 10 + place) for place, length in enumerate((197.0, 184.0))]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +150,12 @@ def study(
         inverse=compensated(rows[0], train[0]) if inverse and blocks else None,
         notes=notes,
     )
+
+
+@cache
+def plain_study() -> Study:
+    """Return the study by default, once for all that look at it."""
+    return study()
 
 
 def compensated(row: Row, recording: Recording) -> Compensation:

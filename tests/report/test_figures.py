@@ -27,7 +27,7 @@ from mckibben.report.figures import (
 )
 from mckibben.report.interactive import packed, plots, text
 from mckibben.report.shown import shown
-from tests.report.studies_by_hand import measured, study
+from tests.report.studies_by_hand import measured, plain_study, study
 
 CHANNELS = ("pressure", "displacement")
 SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
@@ -167,7 +167,7 @@ def test_every_kind_is_drawn_for_print(tmp_path: Path, thing: str, kind: str) ->
     elif thing == "block":
         write_figure(GPI.example(), path, kind, recording=[measured(200), measured(100, seed=1)])
     else:
-        write_figure(study(), path, kind)
+        write_figure(plain_study(), path, kind)
     assert path.stat().st_size > 1000
 
 
@@ -223,7 +223,7 @@ def test_packing_keeps_seven_digits_of_the_range_and_gaps(values: np.ndarray, fa
 def test_every_figure_is_one_that_plotly_knows(name: str) -> None:
     import plotly.graph_objects as go
 
-    for plot in plots(draw(study(), name)):
+    for plot in plots(draw(plain_study(), name)):
         found = unpacked(json.loads(json.dumps(plot, allow_nan=False)))
         go.Figure(found)  # refuses unknown properties and values
 

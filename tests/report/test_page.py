@@ -33,7 +33,7 @@ from mckibben.report.page import page
 from mckibben.report.results import description, tiles
 from mckibben.report.words import answers
 from mckibben.studying.study import Study
-from tests.report.studies_by_hand import measured, renamed, study
+from tests.report.studies_by_hand import measured, plain_study, renamed, study
 
 SECTIONS = {"headline", "leaderboard", "model", "checks", "recordings", "method"}
 MOST_WORDS = 800
@@ -133,7 +133,7 @@ def test_nothing_that_pages_are_made_of_leads_elsewhere() -> None:
 
 @pytest.mark.parametrize("blocks", [{"gpi": GPI.example()}, None])
 def test_every_model_of_a_figure_that_is_chosen_from_can_be_shown(blocks: Any) -> None:
-    parsed = Parsed(page(study() if blocks is None else study(blocks=blocks)))
+    parsed = Parsed(page(plain_study() if blocks is None else study(blocks=blocks)))
     chosen = {v for t, n, v in parsed.attributes if t == "input" and n == "value"}
     for name in ("fit", "residuals"):
         drawn = {trace["meta"] for plot in parsed.figures[name][0] for trace in plot["data"]}
@@ -162,7 +162,7 @@ def test_the_page_of_the_example_is_short_and_has_its_tiles_answers_and_title() 
 
 
 def test_a_check_comes_from_the_builder_and_has_no_links() -> None:
-    found = study()
+    found = plain_study()
     best = found.leaderboard.best
     assert best is not None
     assert best.block is not None
@@ -291,4 +291,4 @@ def test_commands_are_quoted_and_name_every_file_once() -> None:
 
 def test_a_study_is_repeated_as_it_was_typed() -> None:
     typed = "mckibben study 'a b.csv' --column 'pressure=P (1)'"
-    assert commands(study(), typed)[0][1] == typed
+    assert commands(plain_study(), typed)[0][1] == typed

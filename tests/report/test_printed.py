@@ -24,8 +24,7 @@ from mckibben.recording import Recording
 from mckibben.report import printed
 from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Label, Panel
 from mckibben.report.figures import FIGURES, draw, write_figure
-from mckibben.studying.study import Study
-from tests.report.studies_by_hand import measured, study
+from tests.report.studies_by_hand import measured, plain_study
 
 LONG = "2026-03-14_muscle-of-220-mm_load-{}N_triangle-decaying_0.05Hz_repetition-{}.csv"
 SERIES = {colour for name, colour in printed.COLOURS.items() if name.startswith("series")}
@@ -46,13 +45,8 @@ def arm(name: str) -> Recording:
     return Recording(given | made, 0.05, units, meta={"name": name})
 
 
-@cache
-def whole() -> Study:
-    return study()
-
-
 def models_of(kind: str) -> Drawing:
-    board = whole().leaderboard
+    board = plain_study().leaderboard
     every = [row.model for row in board.rows if row.block is not None]
     return draw(board, kind, recording=runs(2), models=every)
 
@@ -81,7 +75,7 @@ def on_runs(kind: str, n: int) -> Drawing:
 
 
 def of_study(kind: str) -> Drawing:
-    return draw(whole(), kind)
+    return draw(plain_study(), kind)
 
 
 AGAINST = ("loops", "fit", "residuals")
@@ -153,18 +147,20 @@ def test_a_figure_fits_its_columns_and_is_legible(case: str, columns: Literal[1,
         assert all(map(distinct, legends(figure)))
 
 
-def test_vectors_hold_text_and_pixels_are_fine(tmp_path: Path) -> None:
-    for columns, width in MILLIMETRES.items():
-        for ending in ("svg", "png", "pdf"):
-            path = tmp_path / f"figure.{ending}"
-            write_figure(runs(2), path, "loop", width=columns)  # type: ignore[arg-type]
-            content = path.read_bytes()
-            if ending == "svg":
-                assert b">2026-03-14_muscle" in content
-            if ending == "png":
-                assert struct.unpack(">I", content[16:20])[0] >= 300 * width / 25.4
-            if ending == "pdf":
-                assert b"/Font" in content
+@pytest.mark.parametrize("columns", MILLIMETRES)
+@pytest.mark.parametrize("ending", ["svg", "png", "pdf"])
+def test_vectors_hold_text_and_pixels_are_fine(
+    tmp_path: Path, ending: str, columns: Literal[1, 2]
+) -> None:
+    path = tmp_path / f"figure.{ending}"
+    write_figure(runs(2), path, "loop", width=columns)
+    content = path.read_bytes()
+    if ending == "svg":
+        assert b">2026-03-14_muscle" in content
+    if ending == "png":
+        assert struct.unpack(">I", content[16:20])[0] >= 300 * MILLIMETRES[columns] / 25.4
+    if ending == "pdf":
+        assert b"/Font" in content
 
 
 def test_axes_have_the_symbols_of_the_equations(tmp_path: Path) -> None:

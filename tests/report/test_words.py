@@ -15,13 +15,13 @@ from mckibben.report import words
 from mckibben.report.columns import columns_of
 from mckibben.report.glossary import definition
 from mckibben.studying.study import Study
-from tests.report.studies_by_hand import hung, study, two_muscles
+from tests.report.studies_by_hand import hung, plain_study, two_muscles
 
 MOST_WORDS = 60
 
 
 def one_muscle() -> Study:
-    found = study()
+    found = plain_study()
     best = found.leaderboard.best
     assert best is not None
     assert best.block is not None
@@ -64,7 +64,7 @@ def test_the_three_answers_are_short_and_hold_their_numbers(make: Callable[[], S
 
 
 def test_every_column_of_a_leaderboard_is_in_the_glossary() -> None:
-    row = study().leaderboard.rows[0].to_dict()
+    row = plain_study().leaderboard.rows[0].to_dict()
     every = [one for by in words.CHOICES for one in columns_of([row], "mm", chosen_by=by)]
     assert len(every) > 20
     assert [one.label for one in every if not definition(one.label)] == []

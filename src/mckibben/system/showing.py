@@ -5,6 +5,7 @@ The report defines how each kind is shown. As the report imports these classes, 
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from mckibben.errors import ModelError, in_terms_of
@@ -13,16 +14,20 @@ from mckibben.registry import load
 from mckibben.system.atomic import Numbers
 
 
+@lru_cache
+def _absence(owner: Any, name: str) -> str:
+    """Return what the error says, once for all that only look whether there is such an attribute."""
+    known = dict.fromkeys((*dir(owner), *owner.__dataclass_fields__))
+    return absent(owner.__name__, name, known, getattr(owner, "face", ""))
+
+
 class Hinted:
     """Names what there is instead of an attribute that it has not."""
 
     if not TYPE_CHECKING:  # a type checker still finds what is not there
 
         def __getattr__(self, name: str) -> Any:
-            owner = self.face if hasattr(type(self), "face") else ""
-            known = dict.fromkeys((*dir(type(self)), *type(self).__dataclass_fields__))
-            text = absent(type(self).__name__, name, known, owner)
-            raise AttributeError(text, name=name, obj=self)
+            raise AttributeError(_absence(type(self), name), name=name, obj=self)
 
 
 class DrawsItself:

@@ -140,7 +140,6 @@ GARBAGE = bytes(range(256)) * 4
 MCAP, DB3 = golden("ros2-mcap/ros2-mcap.mcap"), golden("ros2-db3/ros2-db3.db3")
 PAUSED = K / 10 + 1e6 * (K >= 15)
 UNITS = {"units": {P: "bar", X: "mm"}}
-LATE = FRAME["time_s"].astype(object).where(K != 7, "late")
 HOLE = FRAME["pressure_bar"].where(K != 4)
 
 CASES: list[Case] = [
@@ -161,7 +160,6 @@ CASES: list[Case] = [
     Case("wider.csv", WIDER, row=WIDER[: WIDER.index(b",7\n")].count(b"\n") + 1, names="4 cells"),
     Case("two_times.csv", partial(csv, t_ms=1.0), T, names="'time_s' and 't_ms'"),
     # Time, and options
-    Case("late.csv", partial(csv, time_s=LATE), T, 9, "'late'"),
     Case("long_gap.csv", partial(csv, time_s=PAUSED), T, options={"gaps": "interpolate"}),
     Case("zero_rate.csv", csv, options={"rate": 0}),
     # Parquet

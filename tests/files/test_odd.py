@@ -79,6 +79,9 @@ def followed(file: Odd) -> tuple[Recording | DataError, dict[str, Any]]:
             if not error.options:
                 return error, options
             right = [one for one in error.options if is_true(one, file)]
+            wrong = [one for one in error.options if one not in right]
+            if any(not one.keys() & {"units", "columns"} for one in wrong):  # others are questions
+                raise WrongError(f"a remedy is wrong: {error}") from None
             if not right and "units" in error.options[0]:  # a question to the one at the rig
                 units = {
                     c: file.facts["units"].get(c, u) for c, u in error.options[0]["units"].items()

@@ -39,6 +39,7 @@ VALUES: dict[str, Use] = {
     "skip": Use(3),
     "encoding": Use("cp037"),
     "sheet": Use("Data"),
+    "join": Use(True),
     "between": Use((0.2, 0.8)),
     "resample": Use(0.04),
     "zero": Use(("displacement",)),
@@ -114,6 +115,7 @@ def test_it_is_applied_or_refused(
     if isinstance(found, MckibbenError):
         assert option in str(found) or made is as_file, found
     as_it_is = option == "raw" and made is as_recording  # which is read as measured anyway
+    as_it_is |= option == "join"  # of one recording
     assert (repr(found) != repr(without)) is not as_it_is
 
 

@@ -91,7 +91,7 @@ def test_a_rate_is_compared_with_times_in_any_unit(unit: str, per_second: float)
         f"time [{unit}]": per_second * time,
         "pressure [bar]": 2 + np.sin(3 * time),
     }
-    data["displacement [mm]"] = 7 + 3 * np.sin(3 * time + 0.3)
+    data["displacement [mm]"] = 7 + 3 * np.sin(3 * time - 0.3)
     (run,) = mckibben.read(data, rate=50)
     assert run.sample_time == pytest.approx(0.02)
     with pytest.raises(DataError):

@@ -20,6 +20,7 @@ from mckibben.report import text
 from mckibben.report.builder import Table
 from mckibben.report.columns import columns_of_board
 from mckibben.report.results import FACES, board_table
+from mckibben.signals.lags import lags
 from mckibben.simulation import Simulation
 from tests.workflow.calls import prepare
 
@@ -85,9 +86,10 @@ def expect(rows: Sequence[Mapping[str, str]], wanted: Sequence[Mapping[str, Any]
 def test_recordings(folder: Path) -> None:
     found = mckibben.info(folder / "run.csv")
     run = found.recordings[0]
+    late = {name: run.step * lag.samples for name, lag in lags(run).items()}
     wanted = [
-        {"Channel": name, "Unit": run.units[name] or "–",
-         "Lowest": float(x.min()), "Highest": float(x.max())}
+        {"Channel": name, "Unit": run.units[name] or "–", "Lowest": float(x.min()),
+         "Highest": float(x.max()), "Rate [Hz]": 1 / run.step, "Lag [s]": late.get(name, "–")}
         for name, x in run.channels.items()
     ]  # fmt: skip
     columns, channels = tables(found)[:2]

@@ -28,8 +28,14 @@ REGULAR = 0.9
 WAYS, PULLS = ("mm", "rad", ""), ("N", "N*m")
 """Units of what muscles move, and of what they pull."""
 
+FOLLOWS = 0.5
+"""Correlation of the changes of a slow sensor and of a drive, at least."""
+
 CAUSES = ("pressure", "voltage", "command")
-"""Quantities that drive muscles, and may be held for several rows as they were commanded."""
+"""Quantities that drive muscles."""
+
+SET = ("voltage", "command", "reference")
+"""Quantities that are set from outside: they hold until they are set anew."""
 
 
 def apart(named: Mapping[str, Column], time: Array) -> tuple[dict[str, Column], dict[str, float]]:
@@ -73,12 +79,15 @@ def apart(named: Mapping[str, Column], time: Array) -> tuple[dict[str, Column], 
     columns = {name: column for name, column in named.items() if name != "time"}
     for name, values in numbers.items():
         at = rows.get(name, np.arange(time.size))
-        columns[name] = replace(columns[name], values=values[at], times=time[at])
+        held = columns[name].held or name.partition("_")[0] in SET
+        columns[name] = replace(columns[name], values=values[at], times=time[at], held=held)
     return columns, renewed
 
 
 def _is_output(name: str, column: Column) -> bool:
     """Return whether a column is a length, an angle, a force or a torque, by name or by unit."""
+    if name.partition("_")[0] in SET:
+        return False
     unit = find(column.unit or parse(column.label).unit or "")
     return bool({unit_of(name), unit and unit.target} & {"mm", "rad", *PULLS})
 
@@ -87,28 +96,43 @@ def _renewals(values: Array, drives: Sequence[Array]) -> Spots | None:
     """Return the rows in which a slow sensor was read, or None for one that was read in every row.
 
     Its changes are on a grid of more than one row, unlike each other in size, as those of a coarse
-    one are not, and a drive changes in the rows between.
+    one are not; and a drive, with which it changes, changes as much in the rows between.
     """
     steps = np.diff(values)
     changes = np.flatnonzero(steps) + 1
-    if changes.size < FEWEST_RENEWALS or not drives:
+    if changes.size < FEWEST_RENEWALS:
         return None
     sizes, apart = np.abs(steps[changes - 1]), np.diff(changes)
-    usual = float(np.median(apart))
-    pitch = float(apart[apart <= 1.5 * usual].mean())
+    pitch = float(apart[apart <= 1.5 * np.median(apart)].mean())
     missed = np.maximum(1.0, np.rint(apart / pitch))
     on_grid = np.abs(apart - pitch * missed) < min(1.0, 0.25 * pitch)
     coarse = np.median(sizes) < 1.5 * np.quantile(sizes, 0.05)
-    held = np.delete(np.arange(steps.size), changes - 1)
-    driven = max(float(np.mean(np.diff(drive)[held] != 0)) for drive in drives) if held.size else 0
-    if pitch < 1.5 or np.mean(on_grid) < REGULAR or coarse or driven < 0.5:
+    if pitch < 1.5 or np.mean(on_grid) < REGULAR or coarse:
         return None
     count = np.append(0.0, np.cumsum(missed))
     inside = np.interp(np.arange(count[-1] + 1), count, changes)
     before = changes[0] - pitch * np.arange(int(changes[0] / pitch), 0, -1)
     after = changes[-1] + pitch * np.arange(1, int((values.size - 1 - changes[-1]) / pitch) + 1)
     rows: Spots = np.rint(np.concatenate([before, inside, after])).astype(np.intp)
-    return rows
+    return rows if any(_moves_between(values, drive, rows) for drive in drives) else None
+
+
+def _moves_between(values: Array, drive: Array, rows: Spots) -> bool:
+    """Return whether a drive moves steadily between rows in which a signal is renewed, and with it."""
+    whole, within = np.diff(drive[rows]), drive[rows[1:] - 1] - drive[rows[:-1]]
+    share = 1.0 - 1.0 / np.mean(np.diff(rows))
+    moved = np.abs(whole) >= np.quantile(np.abs(whole), 0.5)
+    if not whole.any() or np.median(within[moved] / whole[moved]) < 0.5 * share:
+        return False
+    follows = np.corrcoef(np.diff(values[rows]), whole)[0, 1]
+    return bool(abs(follows) > FOLLOWS)
+
+
+def rates(named: Mapping[str, Column]) -> dict[str, float]:
+    """Return the samples a second of columns with times of their own."""
+    clocks = {n: np.diff(c.times) for n, c in named.items() if c.times is not None}
+    usual = {n: steps[steps <= 1.5 * np.median(steps)] for n, steps in clocks.items() if steps.size}
+    return {name: float(f"{1 / steps.mean():.4g}") for name, steps in usual.items() if steps.mean()}
 
 
 def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Column], list[str]]:
@@ -135,6 +159,7 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
     if any(unit_of(name) in WAYS for name in meant):  # then a force is a load, as a temperature is
         meant -= {name for name in meant if unit_of(name) in PULLS and not request.asks_for(name)}
     meant |= {name for name in long if request.asks_for(name)}
+    meant -= {name for name, column in named.items() if column.held}
     needed = {name: times for name, times in long.items() if name in meant} or long
     if not needed:
         raise source.error("no channel in it has two samples", "give a longer recording")
@@ -161,9 +186,9 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
         remedy = "record them together, or name other columns with `columns[CHANNEL]=COLUMN`"
         raise source.error(problem, remedy, slowest)
     if any(not np.array_equal(times, grid) for times in needed.values()):
-        rates = ", ".join(f"{name} {1 / step:.4g}" for name, step in list(steps.items())[:10])
+        stated = ", ".join(f"{name} {rate:g}" for name, rate in list(rates(named).items())[:10])
         source.warn(
-            f"channels have separate times (samples a second: {rates}); they were put on the "
+            f"channels have separate times (samples a second: {stated}); they were put on the "
             f"{whose}, by interpolation"
         )
     columns: dict[str, Column] = {"time": Column("time", grid, "s")}

@@ -19,7 +19,10 @@ from mckibben.files.request import GAPS_BRIDGED, Source
 from mckibben.files.table import Column
 from mckibben.files.timebase import Times
 from mckibben.files.units import COUNTS, Unit, convert, find, weight
-from mckibben.recording import COMMAND, REST_LENGTH, conversion, standard_unit
+from mckibben.recording import COMMAND, REFERENCE, REST_LENGTH, conversion, standard_unit
+
+DRIVES = ("pressure", "voltage", REFERENCE.rstrip("_"), COMMAND.rstrip("_"))
+"""What is set from outside: it may jump, and be held."""
 
 ASSUMED = "no unit is given, so these are assumed: "
 """Beginning of a note on assumed units."""
@@ -51,16 +54,15 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     """
     request, source = source.request, _with_clocks(source)
     columns, left_out = assign(source)
-    columns, source, sampled, began = _apart(columns, source)
-    separate = any(column.times is not None for column in columns.values())
-    columns, dropped = clocks.on_one(columns, source)
-    left_out |= dict.fromkeys(dropped, "it does not cover the times of the others")
-    clock = columns.pop("time", None)
-    if clock is not None and clock.values is None and request.step is not None:
-        left_out[clock.header], clock = "the rate is given", None
-    times = None if clock is None else times_of(clock, source)
-    if clock is not None and clock.values is not None and separate:  # in seconds already
-        times = Times(clock.values, began=began)
+    times = _clock(columns, left_out, source)
+    columns = _apart(columns, times, source)
+    sampled = clocks.rates(columns)
+    if any(column.times is not None for column in columns.values()):
+        columns, dropped = clocks.on_one(columns, source)
+        left_out |= dict.fromkeys(dropped, "it does not cover the times of the others")
+        began = None if times is None else times.began
+        times = replace(times_of(columns.pop("time"), source, "s"), began=began)
+        source = replace(source, table=replace(source.table, lines=None))
     signals: dict[str, Signal] = {}
     flawed: DataError | None = None
     derived = source.derived(columns)
@@ -149,38 +151,43 @@ def _with_clocks(source: Source) -> Source:
     return replace(source, table=replace(table, columns=tuple(columns), lines=None))
 
 
-def _apart(
-    columns: dict[str, Column], source: Source
-) -> tuple[dict[str, Column], Source, dict[str, float], str | None]:
-    """Return columns with times of their own where not all were sampled in every row.
+def _clock(columns: dict[str, Column], left_out: dict[str, str], source: Source) -> Times | None:
+    """Return the times, taken out of the columns; with a rate, dates need not be readable."""
+    clock = columns.pop("time", None)
+    if clock is None:
+        return None
+    try:
+        return times_of(clock, source)
+    except DataError:
+        if clock.values is not None or source.request.step is None:
+            raise
+    left_out[clock.header] = "the rate is given"
+    return None
 
-    Then the rates of slow sensors [Hz], by channel, and the date at time 0.
-    """
-    table, step, clock = source.table, source.request.step, columns.get("time")
-    if table.own or table.has_clocks or (clock is None and step is None):
-        return columns, source, {}, None
-    times = Times(np.arange(table.n_samples, dtype=np.float64))
-    seconds = (step or 1.0) * times.values
-    if step is None and clock is not None:
-        times = times_of(clock, source)
-        seconds = convert(times.values, times.unit, "s")
+
+def _apart(columns: dict[str, Column], times: Times | None, source: Source) -> dict[str, Column]:
+    """Return columns with times of their own where not all were sampled in every row."""
+    table, request = source.table, source.request
+    if request.raw or table.own or table.has_clocks or (times is None and request.step is None):
+        return columns
+    if times is None:
+        times = Times((request.step or 1.0) * np.arange(table.n_samples, dtype=np.float64))
+    seconds = convert(times.values, times.unit, "s")
     if not np.all(np.diff(seconds) >= 0):
-        return columns, source, {}, None
+        return columns
     found, renewed = clocks.apart(columns, seconds)
-    if all(column.times is None for column in found.values()):
-        return columns, source, {}, None
-    rate = (seconds.size - 1) / (seconds[-1] - seconds[0])
-    sampled = {name: float(f"{rate / rows:.4g}") for name, rows in renewed.items()}
     for name, rows in renewed.items():
         source.warn(
-            f"channel {name!r} is renewed every {rows:.4g} rows, {sampled[name]:g} times a second, "
-            "so it is read at these rows"
+            f"channel {name!r} is renewed every {rows:.3g} rows, so it is read at these; "
+            "use `raw` where that is wrong"
         )
-    return found, replace(source, table=replace(table, lines=None)), sampled, times.began
+    return found
 
 
-def times_of(column: Column, source: Source) -> Times:
-    """Return the times in a column of numbers or dates."""
+def times_of(column: Column, source: Source, unit: str | None = None) -> Times:
+    """Return the times in a column of numbers, perhaps in a known unit, or of dates."""
+    if unit is not None and column.values is not None:
+        return Times(column.values, unit)
     if column.values is None:
         since, began = instants.seconds(column.texts, source)
         return Times(since, began=began)
@@ -200,7 +207,7 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
     calibration = _calibration(channel, column, source)
     own, standard = source.table.own, unit_of(channel)
     cleaned = not own and not source.request.raw
-    if cleaned and not channel.startswith(("voltage", COMMAND)):  # a sawtooth can be commanded
+    if cleaned and channel.partition("_")[0] not in DRIVES:  # a sawtooth can be commanded
         raw = wrapping.unwrapped(channel, raw, source)
     values = raw
     if "gain" in calibration:
@@ -232,8 +239,10 @@ def _numbers(channel: str, column: Column, source: Source) -> Array:
         raise source.error(f"column {column.header!r} holds text", remedy, channel, 0)
     if (flaw := column.flaw) is None:
         return column.values
+    if channel == "time" and flaw.bridgeable:  # rows without a time are left out
+        return column.values
     if not flaw.bridgeable or source.request.gaps == "error":
-        options = GAPS_BRIDGED[:2] if flaw.bridgeable else ()
+        options = GAPS_BRIDGED if flaw.bridgeable else ()
         raise source.error(flaw.problem, flaw.remedy, channel, flaw.sample, options)
     row = source.table.row(flaw.sample)
     source.warn(f"channel {channel!r}, row {row}: {flaw.problem}, so it is a missing sample")
@@ -349,5 +358,8 @@ def _assumed(channel: str, column: Column, values: Array, source: Source) -> Uni
         return Unit("", "")
     if expected and (ending := unknown_ending(column.label)):
         problem = f"its unit is not certain: {column.label!r} has {ending!r}"
+        volts = find(ending.upper()) if len(ending) == 1 else find(ending)
+        if volts is not None and volts.target in ("V", "A"):
+            raise source.error(problem, _to_calibrate(channel, column, expected), channel)
         raise _unknown(channel, problem, column, values, source)
     return Unit(expected, expected)

@@ -112,7 +112,8 @@ def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
         inside = _within(missing)
         if inside.any() and source.request.gaps == "error":
             problem = f"{inside.sum()} of {missing.size} samples are missing or not finite"
-            raise source.error(problem, "", name, int(np.argmax(inside)), GAPS_BRIDGED)
+            remedy = "use `raw` where they are numbers that were measured"
+            raise source.error(problem, remedy, name, int(np.argmax(inside)), GAPS_BRIDGED)
         found[name] = missing
     if not found:
         problem = "every column has samples missing"

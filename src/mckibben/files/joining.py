@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, permutations
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +12,9 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.channels import by_name
 from mckibben.errors import DataError
-from mckibben.files.clocks import on_one
+from mckibben.files.clocks import on_one, rates
 from mckibben.files.headers import unit_of
+from mckibben.files.notices import listed, warn
 from mckibben.files.request import GAPS_BRIDGED, Request, Source
 from mckibben.files.table import Column, Table
 from mckibben.recording import SAME_TIME, Recording
@@ -23,6 +24,12 @@ MEETS = 0.02
 
 STEPS_BETWEEN = 3.0
 """The same in median steps of the channel; and the longest gap of pieces in sample times."""
+
+EPOCH = 1e9
+"""Times above this [s] are since 1970."""
+
+MOST_PAIRED = 20
+"""Recordings of which all pairs are compared."""
 
 AWAY = 0.2
 """Smallest distance between both ends of a piece, as a share of its range: a run from rest to rest is
@@ -58,7 +65,7 @@ def _joined(recordings: Sequence[Recording], request: Request) -> Recording:
         return recordings[0]
     names = [set(one.channels) for one in recordings]
     if all(some == names[0] for some in names):
-        return _in_sequence(_in_order(_dated(recordings)), request)
+        return _in_sequence(_in_order(_on_one_clock(recordings)), request)
     twice = {some for k, one in enumerate(names) for other in names[:k] for some in one & other}
     shared = sorted(name for name in twice if unit_of(name) is not None or name in request.columns)
     if shared:
@@ -66,7 +73,9 @@ def _joined(recordings: Sequence[Recording], request: Request) -> Recording:
         remedy = "join pieces with the same channels, or loggers with different ones"
         raise DataError(problem, file=recordings[0].source, channel=shared[0], remedy=remedy)
     own = [one.select([name for name in one if name not in twice]) for one in recordings]
-    return _side_by_side(_dated(own), request)
+    if any(_moment(one) is None for one in own):
+        warn(_path(own), "clocks are taken to begin at one moment, as not all files have dates")
+    return _side_by_side(_on_one_clock(own), request)
 
 
 def continues(before: Recording, after: Recording) -> bool:
@@ -86,9 +95,19 @@ def continues(before: Recording, after: Recording) -> bool:
     return not whole
 
 
-def pieces_of_one(recordings: Sequence[Recording]) -> list[tuple[Recording, Recording]]:
-    """Return the pairs of successive recordings of which one continues the other."""
-    return [(one, other) for one, other in pairwise(recordings) if continues(one, other)]
+def continued(recordings: Sequence[Recording]) -> Iterator[tuple[Recording, str]]:
+    """Yield recordings of several files that may be one run with another, and why."""
+    pairs = permutations(recordings, 2) if len(recordings) <= MOST_PAIRED else pairwise(recordings)
+    for before, after in pairs:
+        if before.source != after.source and continues(before, after):
+            yield after, f"it begins where {before.name} ends; if both are one run, use `join`"
+    names = [{name for name in one if unit_of(name)} for one in recordings]
+    if len(names) == 2 and all(names) and not names[0] & names[1]:
+        yield recordings[1], "its channels are others; if it is of the same run, use `join`"
+
+
+def _path(recordings: Sequence[Recording]) -> Path:
+    return Path(recordings[0].source or recordings[0].name)
 
 
 def _same_step(one: Recording, other: Recording) -> bool:
@@ -105,19 +124,25 @@ def _follows(before: Recording, after: Recording) -> bool:
     return 0.0 < gap <= STEPS_BETWEEN * before.sample_time
 
 
-def _dated(recordings: Sequence[Recording]) -> list[Recording]:
-    """Return recordings whose start times are from the first date, if all state one."""
+def _on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
+    """Return recordings whose start times are from one moment, if all are known to be."""
+    starts = [_moment(one) for one in recordings]
+    known = [start for start in starts if start is not None]
+    if len(known) == len(starts):
+        pairs = zip(recordings, known, strict=True)
+        return [_starting(one, start - min(known)) for one, start in pairs]
+    return list(recordings)
+
+
+def _moment(recording: Recording) -> float | None:
+    """Return when a recording began [s], since 1970 or, without a date, midnight; None if unknown."""
     import pandas as pd
 
-    dates = [one.meta.get("began") for one in recordings]
-    if not all(dates):
-        return list(recordings)
-    instants = [pd.Timestamp(str(date)) for date in dates]
-    first = min(instants)
-    return [
-        _starting(one, (instant - first).total_seconds())
-        for one, instant in zip(recordings, instants, strict=True)
-    ]
+    began = recording.meta.get("began")
+    if isinstance(began, str):
+        dated = "T" in began
+        return pd.Timestamp(began if dated else f"1970-01-01T{began}").timestamp()
+    return recording.start_time if recording.start_time > EPOCH else None
 
 
 def _starting(recording: Recording, start: float) -> Recording:
@@ -142,16 +167,28 @@ def _in_sequence(pieces: list[Recording], request: Request) -> Recording:
             remedy = "resample them first, with `resample`"
             raise DataError(problem, file=one.source, remedy=remedy)
     times = np.concatenate([one.time for one in pieces])
+    own = all(one.start_time <= first.start_time + STEPS_BETWEEN * first.step for one in pieces)
+    if not own and np.any(np.diff(times) <= 0):
+        problem = "its pieces overlap in time"
+        raise DataError(problem, file=first.source, remedy="leave out what is there twice")
     if first.sample_time is None or np.any(np.diff(times) <= 0):  # each counts from its own start
+        text = f"{len(pieces)} pieces without common times are one after the other, as given"
+        warn(_path(pieces), text)
         return _together(first, pieces, {n: _end_to_end(pieces, n) for n in first.channels})
     steps = np.diff(times)
     at = int(np.argmax(steps))
     if steps[at] > STEPS_BETWEEN * first.step and request.gaps != "interpolate":
         problem = f"there is a gap of {steps[at]:.6g} s between the pieces, at {times[at]:.6g} s"
-        raise DataError(problem, file=first.source, options=GAPS_BRIDGED[:1])
+        remedy = "join fewer of them"
+        raise DataError(problem, remedy=remedy, options=GAPS_BRIDGED[:1], file=first.source)
     grid = first.start_time + first.step * np.arange(round((times[-1] - times[0]) / first.step) + 1)
     samples = {n: np.interp(grid, times, _end_to_end(pieces, n)) for n in first.channels}
-    return _together(first, pieces, samples)
+    joint = _together(first, pieces, samples)
+    wide = np.flatnonzero(steps > STEPS_BETWEEN * first.step)
+    if not wide.size:
+        return joint
+    bridged = [[float(times[k]), float(times[k + 1])] for k in wide]
+    return joint.with_meta(bridged=[*joint.meta.get("bridged", []), *bridged])
 
 
 def _end_to_end(pieces: Sequence[Recording], name: str) -> Array:
@@ -167,9 +204,7 @@ def _side_by_side(loggers: list[Recording], request: Request) -> Recording:
         for name, values in one.channels.items():
             columns[name] = Column(name, values, one.units[name], times=one.time)
     request = replace(request, channels=list(columns))
-    source = Source(
-        Table(tuple(columns.values())), request, Path(loggers[0].source or "recordings")
-    )
+    source = Source(Table(tuple(columns.values())), request, _path(loggers))
     found, _ = on_one(columns, source)
     samples = {name: one.values for name, one in found.items() if one.values is not None}
     start = float(samples.pop("time")[0])
@@ -177,7 +212,7 @@ def _side_by_side(loggers: list[Recording], request: Request) -> Recording:
     step = slowest.step if request.step is None else request.step
     units = {name: unit for one in loggers for name, unit in one.units.items() if name in samples}
     joint = Recording(samples, step, units, start, slowest.meta)
-    return _together(joint, loggers, samples)
+    return _together(joint, loggers, samples).with_meta(sampled=rates(columns))
 
 
 def _together(
@@ -186,6 +221,9 @@ def _together(
     """Return a recording of joined samples, with the notes and the names of all files."""
     meta = {**first.meta, "joined": [one.source or one.name for one in several]}
     meta["notes"] = [*dict.fromkeys(note for one in several for note in one.notes)]
-    meta["name"] = several[0].name
+    meta["name"] = listed([one.name for one in several], 3)
+    for key in ("converted_units", "assumed_units", "ignored_columns", "bridged"):
+        if every := [each for one in several for each in one.meta.get(key, ())]:
+            meta[key] = every if key == "bridged" else [*dict.fromkeys(every)]
     units = {name: first.units[name] for name in samples}
     return Recording(samples, first.sample_time, units, first.start_time, meta)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +24,7 @@ def samples(rows: Sequence[bytes], layout: Layout, path: Path) -> tuple[list[int
     """Return the numbers of the lines of samples, counted from 1, and their text.
 
     Blank lines, comments and what is below the table are left out; so are words and lines that were
-    cut off, but of samples without times, which become missing samples; and exact repeats of a row.
+    cut off, but of samples without times, which become missing samples.
 
     Raises
     ------
@@ -49,13 +48,7 @@ def samples(rows: Sequence[bytes], layout: Layout, path: Path) -> tuple[list[int
         wrong[lost] = False
         _note(np.flatnonzero(wrong), "no samples, and left out", rows, numbers, path)
         numbers, lines = _without(wrong, numbers, lines)
-    if timed:
-        again = np.array([False, *map(operator.eq, lines[1:], lines)])
-        _note(
-            np.flatnonzero(again), "the same as the row before, and left out", rows, numbers, path
-        )
-        numbers, lines = _without(again, numbers, lines)
-    elif layout.stop is None and numbers[-1] - numbers[0] >= len(numbers):
+    if not timed and layout.stop is None and numbers[-1] - numbers[0] >= len(numbers):
         warn(path, "blank or other lines are left out: without times, what follows moves up")
     return numbers, lines
 

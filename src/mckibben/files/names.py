@@ -10,7 +10,7 @@ import unicodedata
 
 CHANNELS: dict[str, dict[str, str]] = {
     "time": {
-        "en": "t time timestamp time_stamp datetime elapsed elapsed_time millis micros",
+        "en": "t ts time timestamp time_stamp datetime elapsed elapsed_time millis micros",
         "de": "zeit zeitstempel uhrzeit messzeit laufzeit",
         "fr": "temps temps_écoulé horodatage heure", "it": "tempo ora",
         "pt": "tempo hora tempo_decorrido", "es": "tiempo hora tiempo_transcurrido",
@@ -117,12 +117,12 @@ UNITS: dict[str, dict[str, str]] = {
         "en": "second seconds", "de": "sekunde sekunden sek", "fr": "seconde secondes",
         "it": "secondo secondi", "es pt": "segundo segundos seg", "ja zh": "秒", "ko": "초"},
     "ms": {
-        "en": "millisecond milliseconds", "de": "millisekunde millisekunden",
+        "en": "millisecond milliseconds millis", "de": "millisekunde millisekunden",
         "fr": "milliseconde millisecondes", "it": "millisecondo millisecondi",
         "es": "milisegundo milisegundos", "pt": "milissegundo milissegundos", "ja": "ミリ秒",
         "zh": "毫秒", "ko": "밀리초"},
     "us": {
-        "en": "microsecond microseconds", "de": "mikrosekunde mikrosekunden",
+        "en": "microsecond microseconds micros", "de": "mikrosekunde mikrosekunden",
         "fr": "microseconde microsecondes", "it": "microsecondo microsecondi",
         "es": "microsegundo microsegundos", "pt": "microssegundo microssegundos",
         "ja": "マイクロ秒", "zh": "微秒", "ko": "마이크로초"},

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, true_runs
 from mckibben.files.headers import unit_of
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
@@ -18,6 +18,9 @@ from mckibben.recording import PLAUSIBLE
 TOO_SMALL = {"bar": (1e-12, 1e-7)}
 """By the package's unit: largest values that suggest another unit, and are more than rounding of 0.
 """
+
+LONGEST_DROPOUT = 10
+"""Samples of 0 on end, in the usual case, of a sensor that drops out; a muscle rests longer."""
 
 _SIZES = (0.0, *(10.0**k - 1 for k in range(3, 8)), *(2.0**k - 1 for k in (15, 16)), 2.0**15)
 CODES = np.array([sign * size for size in _SIZES for sign in (1.0, -1.0)])
@@ -53,6 +56,9 @@ def _is_code(code: float, known: Array) -> bool:
     at = known == code
     # a muscle rests at 0 before and after it moves, and as often as not
     if not at.any() or at.all() or (code == 0 and (at[0] or at[-1] or at.mean() > 0.25)):
+        return False
+    runs = true_runs(at)
+    if code == 0 and np.median(runs[:, 1] - runs[:, 0]) > LONGEST_DROPOUT:
         return False
     others = known[~at]
     low, high = others.min(), others.max()
@@ -90,7 +96,8 @@ def question_size(
     if stated not in units:
         options.append({"units": {channel: stated}})
     size = f"it reaches {suspect:.6g} {target}".rstrip()
-    problem = f"{size}{', without a unit' if assumed else ''}: is it in {' or '.join(units)}?"
+    problem = f"{size}{', without a unit' if assumed else ''}"
+    problem += f": is it in {' or '.join(units)}?" if units else ", which is not usual"
     at = int(np.argmax(values == suspect))
     remedy = f"name another unit with `units[{channel}]=UNIT`, or correct that cell"
     raise source.error(problem, remedy, channel, at, options)
@@ -104,10 +111,12 @@ def in_mm(channel: str, column: Column, source: Source) -> dict[str, dict[str, s
 
 
 def fitting_units(value: float, read_in: str, target: str) -> list[str]:
-    """Return the units in which a value has a plausible size, nearest first."""
+    """Return the units in which a value is plausible, nearest to a usual size first."""
     read = convert(np.array([abs(value)]), target, read_in)
     sizes = {unit: float(convert(read, unit, target)[0]) for unit in SPELLINGS[target]}
     typical = math.log(PLAUSIBLE[target].typical)
     off = {unit: abs(math.log(max(size, 1e-300)) - typical) for unit, size in sizes.items()}
-    nearest, *others = sorted(off, key=lambda unit: off[unit])
-    return [nearest, *(unit for unit in others if off[unit] < math.log(10.0))]
+    low, high, *_ = PLAUSIBLE[target]
+    possible = [unit for unit in off if low <= math.copysign(sizes[unit], value) <= high]
+    nearest = sorted(possible, key=lambda unit: off[unit])
+    return nearest[:1] + [unit for unit in nearest[1:] if off[unit] < math.log(10.0)]

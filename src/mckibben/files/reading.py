@@ -18,7 +18,7 @@ from mckibben.files.channels import about
 from mckibben.files.choosing import Seen, named_in, seen
 from mckibben.files.converting import ASSUMED, in_package_units
 from mckibben.files.formats import MOST_BYTES
-from mckibben.files.joining import joined, pieces_of_one
+from mckibben.files.joining import continued, joined
 from mckibben.files.memory import Data, InMemory, items, table_of
 from mckibben.files.notices import noted, observe, warn
 from mckibben.files.remedies import offering
@@ -101,19 +101,22 @@ def read(
     chosen = given_options(ReadOptions, options, keywords)
     request = _request(chosen, channels=channels, informative=informative, most=most)
     found: list[Recording] = []
+    part = replace(request, channels=None) if chosen.join else request
     for one in items(data):
         if isinstance(one, Path):
-            found += [each for part in sources.inside(one) for each in _read(part, request)[0]]
+            found += [each for inner in sources.inside(one) for each in _read(inner, part)[0]]
         elif isinstance(one, Recording) and not request.interprets:
             found.append(one)
         else:
-            found += _read(one, request)[0]
-    if chosen.join:
-        joint = joined(found, request)
-        found = [_with_notes(joint, [*joint.notes, *_early(joint)])]
-    for before, after in pieces_of_one(found):
-        text = f"it begins where {before.name} ends; if both are one run, use `join`"
-        warn(Path(after.source or after.name), text)
+            found += _read(one, part)[0]
+    if chosen.join and found:
+        if chosen.resample is not None:
+            found = [resample(one, chosen.resample) for one in found]
+        with noted() as notes:
+            joint = joined(found, request)
+        found = [_with_notes(joint, [*joint.notes, *notes, *_early(joint)])]
+    for one, text in continued(found):
+        warn(Path(one.source or one.name), text)
     return observe(_prepared(found, chosen))
 
 
@@ -264,7 +267,7 @@ def _recordings(source: Source, origin: Mapping[str, Any]) -> list[Recording]:
     start = table.start_time if clock is None else clock.seconds(clock.values[0])
     times = clock if step is None else None
     if times is not None:
-        kept = timebase.without_repeats(times, channels, source)
+        kept = timebase.usable(times, channels, source)
         channels = {name: samples[kept] for name, samples in channels.items()}
         times = timebase.increasing(replace(times, values=times.values[kept]), source)
     pieces = gaps_in.pieces(channels, times, step, start, source)

@@ -17,7 +17,7 @@ from mckibben.files.table import Table
 from mckibben.options import ReadOptions
 from mckibben.recording import FEWEST_SAMPLES, SAME_TIME, conversion
 
-GAPS_BRIDGED = ({"gaps": "interpolate"}, {"gaps": "split"}, {"raw": True})
+GAPS_BRIDGED = ({"gaps": "interpolate"}, {"gaps": "split"})
 """Remedies of missing samples and of gaps."""
 
 LONGEST = 1e6

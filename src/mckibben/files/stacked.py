@@ -41,7 +41,7 @@ class Stack:
 
 
 def stack(headers: Sequence[str], frame: Any) -> Stack | None:
-    """Return the columns of a table in long format, or None: one of values, and one of few words."""
+    """Return the columns of a table in long format, or None: one has values, and one some words."""
     names = [snake_case(parse(header).name) for header in headers]
     times = [i for i, header in enumerate(headers) if is_clock(header)]
     values = [i for i, name in enumerate(names) if name in VALUES.split()]

@@ -35,6 +35,9 @@ STEPS = ("Ts", "dt", "sample_time")
 _SINCE_1970 = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 """Units of times since 1970, and how many are a second."""
 
+MOST_WITHOUT_TIME = 0.05
+"""Largest share of rows without a time that are left out."""
+
 _YEARS_2001_TO_2103 = (1e9, 4.2e9)
 """Seconds since 1970."""
 
@@ -69,25 +72,41 @@ class Step(NamedTuple):
     jitter: tuple[float, float] | None
 
 
-def without_repeats(times: Times, channels: Mapping[str, Array], source: Source) -> Rows:
-    """Return the rows that differ, in time or in a sample, from all before them; with a note on others.
+def usable(times: Times, channels: Mapping[str, Array], source: Source) -> Rows:
+    """Return the rows with a time, and a sample that no row before has at that time; with notes.
 
-    None is left out where times increase, or begin anew as counters do.
+    Many without a time are an error later. None is a repeat where times increase, or begin anew as
+    counters do, or are rounded so that other rows have equal times.
     """
     time = times.values
+    every = np.flatnonzero(np.isfinite(time))
+    if every.size < time.size:
+        if every.size < (1 - MOST_WITHOUT_TIME) * time.size:
+            return np.arange(time.size)
+        row = source.table.row(int(np.argmin(np.isfinite(time))))
+        n = time.size - every.size
+        source.warn(f"{n} row(s) have no time and were left out, the first in row {row}")
+    time, channels = time[every], {name: x[every] for name, x in channels.items()}
+    return every[_without_repeats(time, channels, every, source)]
+
+
+def _without_repeats(
+    time: Array, channels: Mapping[str, Array], rows: Rows, source: Source
+) -> Rows:
     every = np.arange(time.size)
     if np.all(np.diff(time) > 0) or wraps(time) is not None:
         return every
     table = np.column_stack([time, *channels.values()])
     _, first = np.unique(table, axis=0, return_index=True, equal_nan=True)
     repeats = np.setdiff1d(every, first)
-    if not repeats.size:
+    kept = np.sort(first)
+    if not repeats.size or np.any(np.diff(time[kept]) <= 0):  # of a coarse clock at rest
         return every
-    row = source.table.row(int(repeats[0]))
+    row = source.table.row(int(rows[repeats[0]]))
     source.warn(
         f"{repeats.size} row(s) are exact repeats and were left out, the first in row {row}"
     )
-    return np.sort(first)
+    return kept
 
 
 def increasing(times: Times, source: Source) -> Times:
@@ -119,7 +138,7 @@ def increasing(times: Times, source: Source) -> Times:
     remedy, options = "split the file there, or sort its rows by time", []
     if steps[first] == 0:
         problem = f"the time {time[first]:.10g} is repeated"
-        remedy = "delete the repeated row"
+        remedy = "delete the repeated row; or, if times were rounded when saved, give `rate`"
         options = [{"sample_time": step} for step in _of_rounded(times)]
     raise source.error(problem, remedy, "time", first + 1, options)
 
@@ -127,8 +146,9 @@ def increasing(times: Times, source: Source) -> Times:
 def _of_rounded(times: Times) -> Iterator[float]:
     """Yield the sample time [s] of times that were rounded when they were saved."""
     time = times.values
-    mean = (time[-1] - time[0]) / (time.size - 1)
-    for digits in (1, 2) if mean > 0 else ():  # rates and steps that are set have few
+    mean, steps = (time[-1] - time[0]) / (time.size - 1), np.diff(time)
+    coarse = mean > 0 and 0.9 * steps[steps > 0].min() > mean
+    for digits in (1, 2) if coarse else ():  # rates and steps that are set have few
         for size in (float(f"{mean:.{digits}g}"), 1.0 / float(f"{1.0 / mean:.{digits}g}")):
             if agrees(time, size):
                 yield times.seconds(size)
@@ -200,7 +220,8 @@ def unit_by_size(time: Array, source: Source) -> str | None:
         raise source.error(problem, "", "time", 0, _time_units("day", "s"))
     first, last = _YEARS_2001_TO_2103
     for unit, per_second in _SINCE_1970.items():
-        if first <= low / per_second and high / per_second < last:
+        within = first <= low / per_second and high / per_second < last
+        if within and unit in plausible_units(time):
             source.warn(
                 f"the times have no unit; by their size they are counted in {unit} since 1970; "
                 "use `units[time]=UNIT` where that is wrong"

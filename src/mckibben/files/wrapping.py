@@ -94,7 +94,7 @@ def _goes_on(moved: Array, upwards: Array, unit: float) -> bool:
 def quanta(values: Array) -> Iterator[float]:
     """Yield the steps of which the distances between values are multiples: of decimals, and rounded.
 
-    >>> list(quanta(np.array([0.0125, 0.05, 0.0375, 0.0875])))
+    >>> [round(step, 12) for step in quanta(np.array([0.0125, 0.05, 0.0375, 0.0875]))]
     [0.0125, 0.0125]
     """
     places = np.unique(values)

@@ -60,7 +60,7 @@ def recording(found: Recording) -> list[Item]:
             found.units[name] or "–",
             *(f"{end + 0.0:.6g}" for end in ends),
             sampled.get(name, found.sample_time and 1.0 / found.sample_time),
-            found.step * late[name].samples if name in late else None,
+            found.step * late[name].samples if name in late and found.sample_time else None,
         ]
         for name, ends in found.ranges.items()
     ]

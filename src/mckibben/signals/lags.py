@@ -19,13 +19,8 @@ NEAREST = 1e-3
 WIDEST = 0.25
 """Largest lag that is looked for, as a share of the recording."""
 
-FORWARD = {
-    "displacement": 1.0,
-    "contraction": 1.0,
-    "force": 1.0,
-    "length": -1.0,
-}
-"""Quantity of an output -> the sign of its change where a muscle's pressure rises."""
+FORWARD = {"displacement": 1.0, "contraction": 1.0, "length": -1.0, "angle": 0.0}
+"""Quantity that a drive moves -> the sign of its change where a pressure rises, 0 for either."""
 
 ALIKE = 0.8
 """Smallest correlation of a drive and an output that are said to be in the wrong order."""
@@ -80,6 +75,8 @@ def lag(cause: Array, effect: Array, sign: float = 0.0) -> Lag:
     found /= np.sqrt(np.maximum(energies[0] * energies[1], np.finfo(float).tiny))
     found *= sign or np.sign(found[reach])
     found -= NEAREST * np.abs(shifts) / reach  # of several periods
+    sides = [_near(found[reach::-1])[::-1], _near(found[reach:])]
+    found, reach = np.concatenate([sides[0][:-1], sides[1]]), sides[0].size - 1
     at = int(np.argmax(found))
     shift = 0.0
     if 0 < at < found.size - 1:
@@ -90,8 +87,14 @@ def lag(cause: Array, effect: Array, sign: float = 0.0) -> Lag:
     return Lag(float(late), float(found[at]), float(found[reach:].max()))
 
 
+def _near(correlations: Array) -> Array:
+    """Return the correlations from no lag on before they are negative: within half a period."""
+    against = np.flatnonzero(correlations <= 0)
+    return correlations[: max(1, int(against[0]))] if against.size else correlations
+
+
 def lags(recording: Recording) -> dict[str, Lag]:
-    """Return the lag of every other channel that varies behind its drive, where both are known.
+    """Return the lag of every motion behind its drive, where both are known and vary.
 
     The drive of ``displacement_2`` is ``pressure_2``, or the only one.
     """
@@ -102,8 +105,8 @@ def lags(recording: Recording) -> dict[str, Lag]:
         quantity, _, number = name.partition("_")
         own = [drive for drive in drives if drive.partition("_")[2] == number]
         drive = next(iter(own if number else drives if len(drives) == 1 else ()), None)
-        if drive is not None and name not in drives:
-            found[name] = lag(moving[drive], samples, FORWARD.get(quantity, 0.0))
+        if drive is not None and name not in drives and quantity in FORWARD:
+            found[name] = lag(moving[drive], samples, FORWARD[quantity])
     return found
 
 

@@ -96,7 +96,7 @@ def test_pieces_of_one_run_are_told_and_joined(tmp_path: Path) -> None:
     ]
     with pytest.warns(mckibben.errors.DataWarning, match="join"):
         assert len(mckibben.read(paths)) == 3
-    (whole,) = mckibben.read(paths, join=True)
+    (whole,) = several(paths, join=True)  # type: ignore[arg-type]
     assert whole["displacement"] == pytest.approx(Y, abs=1e-9)
     assert whole.duration == pytest.approx(T[-1])
 

@@ -153,19 +153,13 @@ def _argument_words(options: Mapping[str, Any]) -> str:
     >>> _argument_words({"units": {"time": "ms"}, "gaps": "split", "raw": True, "rate": None})
     '`units[time]=ms` with `gaps=split` with `raw` without `rate`'
     """
-    words: list[str] = []
+    words = []
     for name, given in options.items():
-        pairs = given.items() if isinstance(given, Mapping) else [(None, given)]
-        for key, value in pairs:
-            argument = name if key is None else f"{name}[{key}]"
-            joint = "" if not words else " with "
-            if value is None:
-                words.append(f"{' ' * bool(words)}without `{argument}`")
-            else:
-                words.append(
-                    f"{joint}`{argument}`" if value is True else f"{joint}`{argument}={value}`"
-                )
-    return "".join(words)
+        for key, value in given.items() if isinstance(given, Mapping) else [("", given)]:
+            argument = f"{name}[{key}]" if key else name
+            shown = argument if value in (None, True) else f"{argument}={value}"
+            words.append(f"{'without' if value is None else 'with'} `{shown}`")
+    return " ".join(words).removeprefix("with ")
 
 
 def _short(given: object, most: int = 1000) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 from mckibben.errors import DataError
 from mckibben.files.headers import unit_of
 from mckibben.files.notices import noted
-from mckibben.files.request import Request
+from mckibben.files.request import Request, merged
 
 STEPS = 3
 """Remedies that a reading may need, one after the other."""
@@ -70,18 +70,10 @@ def _outcomes(
                 later = list(_outcomes(further, changed, works, steps - 1))
                 answers = [more for more, end in later if end is None]
                 if answers:
-                    yield _both(options, answers[0]) if len(answers) == 1 else options, None
+                    yield merged(options, answers[0]) if len(answers) == 1 else options, None
                 elif later:
                     yield options, later[0][1]
             continue
         if nothing_else:
             yield options, None
 
-
-def _both(options: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return options with more of them; mappings of one name are merged."""
-    both: dict[str, Any] = {**options, **more}
-    for name in options.keys() & more.keys():
-        if isinstance(more[name], Mapping):
-            both[name] = {**options[name], **more[name]}
-    return both

@@ -91,11 +91,7 @@ class Request(ReadOptions):
 
     def changed(self, options: Mapping[str, Any]) -> Request:
         """Return the request with more options, or with others in place of what it has."""
-        merged: dict[str, Any] = {
-            name: _merged(getattr(self, name), value) if isinstance(value, Mapping) else value
-            for name, value in options.items()
-        }
-        return replace(self, **merged)
+        return replace(self, **merged({name: getattr(self, name) for name in options}, options))
 
     @property
     def interprets(self) -> bool:
@@ -131,8 +127,12 @@ class Request(ReadOptions):
                 raise error(problem, channel=channel, remedy="give finite numbers, the gain not 0")
 
 
-def _merged(before: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in {**before, **more}.items() if value is not None}
+def merged(before: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options with others, also within mappings; None leaves one out."""
+    both: dict[str, Any] = {**before}
+    for name, value in more.items():
+        both[name] = merged(both.get(name) or {}, value) if isinstance(value, Mapping) else value
+    return both
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from mckibben.errors import DataError
 from mckibben.files import clocks, instants, quality, timebase, wrapping
 from mckibben.files.channels import NAME, Channel, Time
 from mckibben.files.choosing import assign
-from mckibben.files.headers import is_clock, parse, snake_case, time_unit, unit_of, unknown_ending
+from mckibben.files.headers import is_time, parse, snake_case, time_unit, unit_of, unknown_ending
 from mckibben.files.notices import listed
 from mckibben.files.request import GAPS_BRIDGED, Source
 from mckibben.files.table import Column
@@ -132,7 +132,7 @@ def _with_clocks(source: Source) -> Source:
     clocks: list[Column] = []
     groups: list[list[Column]] = [[]]
     for column in table.columns:
-        if is_clock(column.label):
+        if is_time(column.label):
             clocks.append(column)
             groups.append([])
         elif column.values is not None:

@@ -224,14 +224,9 @@ def is_standard(text: str) -> bool:
 
 
 def is_time(text: str) -> bool:
-    """Return whether a header names the time."""
-    return channel_of(parse(text)) == "time"
-
-
-def is_clock(text: str) -> bool:
     """Return whether a header names times, perhaps one of several.
 
-    >>> is_clock("Time 2 (s)"), is_clock("time.1"), is_clock("T2 [°C]")
+    >>> is_time("Time 2 (s)"), is_time("time.1"), is_time("T2 [°C]")
     (True, True, False)
     """
     header = parse(text)

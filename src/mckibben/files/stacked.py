@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.files.headers import is_clock, parse, snake_case
+from mckibben.files.headers import is_time, parse, snake_case
 from mckibben.files.instants import seconds
 from mckibben.files.request import Request, Source
 from mckibben.files.table import WIDEST, Column, Table
@@ -43,7 +43,7 @@ class Stack:
 def stack(headers: Sequence[str], frame: Any) -> Stack | None:
     """Return the columns of a table in long format, or None: one has values, and one some words."""
     names = [snake_case(parse(header).name) for header in headers]
-    times = [i for i, header in enumerate(headers) if is_clock(header)]
+    times = [i for i, header in enumerate(headers) if is_time(header)]
     values = [i for i, name in enumerate(names) if name in VALUES.split()]
     units = [i for i, name in enumerate(names) if name in UNITS.split()]
     if not len(times) == len(values) == 1:

@@ -48,7 +48,7 @@ def seen(source: Source) -> list[Seen]:
     plain = replace(
         source.request, columns={}, units={}, channels=None, rate=None, sample_time=None
     )
-    asked, unasked = (_by_identity(one) for one in (source, replace(source, request=plain)))
+    asked, unasked = (named_in(one) for one in (source, replace(source, request=plain)))
     return [
         Seen(
             column.header,
@@ -56,8 +56,8 @@ def seen(source: Source) -> list[Seen]:
             tuple(str(text)[:40] for text in column.texts[:4])
             if column.values is None
             else tuple(f"{value:.6g}" for value in column.values[:4]),
-            asked.get(id(column), ""),
-            unasked.get(id(column), ""),
+            asked.get(column.header, ""),
+            unasked.get(column.header, ""),
         )
         for column in source.table.columns
     ]
@@ -65,12 +65,6 @@ def seen(source: Source) -> list[Seen]:
 
 def named_in(source: Source) -> dict[str, str]:
     """Return the channel of every column by its header; on an error, channels by header."""
-    named = _by_identity(source)
-    return {one.header: named[id(one)] for one in source.table.columns if id(one) in named}
-
-
-def _by_identity(source: Source) -> dict[int, str]:
-    """Return the channel of every column, by the column's identity."""
     try:
         named, _ = assign(source)
     except DataError:  # two columns are one channel, for example: each is then named by its header
@@ -79,7 +73,7 @@ def _by_identity(source: Source) -> dict[int, str]:
             if column.values is not None:
                 named.setdefault(channel_of(parse(column.label)), column)
     asked = source.request.channels
-    return {id(c): name for name, c in named.items() if asked is None or name in (*asked, "time")}
+    return {c.header: name for name, c in named.items() if asked is None or name in (*asked, "time")}
 
 
 def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:

@@ -31,35 +31,23 @@ def samples(rows: Sequence[bytes], layout: Layout, path: Path) -> tuple[list[int
     DataError
         If there are none, a quotation mark is not closed, or too many have other numbers of cells.
     """
-    numbers, timed = _filled(rows, layout, path), _is_timed(rows, layout)
-    lines = [rows[number - 1] for number in numbers]
+    numbers, timed = np.array(_filled(rows, layout, path)), _is_timed(rows, layout)
+    lines = np.array(rows, dtype=object)[numbers - 1]
     counts, begins = _measured(lines, numbers, layout, path)
     wrong = (counts > len(layout.headers)) | (counts < layout.least)
     end = _end(lines, numbers, begins & ~wrong, path)
     numbers, lines, begins, wrong = numbers[:end], lines[:end], begins[:end], wrong[:end]
     if 2 * begins.sum() >= begins.size:
         wrong[[k for k in np.flatnonzero(~begins) if _is_of_words(lines[k], layout)]] = True
-    if wrong.any():
-        _refuse_many(wrong, lines, numbers, counts, layout, path)
-        lost = np.flatnonzero(wrong & begins) if not timed else np.array([], dtype=int)
-        for k in lost:
-            lines[k] = (layout.dialect.separator or " ").encode().join([b"nan"] * layout.least)
-        _note(lost, "damaged, and read as missing samples", rows, numbers, path)
-        wrong[lost] = False
-        _note(np.flatnonzero(wrong), "no samples, and left out", rows, numbers, path)
-        numbers, lines = _without(wrong, numbers, lines)
+    _refuse_many(wrong, lines, numbers, counts, layout, path)
+    lost = wrong & begins & (not timed)
+    _note(lost, "damaged, and read as missing samples", lines, numbers, path)
+    _note(wrong & ~lost, "no samples, and left out", lines, numbers, path)
+    lines[lost] = (layout.dialect.separator or " ").encode().join([b"nan"] * layout.least)
+    numbers, lines = numbers[~wrong | lost], lines[~wrong | lost]
     if not timed and layout.stop is None and numbers[-1] - numbers[0] >= len(numbers):
         warn(path, "blank or other lines are left out: without times, what follows moves up")
-    return numbers, lines
-
-
-def _without(
-    some: NDArray[np.bool_], numbers: list[int], lines: list[bytes]
-) -> tuple[list[int], list[bytes]]:
-    if not some.any():
-        return numbers, lines
-    keep = np.flatnonzero(~some)
-    return [numbers[k] for k in keep], [lines[k] for k in keep]
+    return numbers.tolist(), lines.tolist()
 
 
 def _filled(rows: Sequence[bytes], layout: Layout, path: Path) -> list[int]:
@@ -152,16 +140,12 @@ def _refuse_many(
 
 
 def _note(
-    some: Sequence[int] | NDArray[np.intp],
-    what: str,
-    rows: Sequence[bytes],
-    numbers: Sequence[int],
-    path: Path,
+    some: NDArray[np.bool_], what: str, lines: Sequence[bytes], numbers: Sequence[int], path: Path
 ) -> None:
-    if len(some):
-        number = numbers[some[0]]
-        text = " ".join(rows[number - 1].decode("utf-8", "replace").split())[:60]
-        warn(path, f"{len(some)} line(s) are {what}, the first in row {number}: {text!r}")
+    if some.any():
+        first = int(some.argmax())
+        text = " ".join(lines[first].decode("utf-8", "replace").split())[:60]
+        warn(path, f"{some.sum()} line(s) are {what}, the first in row {numbers[first]}: {text!r}")
 
 
 def _is_timed(rows: Sequence[bytes], layout: Layout) -> bool:

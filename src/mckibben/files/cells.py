@@ -133,7 +133,7 @@ def column(name: str, unit: str | None, cells: Any, dialect: Dialect) -> tuple[C
     counts = pd.Series(kinds[filled]).value_counts()
     numbers = counts.drop("text", errors="ignore")
     if 2 * numbers.sum() <= counts.sum():
-        return Column(name, None, unit, texts=[words[code] for code in codes[:5]]), ""
+        return Column(name, None, unit, texts=[words[code] for code in codes]), ""
     usual = str(numbers.index[0])
     if usual.startswith("in "):
         unit = unit or usual.removeprefix("in ")

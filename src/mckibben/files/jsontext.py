@@ -19,13 +19,9 @@ import numpy as np
 from mckibben.errors import DataError
 from mckibben.files import cells, tree
 from mckibben.files.decoding import decoded
-from mckibben.files.headers import is_time
 from mckibben.files.instants import may_be_instant
 from mckibben.files.table import Table, plain_meta
-from mckibben.files.tree import UNITS, Node, Unread
-
-SENDERS = {"channel", "key", "measurement", "name", "sensor", "signal", "topic", "variable"}
-"""Fields with the name of what the one number of a message is."""
+from mckibben.files.tree import Node, Unread
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][+-]?\d+)?")
 _SINCE_1970 = 1e11
@@ -135,26 +131,9 @@ def _series(values: Sequence[Any]) -> Node:
 
 
 def _records(records: Sequence[Mapping[str, Any]]) -> dict[str, Node]:
-    """Return the columns of records; of messages, one for each sender."""
+    """Return the columns of records."""
     names = dict.fromkeys(name for record in records for name in record)
-    by = next((name for name in names if name.casefold() in SENDERS), None)
-    unit = next((name for name in names if name.casefold() in UNITS), "")
-    values = [name for name in names if name not in (by, unit) and not is_time(name)]
-    columns = {name: [record.get(name) for record in records] for name in names}
-    if (
-        by is None
-        or len(values) != 1
-        or not all(isinstance(each, str) for each in columns[by])
-        or not all(isinstance(each, int | float) for each in columns[values[0]])
-    ):
-        return {name: _series(column) for name, column in columns.items()}
-    units = [f" [{each[unit]}]" if each.get(unit) else "" for each in records]
-    senders = [f"{each[by]}{stated}" for each, stated in zip(records, units, strict=True)]
-    times = {name: _series(columns[name]) for name in names if is_time(name)}
-    sent: dict[str, list[Any]] = {sender: [None] * len(records) for sender in senders}
-    for at, sender in enumerate(senders):
-        sent[sender][at] = columns[values[0]][at]
-    return {**times, **{name: _series(column) for name, column in sent.items()}}
+    return {name: _series([record.get(name) for record in records]) for name in names}
 
 
 def _named(names: Sequence[Any], rows: Sequence[Any]) -> dict[str, Node]:

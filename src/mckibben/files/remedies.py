@@ -76,4 +76,3 @@ def _outcomes(
             continue
         if nothing_else:
             yield options, None
-

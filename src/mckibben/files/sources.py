@@ -21,6 +21,7 @@ from mckibben.files.converting import times_of
 from mckibben.files.headers import is_standard, is_time, parse
 from mckibben.files.own import description
 from mckibben.files.request import Request, Source
+from mckibben.files.stacked import unstacked
 from mckibben.files.table import Column, Table
 from mckibben.files.units import convert
 from mckibben.system.ordinary import DESCRIPTION, opened, read_text
@@ -118,7 +119,8 @@ def tables(path: Path, request: Request) -> tuple[list[Table], str]:
             for each, file in files.items():
                 lines = request.header, request.skip, request.encoding
                 text = formats.laid_out(file, each, *lines)
-                found[each] = formats.read(text, each, request.sheet)
+                several = formats.read(text, each, request.sheet)
+                found[each] = [unstacked(one, each) for one in several]
         for (each, file), state in zip(files.items(), before, strict=True):
             file.seek(0)
             digests.append(hashlib.file_digest(file, "sha256").hexdigest())

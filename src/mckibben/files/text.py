@@ -27,7 +27,6 @@ from mckibben.files.instants import may_be_instant
 from mckibben.files.lines import samples
 from mckibben.files.notices import listed, warn
 from mckibben.files.sniffing import SEPARATORS, Layout, sniff
-from mckibben.files.stacked import stack, unstacked
 from mckibben.files.table import Column, Table
 
 _ARROW = re.compile(rb"(?m)^(\d\d:\d\d:\d\d\.\d+) -> (?=.*?([\t;|,]|$))")  # of Arduino's monitor
@@ -124,21 +123,17 @@ def _table(rows: Sequence[bytes], layout: Layout, path: Path) -> Table:
         raise DataError("its lines are not those of a table", file=path, remedy="export it again")
     decimals: dict[str, str] = {}  # column -> a number that has three digits after the mark, as all
 
-    def made(i: int, name: str, unit: str | None, some: Any = slice(None)) -> Column:
-        cells = frame[i].iloc[some]
+    def made(i: int, name: str, unit: str | None) -> Column:
+        cells = frame[i]
         if i in texts or (cells.dtype.kind not in "iufb" and cells.notna().any()):
-            cells = texts[i].iloc[some] if i in texts else cells
+            cells = texts[i] if i in texts else cells
             found, cell = column(name, unit, cells, dialect)
             decimals.update({name: cell} if cell else {})
             return found
         values = cells.to_numpy(np.float64) if cells.notna().any() else None
         return Column(name, values, unit, texts=[""] * len(cells) if values is None else ())
 
-    if (found := stack(headers, frame)) is not None:
-        clock = made(found.time, headers[found.time], layout.units[found.time])
-        table = unstacked(found, frame, clock, made, numbers, path)
-    else:
-        table = _in_columns(made, frame, layout, numbers)
+    table = _in_columns(made, frame, layout, numbers)
     if decimals and not shown:
         _note_decimals(decimals, dialect.decimal, path)
     return table

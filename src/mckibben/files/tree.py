@@ -98,10 +98,10 @@ def table(
     lengths = {each.size for each in columns.values() if each.times is None}
     texts: list[Column] = []
     for place, lines in leaves.items():
-        if isinstance(lines, list) and lines and place[-1].casefold() not in NAMES | UNITS:
+        if isinstance(lines, list) and lines:
             if len(lines) in lengths:
                 texts.append(Column(place[-1], None, texts=lines, place=dot.join(place)))
-            else:
+            elif place[-1].casefold() not in NAMES | UNITS:
                 unread[dot.join(place)] = "text"
     if not columns:
         raise without_numbers(unread, path)
@@ -238,7 +238,7 @@ def _units(
     beside: dict[Place, set[str]] = {}
     for place, leaf in leaves.items():
         home = place[:-1]
-        if place[-1].casefold() in UNITS and isinstance(leaf, (str, list)):
+        if place[-1].casefold() in UNITS and isinstance(leaf, (str, list) if home else str):
             place = (*home[:-1], home[-1].removesuffix(INFO)) if home else ()
         elif not isinstance(leaf, str) or not (
             home in groups or (home and home[-1].casefold() in UNITS)

@@ -73,7 +73,9 @@ def named_in(source: Source) -> dict[str, str]:
             if column.values is not None:
                 named.setdefault(channel_of(parse(column.label)), column)
     asked = source.request.channels
-    return {c.header: name for name, c in named.items() if asked is None or name in (*asked, "time")}
+    return {
+        c.header: name for name, c in named.items() if asked is None or name in (*asked, "time")
+    }
 
 
 def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:

@@ -66,9 +66,11 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     signals: dict[str, Signal] = {}
     flawed: DataError | None = None
     derived = source.derived(columns)
+    drives = [c.values for n, c in columns.items() if n.partition("_")[0] in DRIVES]
+    jumps = wrapping.jumps_of(values for values in drives if values is not None)
     for name, column in columns.items():
         try:
-            signals[name] = _signal(name, column, source)
+            signals[name] = _signal(name, column, jumps, source)
         except DataError as error:
             if name in derived.values() or (
                 request.needs(name) and (unit_of(name) is not None or request.asks_for(name))
@@ -201,14 +203,14 @@ def times_of(column: Column, source: Source, unit: str | None = None) -> Times:
     return Times(values, unit, stated or unit != "s", assumed)
 
 
-def _signal(channel: str, column: Column, source: Source) -> Signal:
-    """Return a channel in the package's unit, NaN for missing samples."""
+def _signal(channel: str, column: Column, jumps: wrapping.Rows, source: Source) -> Signal:
+    """Return a channel in the package's unit, NaN for missing samples; drives have ``jumps``."""
     raw = _numbers(channel, column, source)
     calibration = _calibration(channel, column, source)
     own, standard = source.table.own, unit_of(channel)
     cleaned = not own and not source.request.raw
     if cleaned and channel.partition("_")[0] not in DRIVES:  # a sawtooth can be commanded
-        raw = wrapping.unwrapped(channel, raw, source)
+        raw = wrapping.unwrapped(channel, raw, jumps, source)
     values = raw
     if "gain" in calibration:
         with np.errstate(over="ignore"):

@@ -16,6 +16,9 @@ from mckibben.files.notices import warn
 from mckibben.files.sniffing import Layout
 from mckibben.files.units import find
 
+Rows = NDArray[np.intp]
+"""Numbers of lines, counted from 1."""
+
 MOST = 0.1
 """Largest share of lines with digits that are no samples; a file with more is refused."""
 
@@ -66,7 +69,7 @@ def _filled(rows: Sequence[bytes], layout: Layout, path: Path) -> list[int]:
 
 
 def _measured(
-    lines: Sequence[bytes], numbers: Sequence[int], layout: Layout, path: Path
+    lines: Sequence[bytes], numbers: Rows, layout: Layout, path: Path
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Return the number of cells of every line, and whether it begins with a number or a blank cell."""
     joined, mark = b"\n".join(lines), (layout.dialect.separator or " ").encode()
@@ -89,9 +92,7 @@ def _measured(
     return np.diff(cells, prepend=0) + 1, begins
 
 
-def _end(
-    lines: Sequence[bytes], numbers: Sequence[int], sound: NDArray[np.bool_], path: Path
-) -> int:
+def _end(lines: Sequence[bytes], numbers: Rows, sound: NDArray[np.bool_], path: Path) -> int:
     """Return the number of lines before words behind a blank line, such as "Maximum", with a note.
 
     Unless a good part of the samples follows.
@@ -122,7 +123,7 @@ def _is_of_words(line: bytes, layout: Layout) -> bool:
 def _refuse_many(
     wrong: NDArray[np.bool_],
     lines: Sequence[bytes],
-    numbers: Sequence[int],
+    numbers: Rows,
     counts: NDArray[np.int64],
     layout: Layout,
     path: Path,
@@ -140,7 +141,7 @@ def _refuse_many(
 
 
 def _note(
-    some: NDArray[np.bool_], what: str, lines: Sequence[bytes], numbers: Sequence[int], path: Path
+    some: NDArray[np.bool_], what: str, lines: Sequence[bytes], numbers: Rows, path: Path
 ) -> None:
     if some.any():
         first = int(some.argmax())

@@ -128,8 +128,8 @@ def _early(recording: Recording) -> list[str]:
     """Return notes on channels that move before what should drive them."""
     unit = "samples" if recording.sample_time is None else "s"
     return [
-        f"channel {name!r} moves {-late.samples * recording.step:.3g} {unit} before what should "
-        "drive it: columns are swapped, or clocks differ"
+        f"channel {name!r} moves {-late.samples * recording.step:.3g} {unit} before the input: if that "
+        "drives it, columns are swapped, or clocks differ"
         for name, late in lags(recording).items()
         if comes_first(late)
     ]
@@ -263,13 +263,15 @@ def _recordings(source: Source, origin: Mapping[str, Any]) -> list[Recording]:
     if n < request.fewest:
         problem = f"{n} sample(s) are too few, at least {request.fewest} are needed"
         raise source.error(problem, "give a longer recording")
+    if clock is not None:
+        kept = timebase.usable(clock, channels, source)
+        channels = {name: samples[kept] for name, samples in channels.items()}
+        clock = replace(clock, values=clock.values[kept])
     step = _stated_step(clock, source)
     start = table.start_time if clock is None else clock.seconds(clock.values[0])
     times = clock if step is None else None
     if times is not None:
-        kept = timebase.usable(times, channels, source)
-        channels = {name: samples[kept] for name, samples in channels.items()}
-        times = timebase.increasing(replace(times, values=times.values[kept]), source)
+        times = timebase.increasing(times, source)
     pieces = gaps_in.pieces(channels, times, step, start, source)
     if request.informative:
         _refuse_constant(pieces, source)

@@ -126,7 +126,7 @@ def _table(rows: Sequence[bytes], layout: Layout, path: Path) -> Table:
     def made(i: int, name: str, unit: str | None) -> Column:
         cells = frame[i]
         if i in texts or (cells.dtype.kind not in "iufb" and cells.notna().any()):
-            cells = texts[i] if i in texts else cells
+            cells = texts.get(i, cells)
             found, cell = column(name, unit, cells, dialect)
             decimals.update({name: cell} if cell else {})
             return found

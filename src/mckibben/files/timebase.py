@@ -26,10 +26,13 @@ Spans = NDArray[np.intp]
 GAP = 3.0
 """Steps longer than this many median steps are gaps; shorter ones are jitter."""
 
-RATES = ("fs", "Fs", "sample_rate", "sampling_frequency")
+RATES = ("fs", "Fs", "sample_rate", "sampling_rate", "sample_frequency", "sampling_frequency")
 """Names of scalars that are sampling rates [Hz]."""
 
-STEPS = ("Ts", "dt", "sample_time")
+STEPS = (
+    *("Ts", "dt", "sample_time", "sample_interval", "sample_period"),
+    *("sampling_time", "sampling_interval", "sampling_period"),
+)
 """Names of scalars that are sample times [s]."""
 
 _SINCE_1970 = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}

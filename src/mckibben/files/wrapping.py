@@ -7,25 +7,49 @@ speed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.files.request import Source
+
+Rows = NDArray[np.intp]
+"""Numbers of rows, counted from 0."""
+
+SOON = 5
+"""Rows after a jump of a drive in which an output may follow."""
 
 FEWEST, MOST = 2.0**8, 2.0**32
 """Ranges of counters [steps]."""
 
 
-def unwrapped(channel: str, recorded: Array, source: Source) -> Array:
-    """Return samples of which a counter that wraps goes on, with a note; others as they are."""
+def jumps_of(columns: Iterable[Array]) -> Rows:
+    """Return the rows in which any column changes by more than half of its range."""
+    found = []
+    with np.errstate(over="ignore", invalid="ignore"):
+        for values in columns:
+            steps, width = np.abs(np.diff(values)), np.ptp(values) if values.size else 0.0
+            found.append(np.flatnonzero(steps > 0.5 * width) + 1)
+    return np.unique(np.concatenate([np.zeros(0, np.intp), *found]))
+
+
+def unwrapped(channel: str, recorded: Array, jumps: Rows, source: Source) -> Array:
+    """Return samples of which a counter that wraps goes on, with a note; others as they are.
+
+    None that jumps with what drives it, in the rows ``jumps``, is a counter.
+    """
     known = np.flatnonzero(np.isfinite(recorded))
     found = wraps(recorded[known])
     if found is None:
         return recorded
     size, upwards = found
-    row = source.table.row(int(known[np.flatnonzero(upwards)[0] + 1]))
+    wrapped = known[np.flatnonzero(upwards) + 1]
+    after = wrapped[:, np.newaxis] - jumps
+    if np.mean(np.any((after >= 0) & (after <= SOON), axis=1)) > 0.5:
+        return recorded
+    row = source.table.row(int(wrapped[0]))
     source.warn(
         f"channel {channel!r} jumps by almost {size:.6g}, first in row {row}, as a counter that wraps: "
         "it was made to go on; use `raw` where that was measured"

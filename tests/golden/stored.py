@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -41,7 +42,9 @@ def machine() -> str:
     import llvmlite.binding
 
     libm = " ".join(platform.libc_ver())
-    return f"{platform.system()} {platform.machine()} {llvmlite.binding.get_host_cpu_name()} {libm}"
+    cpu = llvmlite.binding.get_host_cpu_name()
+    features = llvmlite.binding.get_host_cpu_features().flatten()  # a host can hide some
+    return f"{platform.system()} {platform.machine()} {cpu} {crc32(features.encode()):08x} {libm}"
 
 
 def _place(name: str) -> Path:

@@ -32,7 +32,7 @@ def may_be_instant(text: str) -> bool:
 
 
 def seconds(texts: Sequence[str], source: Source) -> tuple[Array, str]:
-    """Return instants as seconds since the first, and the first as ISO 8601; a time of day has no date.
+    """Return instants as seconds since the first, NaN where blank; and the first as ISO 8601.
 
     Parameters
     ----------
@@ -62,21 +62,23 @@ def seconds(texts: Sequence[str], source: Source) -> tuple[Array, str]:
         read = pd.to_datetime(cells, format=pattern, errors="coerce", utc=zoned)
         found.append((read.dt.tz_localize(None) if zoned else read).to_numpy("datetime64[ns]"))
     instants, *others = sorted(found, key=lambda each: np.isnat(each).sum())
-    bad = np.flatnonzero(np.isnat(instants))
+    blank = np.array([not text for text in texts])
+    bad = np.flatnonzero(np.isnat(instants) & ~blank)
     if bad.size:
         like = "" if form is None or bad[0] == 0 else f" as {first[:40]!r} is"
         problem = f"{texts[bad[0]][:40]!r} is no time{like}"
         remedy = "write times in seconds or as 2026-01-31T12:00:00.5, or give `rate`"
         raise source.error(problem, remedy, "time", int(bad[0]))
     for other in others:
-        if not np.isnat(other).any() and np.any(other - other[0] != instants - instants[0]):
+        if not np.isnat(other[~blank]).any() and np.any((other - other[0])[~blank] != (instants - instants[0])[~blank]):
             problem = f"{first[:40]!r} may have the day first or the month"
             remedy = "write dates as 2026-01-31, or with the day first and dots, or give `rate`"
             raise source.error(problem, remedy, "time", 0)
-    since: Array = (instants - instants[0]).astype(np.float64) * 1e-9
+    start = instants[~blank][0] if not blank.all() else instants[0]
+    since: Array = np.where(blank, np.nan, (instants - start).astype(np.float64) * 1e-9)
     if form is not None and form["first"] is None:  # times of day go on after midnight
         since[1:] += 86400.0 * np.cumsum(np.diff(since) < -43200.0)
-    date = str(instants[0])
+    date = str(start)
     return since, date.partition("T")[2] if form is not None and form["first"] is None else date
 
 

@@ -31,6 +31,7 @@ def unstacked(table: Table, path: Path) -> Table:
     others = [c for c in table.columns if not any(c is one for one in (*times, *units))]
     words = [c for c in others if c.values is None and _are_few(c.texts)]
     values = [c for c in others if c.values is not None]
+    values = [c for c in values if names[id(c)] in VALUES.split()] or values
     if not len(times) == len(words) == len(values) == 1 or len(units) > 1 or table.own:
         return table
     (clock,), (signal,), (value,) = times, words, values

@@ -69,16 +69,18 @@ def seconds(texts: Sequence[str], source: Source) -> tuple[Array, str]:
         problem = f"{texts[bad[0]][:40]!r} is no time{like}"
         remedy = "write times in seconds or as 2026-01-31T12:00:00.5, or give `rate`"
         raise source.error(problem, remedy, "time", int(bad[0]))
+    at = int(np.argmin(blank))  # the first with a time
+    elapsed = (instants - instants[at])[~blank]
     for other in others:
-        if not np.isnat(other[~blank]).any() and np.any((other - other[0])[~blank] != (instants - instants[0])[~blank]):
+        found_else = (other - other[at])[~blank]
+        if not np.isnat(found_else).any() and np.any(found_else != elapsed):
             problem = f"{first[:40]!r} may have the day first or the month"
             remedy = "write dates as 2026-01-31, or with the day first and dots, or give `rate`"
             raise source.error(problem, remedy, "time", 0)
-    start = instants[~blank][0] if not blank.all() else instants[0]
-    since: Array = np.where(blank, np.nan, (instants - start).astype(np.float64) * 1e-9)
+    since: Array = np.where(blank, np.nan, (instants - instants[at]).astype(np.float64) * 1e-9)
     if form is not None and form["first"] is None:  # times of day go on after midnight
         since[1:] += 86400.0 * np.cumsum(np.diff(since) < -43200.0)
-    date = str(start)
+    date = str(instants[at])
     return since, date.partition("T")[2] if form is not None and form["first"] is None else date
 
 

@@ -135,7 +135,7 @@ def test_a_day_that_may_be_a_month_is_refused_where_it_matters(tmp_path: Path, f
 
 
 BAD = ["31.02.2026 23:59:57", "01.13.2026 23:59:57", "01.Foo.2026 23:59:57", "01.02.2026 25:00:00"]
-BAD += ["2026-02-01T00:00:00", "soon", "", "31.01.2026 23:59:54", "31.01.2026 23:59:56.000000"]
+BAD += ["2026-02-01T00:00:00", "soon", "31.01.2026 23:59:54", "31.01.2026 23:59:56.000000"]
 
 
 @pytest.mark.parametrize("bad", BAD)
@@ -143,6 +143,15 @@ def test_bad_dates_are_refused_by_their_row(tmp_path: Path, bad: str) -> None:
     times = [instant.strftime("%d.%m.%Y %H:%M:%S.%f") for instant in INSTANTS]
     times[5] = bad
     assert place(written(tmp_path, times)) == ("time", 7)
+
+
+def test_a_row_without_a_date_is_left_out(tmp_path: Path) -> None:
+    times = [instant.strftime("%d.%m.%Y %H:%M:%S.%f") for instant in INSTANTS]
+    whole = one(written(tmp_path, times))
+    times[5] = ""
+    found = one(written(tmp_path, times), gaps="interpolate")
+    assert found.duration == whole.duration
+    assert any("row 7" in note for note in found.notes)
 
 
 # Counts --------------------------------------------------------------------------------

@@ -32,6 +32,7 @@ from mckibben.signals.excitations import irregular_triangle
 
 STATIC, LAW = "static law alone", "force-bilinear"
 PAPERS, OURS, EIGHTEEN = "11 parameters, the paper's", "11 parameters, ours", "18 parameters"
+LITERAL = "11 parameters, Eq. (5) to the letter"
 HYSTERESIS, ELONGATION = "force_hysteresis", "elongation"
 """What a static law leaves of the force [N], and the length beyond that at rest [mm], where models start
 that are at rest at 0."""
@@ -42,6 +43,7 @@ LINE: dict[str, Any] = {"input": ELONGATION, "degree": 1}
 SIGNED: dict[str, Any] = {"input": ELONGATION, "n_operators": 39, "nonnegative": False}
 MODELS: Mapping[str, tuple[str, dict[str, Any]]] = {
     PAPERS: ("multistate-11", {"static": None}),
+    LITERAL: ("multistate-11", {"static": None, "elements": "eleven-released"}),
     OURS: ("multistate", {"static": None}),
     EIGHTEEN: ("multistate-18", {"static": None}),
     "modified Maxwell-slip": ("mms", LINE | {"n_operators": 38}),

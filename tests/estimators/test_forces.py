@@ -282,3 +282,14 @@ def test_a_scaled_law_is_printed_by_the_length_itself() -> None:
     lengths = np.linspace(184.0, 200.0, 9)
     for ours, theirs in zip(plain.terms(lengths), law.terms(lengths), strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1e-8)
+
+
+def test_the_printed_swarm_comes_to_where_least_squares_comes() -> None:
+    from mckibben.estimators.force.activation import ActivationPressureEstimator
+
+    runs = [sines(frequency, force) for frequency in (0.5, 2.0) for force in (0.0, 100.0, 300.0)]
+    least, swarm = (
+        ActivationPressureEstimator(method=method).fit(runs).diagnostics_.rmse
+        for method in ("ls", "pso")
+    )
+    assert swarm == pytest.approx(least, rel=0.01, abs=1e-4)

@@ -25,7 +25,7 @@ from mckibben.papers.experiment import (
 from mckibben.recording import Recording
 from mckibben.signals.protocol import protocol
 
-THEIRS, OURS = "the paper's", "ours"
+THEIRS, OURS, SWARM = "the paper's", "ours", "the paper's, by particle swarm"
 QUALITIES = ("RMSE [% of range]", "correlation")
 
 QUICK = 3
@@ -53,6 +53,7 @@ class Study:
     waves: Recordings
     printed: ActivationPressure
     found: ActivationPressure
+    swarmed: ActivationPressure
 
 
 def run(experiment: Experiment) -> None:
@@ -68,10 +69,11 @@ def run(experiment: Experiment) -> None:
     train = [*slow.values(), *sines.values()]
     experiment.tell(0.82, "the paper's model")
     theirs: Any = experiment.fit(THEIRS, "activation-pressure", train).block
+    swarm: Any = experiment.fit(SWARM, "activation-pressure", train, {"method": "pso"}).block
     experiment.tell(0.9, "ours")
     experiment.fit(OURS, "activation-memory", train)
     printed = experiment.paper.printed("activation-pressure-profile")
-    study = Study(experiment, slow, sines, waves, printed, theirs)
+    study = Study(experiment, slow, sines, waves, printed, theirs, swarm)
     _scores(study, "sines", sines)
     _scores(study, "waves", waves)
     for part in (_profile, _constants, _rates, _extremes, _loops):
@@ -105,6 +107,12 @@ def points(model: ActivationPressure, force: float) -> tuple[Array, Array]:
     cubics = (np.reshape(field, (4, 4)).T for field in (model.contractions, model.pressures))
     contractions, pressures = (np.polyval(cubic, force) for cubic in cubics)
     return contractions, pressures
+
+
+def _percent(model: ActivationPressure, at: tuple[float, float, str], one: Recording) -> float:
+    """Return the RMSE of the paper's model over a sine of a frequency, in percent of its range."""
+    p = replace(model, frequency=at[1]).simulate(one)["pressure"]
+    return 100 * rms(p - one["pressure"]) / float(np.ptp(one["pressure"]))
 
 
 def static_rmse(model: ActivationPressure, runs: Iterable[Recording]) -> float:
@@ -174,17 +182,20 @@ def _rates(study: Study) -> None:
     middle, columns = float(np.mean(frequencies)), []
     panels: dict[str, dict[str, tuple[Array, Array]]]
     panels = {"gamma by frequency [Hz]": {}, "phi by force [N]": {}}
-    for whose, model in (("printed", study.printed), ("here", study.found)):
+    models = {"printed": study.printed, "here": study.found, "here, by swarm": study.swarmed}
+    for whose, model in models.items():
         scale = float(np.polyval(model.gamma, middle))
         gamma = np.polyval(model.gamma, frequencies) / scale
         phi = scale * np.polyval(model.phi, forces)
-        columns.append([model.gamma[0] / scale, *gamma.tolist(), *phi.tolist()])
+        off = [_percent(model, *one) for one in study.sines.items()]
+        columns.append([model.gamma[0] / scale, *gamma.tolist(), *phi.tolist(), rms(np.array(off))])
         panels["gamma by frequency [Hz]"][whose] = frequencies, gamma
         panels["phi by force [N]"][whose] = forces, phi
     names = ["slope of gamma [1/Hz]", *(f"gamma at {f:g} Hz" for f in frequencies)]
-    names += [f"phi at {f:.3g} N [bar s]" for f in forces]
+    names += [*(f"phi at {f:.3g} N [bar s]" for f in forces), "RMSE over all sines [% of range]"]
     rows = dict(zip(names, zip(*columns, strict=True), strict=True))
-    study.experiment.table("rates", ["printed", "here"], rows, middle=middle)
+    study.experiment.table("rates", [*models], rows, middle=middle)
+    study.experiment.says(off=dict(zip(models, rows[names[-1]], strict=True)))
     study.experiment.figure("rates", panels)
 
 

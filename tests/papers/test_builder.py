@@ -13,7 +13,7 @@ import pytest
 from mckibben import Recording, registry
 from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelError
-from mckibben.papers.experiment import Experiment, Labels, Runs, reproduce
+from mckibben.papers.experiment import Experiment, Labels, Runs, Verdict, reproduce
 from mckibben.papers.paper import Paper, paper, papers
 from mckibben.report.reproduction import comparison, drawing, heading, markdown, reproduction_page
 from mckibben.rigs import rig_names
@@ -121,8 +121,12 @@ def test_a_sentence_without_its_facts_is_left_out_and_models_that_warn_are_named
     assert "1.50 mm" in found.summary[0]
     assert found.paper.quick in found.notes
     loaded = experiment("mpi-narmax")
-    loaded.says(status_4_gains=[2.0, 3.0])
-    assert any("2.0" in sentence for sentence in loaded.done("a rig").summary)
+    gains = {"status_4_gains": [2.0, 3.0], "status_4_gains_rmse": [1.5, 2.5]}
+    for better, text in ((True, "As in"), (False, "Unlike")):
+        loaded.says(**gains, status_4_better=Verdict(better))
+        (sentence,) = loaded.done("a rig").summary
+        assert sentence.startswith(text)
+        assert "2.0" in sentence
 
 
 def test_pages_name_the_paper_and_its_figures() -> None:

@@ -20,6 +20,7 @@ from mckibben.papers.experiment import (
     Curves,
     Experiment,
     Runs,
+    Verdict,
     rms,
 )
 from mckibben.recording import Recording
@@ -136,6 +137,7 @@ def _scores(study: Study, key: str, recordings: Recordings) -> None:
         facts = {"n": len(rows), "worst": worst, "at": [*rows][percents.index(worst)]}
         facts |= {"above": sum(percent > bound for percent in percents)}
         facts |= {"low": min(correlations), "high": max(correlations)}
+        facts |= {"below": Verdict(facts["above"] == 0)}
         study.experiment.says(**{f"{key}_{whose}_{name}": fact for name, fact in facts.items()})
 
 
@@ -229,7 +231,8 @@ def _extremes(study: Study) -> None:
     if len(rows) > 4:  # a cubic of the force goes through the extremes at four forces exactly
         experiment.table("distance", columns, rows)
         low, high = (sum(cells[k + 2] < cells[k] for cells in rows.values()) for k in (0, 1))
-        experiment.says(nearer_low=low, nearer_high=high, n_forces=len(rows))
+        nearer = Verdict(low + high == 2 * len(rows))
+        experiment.says(nearer_low=low, nearer_high=high, n_forces=len(rows), nearer=nearer)
     scatter = {"of every loop": np.vstack(local).T, "of every force": np.vstack(whole).T}
     experiment.figure("extrema", {"": {name: (x, y) for name, (x, y) in scatter.items()}})
     experiment.figure("static", static_curves)

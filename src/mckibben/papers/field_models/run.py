@@ -19,6 +19,7 @@ from mckibben.papers.experiment import (
     Cell,
     Curves,
     Experiment,
+    Verdict,
 )
 from mckibben.papers.paper import paper
 from mckibben.recording import Recording
@@ -32,6 +33,9 @@ QUICK = ("balance", "bj", "cpi", "duhem", "gpi", "mpi", "oe", "p2uz", "pi", "pre
 PRINTED_PI, PRINTED_P2UZ = "field-models-pi", "field-models-p2uz"
 NARX, BJ, P2UZ, SLOPES = PAPERS = ("NARX", "BJ", "P2UZ", "PI")
 ALL_LAGS, LEAST_SQUARES = "BJ, B with q^-1", "PI by least squares, ours"
+
+GOOD = 90.0
+"""Fitness that all four methods exceed in the paper [%]."""
 
 SAME = 0.05
 """Difference of a range of pressure from the paper's, relative to it, up to which both are the same."""
@@ -75,13 +79,9 @@ class MethodResult(NamedTuple):
     failures: list[str]
 
     @property
-    def lowest_test(self) -> float | None:
-        """The lower of the median test RMSE of plain and matched models [mm].
-
-        None where most seeds failed, or are worse than the mean of what was measured.
-        """
-        medians = np.median(self.errors, axis=1)
-        return min((test for _, _, test, fitness in medians.tolist() if fitness > 0), default=None)
+    def medians(self) -> list[tuple[float, float]]:
+        """RMSE [mm] and fitness [%] on the test, plain, then matched; infinite if most seeds failed."""
+        return [(row[2], row[3]) for row in np.median(self.errors, axis=1).tolist()]
 
 
 def finite(values: Array) -> list[Cell]:
@@ -249,13 +249,28 @@ def _inside(row: Mapping[str, Any], path: str, scale: float) -> Cell:
 def _summary(
     experiment: Experiment, tried: Mapping[str, MethodResult], board: Leaderboard
 ) -> dict[str, Row]:
-    """Set the summary's facts, and return the named models of the field."""
-    worked = {name: low for name in PAPERS if (low := tried[name].lowest_test) is not None}
+    """Set the summary's facts, and return the named models of the field.
+
+    The field runs plain, so that is compared with the paper's methods run plain; their order is that of
+    the paper's own errors, matched.
+    """
+    plain, matched_ = ({n: tried[n].medians[k] for n in PAPERS} for k in (0, 1))
+    printed = experiment.paper.tables["errors"].printed["RMSE test [mm]"]
+    order, theirs = (sorted(PAPERS, key=lambda n: by[n]) for by in (matched_, printed))
+    good = sum(fitness > GOOD for _, fitness in matched_.values())
+    experiment.says(
+        order=", ".join(f"{n} {matched_[n][0]:.2f} mm" for n in order),
+        order_printed=", ".join(f"{n} {printed[n]:.2f} mm" for n in theirs),
+        same_order=Verdict(order == theirs),
+        good=good,
+        all_good=Verdict(good == len(PAPERS)),
+    )
+    worked = {name: test for name, (test, fitness) in plain.items() if fitness > 0}
     best = min(worked, key=worked.__getitem__, default=None)
     if best is not None:
-        plain, matched_ = np.median(tried[best].errors, axis=1)[:, 2].tolist()
         n_worked = len(tried[best].errors[0]) - len(tried[best].failures)
-        experiment.says(best=best, best_seeds=n_worked, best_plain=plain, best_matched=matched_)
+        both = {"best_plain": plain[best][0], "best_matched": matched_[best][0]}
+        experiment.says(best=best, best_seeds=n_worked, **both)
     shown = {}
     chosen = "fitted" if board.chosen_by == "fit" else "chosen"
     for key, row in ((chosen, board.best), ("lowest", board.lowest)):

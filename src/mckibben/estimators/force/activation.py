@@ -217,7 +217,9 @@ class ActivationPressureEstimator(SearchEstimator):
         rise = np.repeat(rises, [int(run.counts.sum()) for run in data.runs])
         force = data.scored(lambda run: run.scheduled[:, 0])
         largest = max(float(np.abs(force).max()), 1.0)
-        powers = np.vander(force / largest, 4)
+        # a cubic of fewer forces than four, and a slope by one frequency, are not determined
+        known = np.append(np.arange(4, 0, -1) <= len(by_force(data.runs)), np.ptp(at) > 0)
+        powers = np.vander(force / largest, 4) * known[:4]
         start = np.linalg.lstsq(powers * rate[:, np.newaxis], rest, rcond=1e-9)[0]
         width = np.maximum(np.abs(start), np.abs(start).max(initial=1e-6))
         bounds = np.append(start - 2 * width, -1.0), np.append(start + 2 * width, 1.0)
@@ -231,6 +233,7 @@ class ActivationPressureEstimator(SearchEstimator):
             found = _swarmed(errors, bounds, tracker, self.seed)
         else:
             found = _searched(tracker.watched(errors), np.append(start, 0.0), bounds)
+        found = found * known
         phi = found[:4] / largest ** np.array([3, 2, 1, 0])
         slope = float(found[4]) / max(middle, 1e-9)
         return phi, (slope, 1.0 - slope * middle)

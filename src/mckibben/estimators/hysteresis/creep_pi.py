@@ -1,9 +1,9 @@
 """Identification of a Prandtl-Ishlinskii model with increasing map and viscoelastic creep.
 
 Two things that rate-independent loops leave out of a pneumatic muscle: its friction grows with pressure,
-so the play operators act on log(u + offset), where the offset counts from the lowest pressure recorded,
-so that it is the same for absolute and for gauge pressure; and braid and rubber creep, so the output goes on moving
-while the input is held. Everything is identified jointly by variable projection.
+so the play operators act on log(u + offset); and braid and rubber creep, so the output goes on moving
+while the input is held. Everything is identified jointly by variable projection. The offset is searched
+from the lowest pressure recorded on, so that absolute and gauge pressure give the same model.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from mckibben import DataError, Recording, study
 from mckibben.blocks.force.activation import ActivationPressure
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.force.laws import ChouHannaford, TonduLopez
-from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
+from mckibben.blocks.force.multistate_friction import EACH_WAY, ELEVEN, MultistateFriction
 from mckibben.estimators.coupled.balance_force import BalanceForceEstimator
 from mckibben.estimators.force.activation import ActivationPressureEstimator
 from mckibben.estimators.force.laws import (
@@ -86,6 +86,27 @@ def test_friction_is_recovered_to_the_noise() -> None:
     table, truth = fit.model_.table(), TRUTH.table()
     # what lengthening feels from the bottom on, and shortening from the top on, is determined
     assert table[:, 2].sum() == pytest.approx(truth[:, 2].sum(), rel=0.05)
+
+
+def test_more_parameters_of_friction_are_never_worse() -> None:
+    from mckibben.estimators.force.multistate import Multistate11Estimator, Multistate18Estimator
+
+    # springs that motion unloads, which no element with an F_c in both directions is
+    model = MultistateFriction(ELEVEN, printed("multistate-friction").values, initial="virgin")
+    given = isobaric()
+    one = given.with_channels(force=model.simulate(given)["force"])
+    kinds = Multistate11Estimator, Multistate18Estimator
+    few: dict[str, Any] = {"static": None, "n_starts": 8, "n_refined": 2}
+    eleven, eighteen = (kind(**few).fit(one).diagnostics_.rmse for kind in kinds)
+    assert eighteen <= eleven
+
+
+def test_a_released_element_has_no_force_where_it_is_inactive() -> None:
+    element = MultistateFriction(("shortening-released",), (10.0, 0.01, 50.0), initial="virgin")
+    length = np.concatenate([np.linspace(0.0, -8.0, 100), np.linspace(-8.0, 0.0, 100)])
+    force = element.simulate(Recording({"length": length, "pressure": 0 * length}, 0.02))["force"]
+    assert force[99] == pytest.approx(-50.0, rel=1e-6)
+    assert np.abs(force[101:]).max() < 1e-6
 
 
 def sines(frequency: float, force: float) -> Recording:
@@ -261,3 +282,14 @@ def test_a_scaled_law_is_printed_by_the_length_itself() -> None:
     lengths = np.linspace(184.0, 200.0, 9)
     for ours, theirs in zip(plain.terms(lengths), law.terms(lengths), strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1e-8)
+
+
+def test_the_printed_swarm_comes_to_where_least_squares_comes() -> None:
+    from mckibben.estimators.force.activation import ActivationPressureEstimator
+
+    runs = [sines(frequency, force) for frequency in (0.5, 2.0) for force in (0.0, 100.0, 300.0)]
+    least, swarm = (
+        ActivationPressureEstimator(method=method).fit(runs).diagnostics_.rmse
+        for method in ("ls", "pso")
+    )
+    assert swarm == pytest.approx(least, rel=0.01, abs=1e-4)

@@ -6,17 +6,21 @@ import re
 import subprocess
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
+import click
 import numpy as np
 import pytest
 
 from mckibben import Recording, registry
 from mckibben.checkpoints import Checkpoints
+from mckibben.cli.main import app
 from mckibben.errors import DataError, ModelError
-from mckibben.papers.experiment import Experiment, Labels, Runs, reproduce
+from mckibben.papers.experiment import Experiment, Labels, Runs, Verdict, reproduce
 from mckibben.papers.paper import Paper, paper, papers
 from mckibben.report.reproduction import comparison, drawing, heading, markdown, reproduction_page
-from mckibben.rigs import rig_names
+from mckibben.rigs import load_rig, rig_names
+from mckibben.signals.protocol import protocol
 
 ROOT = Path(__file__).parents[2]
 PAGES = ROOT / "docs" / "papers"
@@ -72,6 +76,41 @@ def test_every_line_of_an_index_leads_somewhere(name: str) -> None:
     assert {key for key, of in redrawn.items() if of} <= listed
 
 
+MODELLED = {
+    "activation-pressure": {"contraction"},
+    "field-models": {"pressure"},
+    "mpi-narmax": {"voltage"},
+    "multistate-friction": {"length", "pressure"},  # the latter is the input of the static law
+    "sdchm": {"pressure_1", "pressure_2", "pressure_3"},
+}
+"""What each paper's models are driven by."""
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_commands_of_an_index_are_whole_and_fit_what_the_paper_fits(name: str) -> None:
+    rig = load_rig(protocol(name).rig)
+    channels = sorted({*rig.inputs, *rig.outputs, *paper(name).channels})
+    waves = np.random.default_rng(0).uniform(1.0, 2.0, (len(channels), 100))
+    whole = Recording(dict(zip(channels, waves, strict=True)), 0.1)
+    still = {one: np.ones(100) for one in rig.inputs}
+    alone = [whole.with_channels(**still | {one: whole[one]}) for one in rig.inputs]
+    for words in (item.command.split() for item in paper(name).items if item.command):
+        command: Any = app
+        for word in words[1:]:
+            if isinstance(command, click.Group):
+                command = command.get_command(click.Context(app), word)
+        wanted = [{*one.opts} for one in command.params if one.required and one.opts[0][0] == "-"]
+        assert all(options & {*words} for options in wanted), words
+        if words[1] == "fit":
+            given = {side: words[words.index(side) + 1] for side in words if side[:2] == "--"}
+            model = registry.load("estimators", words[2])
+            found = model.resolved(
+                [whole, *alone], given.get("--input"), given.get("--output"), None
+            )
+            assert model.objection([whole, *alone], found) is None, words
+            assert {*model.own_roles(found).inputs} <= MODELLED[name], words
+
+
 @pytest.mark.parametrize("name", PAPERS)
 def test_pages_are_of_full_runs_after_the_last_change_of_what_they_report(name: str) -> None:
     text = (PAGES / f"{name}.md").read_text(encoding="utf-8")
@@ -121,8 +160,12 @@ def test_a_sentence_without_its_facts_is_left_out_and_models_that_warn_are_named
     assert "1.50 mm" in found.summary[0]
     assert found.paper.quick in found.notes
     loaded = experiment("mpi-narmax")
-    loaded.says(status_4_gains=[2.0, 3.0])
-    assert any("2.0" in sentence for sentence in loaded.done("a rig").summary)
+    gains = {"status_4_gains": [2.7, 3.0], "status_4_gains_rmse": [1.5, 2.5]}
+    for better, text in ((True, "As in"), (False, "Unlike")):
+        loaded.says(**gains, status_4_better=Verdict(better))
+        (sentence,) = loaded.done("a rig").summary
+        assert sentence.startswith(text)
+        assert "2.7" in sentence
 
 
 def test_pages_name_the_paper_and_its_figures() -> None:

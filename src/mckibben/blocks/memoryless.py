@@ -323,7 +323,7 @@ class Raised(Block):
     parameters = ("offset",)
     typical = (0.5,)
 
-    offset: Annotated[fields.NotNegative, "c [{u}]"] = 0.0
+    offset: Annotated[FiniteFloat, "c [{u}]"] = 0.0
     input: fields.ChannelField = fields.PRESSURE
     output: fields.ChannelField = fields.PRESSURE
 
@@ -339,7 +339,7 @@ class Logarithm(Raised):
     Parameters
     ----------
     offset : float
-        Added to the input, in its unit; not negative.
+        Added to the input, in its unit.
     input, output : Channel
         Channel driven and channel given.
     """
@@ -359,7 +359,7 @@ class Exponential(Raised):
     Parameters
     ----------
     offset : float
-        Taken off the exponential; not negative.
+        Taken off the exponential.
     input, output : Channel
         Channel driven and channel given.
     """
@@ -368,7 +368,7 @@ class Exponential(Raised):
     kernel = exponential_step
     formulas = ("y = e^{u} - c",)
 
-    offset: Annotated[fields.NotNegative, "c [{y}]"] = 0.0
+    offset: Annotated[FiniteFloat, "c [{y}]"] = 0.0
 
     def inverse(self) -> Block:
         return Logarithm(self.offset, self.output, self.input)

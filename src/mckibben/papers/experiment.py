@@ -126,6 +126,18 @@ class Fitted:
     search: tuple[float, ...] = field(default=(), compare=False)
 
 
+class Verdict(NamedTuple):
+    """Whether a result agrees with what the paper concludes.
+
+    A sentence has a text for either case: ``{order:As in|Unlike} the paper``.
+    """
+
+    agrees: bool
+
+    def __format__(self, texts: str) -> str:
+        return texts.split("|")[not self.agrees]
+
+
 class Labels(NamedTuple):
     """Role of a recording, and labels as in the paper's protocol (stage, load, frequency)."""
 

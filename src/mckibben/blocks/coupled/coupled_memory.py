@@ -34,18 +34,19 @@ def coupled_memory_step(coefficients: Array, state: Array, inputs: Array, output
     """Advance lags, then play operators, then the readout.
 
     Coefficients are [lags, thresholds, degree, crossed, decays, thresholds (inputs by thresholds),
-    readout].
+    origin, readout].
     """
     n, n_out = inputs.size, outputs.size
     n_lags, m, degree = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
     decays = coefficients[4 : 4 + n_lags]
     radii = coefficients[4 + n_lags : 4 + n_lags + n * m]
-    readout = coefficients[4 + n_lags + n * m :]
+    origin = coefficients[4 + n_lags + n * m : 4 + n_lags + n * m + n]
+    readout = coefficients[4 + n_lags + n * m + n :]
     width = readout.size // n_out
     for lag in range(n_lags):
         for i in range(n):
             place = lag * n + i
-            state[place] += (1.0 - decays[lag]) * (inputs[i] - state[place])
+            state[place] += (1.0 - decays[lag]) * (inputs[i] - origin[i] - state[place])
             x = state[place]
             plays = state[n_lags * n + place * m :]
             for k in range(m):
@@ -79,12 +80,13 @@ def coupled_memory_step(coefficients: Array, state: Array, inputs: Array, output
 
 @kernel
 def coupled_memory_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start at rest at the first inputs, reached from zero, or with all states zero."""
+    """Start at rest at the first inputs, reached from their origin, or with all states zero."""
     n, n_lags, m = inputs.size, int(coefficients[0]), int(coefficients[1])
     radii = coefficients[4 + n_lags : 4 + n_lags + n * m]
+    origin = coefficients[4 + n_lags + n * m : 4 + n_lags + n * m + n]
     for lag in range(n_lags):
         for i in range(n):
-            x = 0.0 if virgin else inputs[i]
+            x = 0.0 if virgin else inputs[i] - origin[i]
             state[lag * n + i] = x
             plays = state[n_lags * n + (lag * n + i) * m :]
             start_operators(radii[i * m : (i + 1) * m], x, x, True, plays)
@@ -110,10 +112,12 @@ class CoupledMemory(Block):
         Inputs driven, those that schedule (treated alike), and outputs.
     crossed : bool
         Whether there are products of inputs with other lags and plays.
+    origin : sequence of n float
+        Of every input, from which it counts; by default 0.
     """
 
     kind = "coupled-memory"
-    added: ClassVar[Mapping[str, int]] = {"crossed": 2}
+    added: ClassVar[Mapping[str, int]] = {"crossed": 2, "origin": 2}
     ports = SEVERAL
     kernel = coupled_memory_step
     start_kernel = coupled_memory_start
@@ -121,7 +125,7 @@ class CoupledMemory(Block):
     no_inverse = "has no inverse: its lags cannot be inverted within a sample"
     instead = "invert balance or sdchm, or close a loop"
     formulas = (
-        r"\tau_l \dot{x}_{li} = u_i - x_{li},\quad z_{lik} = F_{r_{ik}}[x_{li}]",
+        r"\tau_l \dot{x}_{li} = u_i - u_{0i} - x_{li},\quad z_{lik} = F_{r_{ik}}[x_{li}]",
         r"y_j = \sum_k R_{jk} \phi_k,\quad \phi = \left(1,\; x,\; z,\; x_{1i} x_{1k},\; "
         r"x_{1i} x_{1k} x_{1q},\; x_{1i} x_{lk},\; x_{1i} z_{lkm}\right)",
     )
@@ -134,6 +138,7 @@ class CoupledMemory(Block):
     scheduled: Annotated[Channels, "u_i"]
     given: Annotated[Channels, "y_j"]
     crossed: bool = False
+    origin: Annotated[Vector, "u_{0i} [{in0}]"] = ()
 
     def __post_init__(self) -> None:
         self.check_channels()
@@ -148,6 +153,10 @@ class CoupledMemory(Block):
                 f"{self.kind!r} of {n} inputs has thresholds of "
                 f"{[len(row) for row in self.thresholds]}",
                 remedy="give as many for each input",
+            )
+        if len(self.origin) not in (0, n):
+            raise ModelError(
+                f"{self.kind!r} of {n} inputs has {len(self.origin)} origins", remedy=f"give {n}"
             )
         width = readout_width(n, len(self.lags), len(self.thresholds[0]), self.degree, self.crossed)
         if len(self.readout) != len(self.given) or any(len(row) != width for row in self.readout):
@@ -170,7 +179,8 @@ class CoupledMemory(Block):
         head = [len(self.lags), len(self.thresholds[0]), self.degree, self.crossed]
         decays = [math.exp(-step / tau) if tau else 0.0 for tau in self.lags]
         radii = np.array(self.thresholds).ravel()
-        return np.concatenate([head, decays, radii, self.pack()])
+        origin = self.origin or np.zeros(len(self.inputs))
+        return np.concatenate([head, decays, radii, origin, self.pack()])
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
         if field != "readout":

@@ -13,7 +13,8 @@ k / sigma is thousands per second, so nothing is stepped: over a sample v is con
 element sticks x grows with v, while it slips x tends to F_c / k as an exponential, and the time at
 which one ends is in closed form. An element that acts in one direction only is unloaded by
 motion in the other: its spring goes back with the length until it is slack, and its force with it. (The
-paper leaves this open; without, the force would jump at every reversal.)
+paper leaves this open.) To the letter of Eq. (5) such an element has F_c = 0 there, so that Eq. (4) lets
+its spring go at once and the force jumps at every reversal: that is "shortening-released".
 
 Ours: friction may grow in proportion to pressure, f (1 + pressure_gain (p - reference));
 pressure_gain 0 is the paper's model.
@@ -38,7 +39,7 @@ from mckibben.blocks.parameters import one_per
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError
 
-Direction = Literal["shared", "both", "lengthening", "shortening"]
+Direction = Literal["shared", "both", "lengthening", "shortening", "shortening-released"]
 WAYS = ("lengthening", "shortening")
 QUANTITIES = ("k [N/mm]", "sigma [N s/mm]", "F_c [N]")
 """Parameters of an element in one direction; lengthening first, then shortening."""
@@ -48,14 +49,19 @@ PLACES: dict[Direction, tuple[int, ...]] = {
     "both": (0, 1, 2, 3, 4, 5),
     "lengthening": (0, 1, 2),
     "shortening": (3, 4, 5),
+    "shortening-released": (3, 4, 5),
 }
 """Which of these six parameters an element has. A direction without its own takes k and sigma of
 the other direction, and no F_c.
 """
 
+LET_GO = 1e-30
+"""F_c of a released element where it is inactive [N]: as good as none, where 0 marks unloaded ones."""
+
 SIZES = {element: len(places) for element, places in PLACES.items()}
 ELEVEN: tuple[Direction, ...] = ("shared", "shortening", "shortening")
 EACH_WAY: tuple[Direction, ...] = ("shared", "lengthening", "shortening")
+RELEASED: tuple[Direction, ...] = ("shared", "shortening-released", "shortening-released")
 EIGHTEEN: tuple[Direction, ...] = ("both", "both", "both")
 
 
@@ -150,9 +156,9 @@ class MultistateFriction(ForceByLength, Block):
 
     Parameters
     ----------
-    elements : sequence of {"shared", "both", "lengthening", "shortening"}
+    elements : sequence of {"shared", "both", "lengthening", "shortening", "shortening-released"}
         What each element is: in both directions with one stiffness, in both with two, or in one
-        only.
+        only, unloaded by motion in the other or released at once.
     values : sequence of float
         For every element, in order, its positive numbers: k [N/mm], sigma [N s/mm] and F_c [N]
         lengthening, then shortening; "shared" leaves the second k out.
@@ -242,13 +248,14 @@ class MultistateFriction(ForceByLength, Block):
         ]
 
     def table(self) -> Array:
-        """Return k, sigma and F_c lengthening and shortening, shape (n, 6), F_c 0 where inactive."""
+        """Return k, sigma and F_c lengthening and shortening, shape (n, 6), F_c 0 where unloaded."""
         table, values = np.full((len(self.elements), 6), np.nan), iter(self.values)
         for row, element in zip(table, self.elements, strict=True):
             for place in PLACES[element]:
                 row[place] = next(values)
         other = np.roll(table, 3, axis=1)
-        other[:, [2, 5]] = 0.0
+        released = [element.endswith("released") for element in self.elements]
+        other[:, [2, 5]] = np.where(released, LET_GO, 0.0)[:, np.newaxis]
         return np.where(np.isnan(table), other, table)
 
     def by_strength(self) -> tuple[Self, list[int]]:

@@ -229,7 +229,7 @@ class SeparableEstimator(Estimator):
         return errors
 
     def best_of(
-        self, setting: str, values: Sequence[float], data: TrainingData, tracker: Tracker
+        self, setting: str, values: Sequence[object], data: TrainingData, tracker: Tracker
     ) -> Block:
         """Return the block of smallest error over the values of a setting."""
         found = []

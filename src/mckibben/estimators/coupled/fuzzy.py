@@ -188,6 +188,9 @@ def fit_network(
     Channels are those driven, those that schedule, and the outputs; its inverse ends a share ``beyond``
     of the range of each driven one away from the data.
     """
+    # damped from the least of every input on, which a constant makes up for, inputs may have any zero
+    origin = x.min(axis=0) if solver.constants else np.zeros(x.shape[1])
+    x = x - origin
     keep = np.linspace(0, len(x) - 1, min(len(x), search.samples)).round().astype(int)
     problem = Problem(x[keep], y[keep], solver)
     if search.method == "pso":
@@ -202,10 +205,13 @@ def fit_network(
     n_terms = x.shape[1] + solver.constants
     driven, scheduled, given = channels
     consequents = solver.solve(gram, right, n_terms).reshape(-1, n_terms, len(given))
-    low, high = (end(x[:, : len(driven)], axis=0) for end in (np.min, np.max))
+    if solver.constants:
+        consequents[:, -1] -= np.einsum("i,rij->rj", origin, consequents[:, :-1])
+    ends = (end(x + origin, axis=0) for end in (np.min, np.max))
+    low, high = (end[: len(driven)] for end in ends)
     margin = beyond * (high - low)
     return FuzzyNetwork(
-        rows(sets.centres),
+        rows(sets.centres + origin[:, np.newaxis]),
         rows(sets.widths),
         vector(np.moveaxis(consequents, 2, 1).ravel()),
         driven,

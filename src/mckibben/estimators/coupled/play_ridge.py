@@ -2,7 +2,8 @@
 
 Linear in the readout: least squares on what a block with a unit readout gives, with a penalty that is
 chosen for every output by leaving out blocks of time, since generalized cross-validation, of one sample
-left out at a time, takes for evidence that samples which follow one another are alike.
+left out at a time, takes for evidence that samples which follow one another are alike. Inputs count from
+the least that is recorded, so that absolute and gauge pressure are penalised alike.
 
 Source: Hoerl and Kennard, "Ridge regression", Technometrics, 1970.
 """
@@ -84,7 +85,8 @@ class PlayRidgeEstimator(CoupledEstimator):
 
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
         lags = self.lags if data.sample_time is not None else (0.0,)
-        spans = np.ptp(data.stacked("inputs"), axis=0)
+        inputs = data.stacked("inputs")
+        spans = np.ptp(inputs, axis=0)
         width = readout_width(
             spans.size, len(lags), len(self.thresholds), self.degree, self.crossed
         )
@@ -97,6 +99,7 @@ class PlayRidgeEstimator(CoupledEstimator):
             data.scheduled,
             data.outputs,
             self.crossed,
+            vector(inputs.min(axis=0)),
         )
         blocks = []
         for place, run in enumerate(data.runs):

@@ -1,15 +1,15 @@
 """Identification of activation pressure: with memory, in closed form; and as in its paper.
 
 Source of the latter: "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization
-and Particle Swarm Optimization", Sections 4.2 to 4.4; gamma and phi are found by least squares where
-the paper has a particle swarm.
+and Particle Swarm Optimization", Sections 4.2 to 4.4; gamma and phi are found by least squares, or by
+the particle swarm that the paper prints.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Interval
@@ -25,6 +25,8 @@ from mckibben.estimators.core.estimator import Operators, SearchEstimator
 from mckibben.estimators.core.separable import DIFFERENCE, SeparableEstimator
 from mckibben.numerics.descent import Errors, by_differences, trust_region
 from mckibben.numerics.least_squares import solve_bounded
+from mckibben.numerics.statistics import rms
+from mckibben.numerics.swarm import Swarm, particle_swarm
 from mckibben.numerics.tracker import Tracker
 from mckibben.signals.reversals import reversals
 
@@ -138,11 +140,17 @@ pressure, and no rate terms.
 """
 
 
+PRINTED_SWARM = Swarm(50, 100, inertia=(0.4, 0.4), c1=1.5, c2=1.5)
+"""Section 4.4. The paper prints no bounds: those of the least squares."""
+
+
 class ActivationPressureEstimator(SearchEstimator):
-    """Activation pressure by characteristic points, and gamma and phi by least squares.
+    """Activation pressure by characteristic points, and gamma and phi by least squares or a swarm.
 
     Parameters
     ----------
+    method : {"ls", "pso"}
+        How gamma and phi are found: by least squares, or by the particle swarm of the paper.
     force : str
         Channel of the force.
     rate_time_constant : float, optional
@@ -161,6 +169,7 @@ class ActivationPressureEstimator(SearchEstimator):
     input_settings = ("force",)
 
     force: str = "force"
+    method: Literal["ls", "pso"] = "ls"
     rate_time_constant: Annotated[float, Ge(0)] | None = None
     frequency: Annotated[float, Ge(0)] | None = None
 
@@ -208,17 +217,23 @@ class ActivationPressureEstimator(SearchEstimator):
         rise = np.repeat(rises, [int(run.counts.sum()) for run in data.runs])
         force = data.scored(lambda run: run.scheduled[:, 0])
         largest = max(float(np.abs(force).max()), 1.0)
-        powers = np.vander(force / largest, 4)
+        # a cubic of fewer forces than four, and a slope by one frequency, are not determined
+        known = np.append(np.arange(4, 0, -1) <= len(by_force(data.runs)), np.ptp(at) > 0)
+        powers = np.vander(force / largest, 4) * known[:4]
         start = np.linalg.lstsq(powers * rate[:, np.newaxis], rest, rcond=1e-9)[0]
         width = np.maximum(np.abs(start), np.abs(start).max(initial=1e-6))
-        lower, upper = np.append(start - 2 * width, -1.0), np.append(start + 2 * width, 1.0)
+        bounds = np.append(start - 2 * width, -1.0), np.append(start + 2 * width, 1.0)
 
         def errors(point: Array) -> tuple[Array, Callable[[], Array]]:
             shape, grown = powers @ point[:4], (1 + point[4] * rise) * rate
             slopes = [powers * grown[:, np.newaxis], shape * rise * rate]
             return shape * grown - rest, lambda: np.column_stack(slopes)
 
-        found = _searched(tracker.watched(errors), np.append(start, 0.0), (lower, upper))
+        if self.method == "pso":
+            found = _swarmed(errors, bounds, tracker, self.seed)
+        else:
+            found = _searched(tracker.watched(errors), np.append(start, 0.0), bounds)
+        found = found * known
         phi = found[:4] / largest ** np.array([3, 2, 1, 0])
         slope = float(found[4]) / max(middle, 1e-9)
         return phi, (slope, 1.0 - slope * middle)
@@ -229,6 +244,16 @@ def _searched(errors: Errors, start: Array, bounds: tuple[Array, Array]) -> Arra
         errors, start, bounds=bounds, least_gain=LEAST_GAIN, max_evaluations=MOST_EVALUATIONS
     )
     return path[-1][0]
+
+
+def _swarmed(errors: Errors, bounds: tuple[Array, Array], tracker: Tracker, seed: int) -> Array:
+    """Return the best point of the paper's swarm, which starts anywhere within the bounds."""
+    start = np.random.default_rng(seed).uniform(*bounds, (PRINTED_SWARM.particles, bounds[0].size))
+
+    def costs(points: Array) -> Array:
+        return np.array([rms(errors(point)[0]) for point in points])
+
+    return particle_swarm(costs, *bounds, PRINTED_SWARM, tracker, seed, start)
 
 
 def frequencies(data: TrainingData) -> Array:

@@ -17,6 +17,7 @@ from mckibben.blocks.force.multistate_friction import (
     EIGHTEEN,
     ELEVEN,
     PLACES,
+    RELEASED,
     Direction,
     MultistateFriction,
 )
@@ -25,10 +26,16 @@ from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.force.laws import Law, force_columns, force_law
 from mckibben.numerics.multi_start import Choice
+from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording, listed
 
-Structure = Literal["eleven", "each-way", "eighteen"]
-STRUCTURES = {"eleven": ELEVEN, "each-way": EACH_WAY, "eighteen": EIGHTEEN}
+Structure = Literal["eleven", "eleven-released", "each-way", "eighteen"]
+STRUCTURES = {
+    "eleven": ELEVEN,
+    "eleven-released": RELEASED,
+    "each-way": EACH_WAY,
+    "eighteen": EIGHTEEN,
+}
 
 LEAST_SHARE = 1e-5
 """Smallest force of an element, relative to the range of the output."""
@@ -81,10 +88,11 @@ class MultistateEstimator(SeparableEstimator):
         Channel of the pressure.
     static : {"bilinear", "petrovic", "minh", "schindele"}, optional
         Law identified with the friction, or None.
-    elements : {"eleven", "each-way", "eighteen"} or sequence of directions
-        The paper's two structures, "eleven" and "eighteen"; "each-way", also of eleven parameters,
-        with one shared element, one for lengthening and one for shortening; or the direction of every
-        element: "shared", "both", "lengthening" or "shortening".
+    elements : {"eleven", "eleven-released", "each-way", "eighteen"} or sequence of directions
+        The paper's two structures, "eleven" and "eighteen", the former also with elements that let go
+        at once where they are inactive; "each-way", also of eleven parameters, with one shared element,
+        one for lengthening and one for shortening; or the direction of every element: "shared",
+        "both", "lengthening", "shortening" or "shortening-released".
     """
 
     purpose = "force"
@@ -256,6 +264,16 @@ class Multistate18Estimator(MultistateEstimator):
     """Multistate friction with three elements in both directions: eighteen parameters."""
 
     title = "Multistate friction with eighteen parameters"
-    can = "The paper's friction model of eighteen parameters."
+    can = "The paper's friction model of eighteen parameters; of eleven where these fit better."
     cannot = "Its structure is that of the paper's muscle; many parameters are poorly determined."
     elements = "eighteen"
+
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
+        """Return the better of eighteen and eleven parameters: more are never worse.
+
+        Eleven are eighteen of which two elements have no F_c lengthening, which no search over positive
+        ones comes to.
+        """
+        if self.elements != "eighteen":
+            return super().identify(data, tracker)
+        return self.best_of("elements", ("eleven", EIGHTEEN), data, tracker)

@@ -2,7 +2,8 @@
 
 Two things that rate-independent loops leave out of a pneumatic muscle: its friction grows with pressure,
 so the play operators act on log(u + offset); and braid and rubber creep, so the output goes on moving
-while the input is held. Everything is identified jointly by variable projection.
+while the input is held. Everything is identified jointly by variable projection. The offset is searched
+from the lowest pressure recorded on, so that absolute and gauge pressure give the same model.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ from mckibben.estimators.hysteresis.pi import play_operators, spread
 RAISED = 1e-5
 """Step of the logarithm of the input offset, for its derivative."""
 
-MOST_ADDED = 20.0
-"""Largest input offset, relative to the input range."""
+LEAST_ADDED, MOST_ADDED = 0.02, 20.0
+"""Smallest and largest input of the logarithm at the lowest pressure, relative to the input range."""
 
 FASTEST, SLOWEST = 3.0, 3.0
 """Bounds of the time constants: in samples, and in durations of the longest run."""
@@ -84,8 +85,8 @@ class CreepPIEstimator(SeparableEstimator):
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [weights, log addition, log time constants, compliances]."""
         n, k = self.n_operators, self.n_creep
-        low, span = data.input_range[0], data.input_span
-        least = np.log(max(0.01 * span, 0.1 - low))
+        span = data.input_span
+        least = np.log(LEAST_ADDED * span)
         step = data.timed()
         longest = max(run.u.size for run in data.runs) * step
         slow = np.log(max(SLOWEST * longest, 30 * step))
@@ -122,7 +123,7 @@ class CreepPIEstimator(SeparableEstimator):
 
     def memory(self, theta: Array, data: TrainingData) -> tuple[float, Array, Array, Array]:
         """Return the logarithm's offset, its thresholds and range, and the operators' sums there."""
-        offset = float(np.exp(theta[self.n_operators]))
+        offset = float(np.exp(theta[self.n_operators])) - data.input_range[0]
         ends = Logarithm(offset).simulate(np.array(data.input_range))
         radii = self.threshold_share * spread(self.n_operators, (ends[0], ends[1]))
         sums = [float(theta[: self.n_operators] @ (end - radii)) for end in ends]

@@ -20,12 +20,13 @@ from mckibben.papers.experiment import (
     Curves,
     Experiment,
     Runs,
+    Verdict,
     rms,
 )
 from mckibben.recording import Recording
 from mckibben.signals.protocol import protocol
 
-THEIRS, OURS = "the paper's", "ours"
+THEIRS, OURS, SWARM = "the paper's", "ours", "the paper's, by particle swarm"
 QUALITIES = ("RMSE [% of range]", "correlation")
 
 QUICK = 3
@@ -53,6 +54,7 @@ class Study:
     waves: Recordings
     printed: ActivationPressure
     found: ActivationPressure
+    swarmed: ActivationPressure
 
 
 def run(experiment: Experiment) -> None:
@@ -68,10 +70,11 @@ def run(experiment: Experiment) -> None:
     train = [*slow.values(), *sines.values()]
     experiment.tell(0.82, "the paper's model")
     theirs: Any = experiment.fit(THEIRS, "activation-pressure", train).block
+    swarm: Any = experiment.fit(SWARM, "activation-pressure", train, {"method": "pso"}).block
     experiment.tell(0.9, "ours")
     experiment.fit(OURS, "activation-memory", train)
     printed = experiment.paper.printed("activation-pressure-profile")
-    study = Study(experiment, slow, sines, waves, printed, theirs)
+    study = Study(experiment, slow, sines, waves, printed, theirs, swarm)
     _scores(study, "sines", sines)
     _scores(study, "waves", waves)
     for part in (_profile, _constants, _rates, _extremes, _loops):
@@ -107,6 +110,12 @@ def points(model: ActivationPressure, force: float) -> tuple[Array, Array]:
     return contractions, pressures
 
 
+def _percent(model: ActivationPressure, at: tuple[float, float, str], one: Recording) -> float:
+    """Return the RMSE of the paper's model over a sine of a frequency, in percent of its range."""
+    p = replace(model, frequency=at[1]).simulate(one)["pressure"]
+    return 100 * rms(p - one["pressure"]) / float(np.ptp(one["pressure"]))
+
+
 def static_rmse(model: ActivationPressure, runs: Iterable[Recording]) -> float:
     """Return the RMSE of the static pressure over runs [bar]."""
     return rms(np.concatenate([static(model, run) - run["pressure"] for run in runs]))
@@ -128,6 +137,7 @@ def _scores(study: Study, key: str, recordings: Recordings) -> None:
         facts = {"n": len(rows), "worst": worst, "at": [*rows][percents.index(worst)]}
         facts |= {"above": sum(percent > bound for percent in percents)}
         facts |= {"low": min(correlations), "high": max(correlations)}
+        facts |= {"below": Verdict(facts["above"] == 0)}
         study.experiment.says(**{f"{key}_{whose}_{name}": fact for name, fact in facts.items()})
 
 
@@ -174,17 +184,20 @@ def _rates(study: Study) -> None:
     middle, columns = float(np.mean(frequencies)), []
     panels: dict[str, dict[str, tuple[Array, Array]]]
     panels = {"gamma by frequency [Hz]": {}, "phi by force [N]": {}}
-    for whose, model in (("printed", study.printed), ("here", study.found)):
+    models = {"printed": study.printed, "here": study.found, "here, by swarm": study.swarmed}
+    for whose, model in models.items():
         scale = float(np.polyval(model.gamma, middle))
         gamma = np.polyval(model.gamma, frequencies) / scale
         phi = scale * np.polyval(model.phi, forces)
-        columns.append([model.gamma[0] / scale, *gamma.tolist(), *phi.tolist()])
+        off = [_percent(model, *one) for one in study.sines.items()]
+        columns.append([model.gamma[0] / scale, *gamma.tolist(), *phi.tolist(), rms(np.array(off))])
         panels["gamma by frequency [Hz]"][whose] = frequencies, gamma
         panels["phi by force [N]"][whose] = forces, phi
     names = ["slope of gamma [1/Hz]", *(f"gamma at {f:g} Hz" for f in frequencies)]
-    names += [f"phi at {f:.3g} N [bar s]" for f in forces]
+    names += [*(f"phi at {f:.3g} N [bar s]" for f in forces), "RMSE over all sines [% of range]"]
     rows = dict(zip(names, zip(*columns, strict=True), strict=True))
-    study.experiment.table("rates", ["printed", "here"], rows, middle=middle)
+    study.experiment.table("rates", [*models], rows, middle=middle)
+    study.experiment.says(off=dict(zip(models, rows[names[-1]], strict=True)))
     study.experiment.figure("rates", panels)
 
 
@@ -218,7 +231,8 @@ def _extremes(study: Study) -> None:
     if len(rows) > 4:  # a cubic of the force goes through the extremes at four forces exactly
         experiment.table("distance", columns, rows)
         low, high = (sum(cells[k + 2] < cells[k] for cells in rows.values()) for k in (0, 1))
-        experiment.says(nearer_low=low, nearer_high=high, n_forces=len(rows))
+        nearer = Verdict(low + high == 2 * len(rows))
+        experiment.says(nearer_low=low, nearer_high=high, n_forces=len(rows), nearer=nearer)
     scatter = {"of every loop": np.vstack(local).T, "of every force": np.vstack(whole).T}
     experiment.figure("extrema", {"": {name: (x, y) for name, (x, y) in scatter.items()}})
     experiment.figure("static", static_curves)

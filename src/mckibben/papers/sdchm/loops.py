@@ -17,7 +17,7 @@ from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.fuzzy import Search, printed_swarm
 from mckibben.estimators.coupled.sdchm import learned_inverse
 from mckibben.metrics import crosstalk, loop_width
-from mckibben.papers.experiment import Cell, Curves, Experiment, Runs
+from mckibben.papers.experiment import Cell, Curves, Experiment, Runs, Verdict
 from mckibben.papers.sdchm.protocol import PERIOD
 from mckibben.recording import REFERENCE, Recording
 from mckibben.rigs import Rig
@@ -27,6 +27,7 @@ EXTENSOR = "pressure_extensor"
 PUBLISHED, INDIVIDUAL = "SDCHM, as published", "individual hysteresis"
 OURS, BALANCE = "SDCHM, ours", "balance"
 SDIHC, SINGLE, SDIHC_OURS = "SDIHC, as published", "individual inverse", "SDIHC, ours"
+PID = "PID"
 
 QUICK_SWARM, QUICK_SAMPLES, SAMPLES = {"particles": 8, "iterations": 6}, 1000, 6000
 """Of the quick run's searches; samples on which the paper's inverse network is searched else."""
@@ -83,7 +84,7 @@ def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
     scale = min(1.0, REACHED * reached / (AMPLITUDE + OFFSET))
     pid = tune_pid(rig, sample_time=step, scheduled={EXTENSOR: middle}, seed=seed)
     inverses = compensators(experiment, runs)
-    laws: dict[str, Block | Controller] = {**inverses, "PID": pid}
+    laws: dict[str, Block | Controller] = {**inverses, PID: pid}
     time = np.arange(round((1.5 if quick else 3) * PERIOD / step), dtype=np.float64) * step
     moved = dict(zip(outputs[: 1 if quick else len(MOVES)], at, strict=False))
     tasks = {f"tracking_{y[-1]}": held(outputs, y, time, p, scale) for y, p in moved.items()}
@@ -116,8 +117,30 @@ def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
         experiment.table("beyond", [*beyond], rows, **tasks["tracking_1"].facts)
     most = {name: max(worst[key, name] for key in tasks) for name in laws}
     experiment.says(tracking=", ".join(f"{name} {value:.2f} mm" for name, value in most.items()))
+    _table_5(
+        experiment, [{name: [*found[key, name].rmse.values()] for name in laws} for key in tasks]
+    )
     experiment.says(
         moved=", ".join(y[-1] for y in moved), step=1e6 * found["task", SDIHC_OURS].step_time[0]
+    )
+
+
+def _table_5(experiment: Experiment, tracked: Sequence[Mapping[str, Sequence[float]]]) -> None:
+    """Set how the paper's compensator compares with its rivals, by RMSE of every output."""
+    tables = [t for key, t in experiment.paper.tables.items() if key.startswith("tracking_")]
+    off = {name: [rmse for one in tracked for rmse in one[name]] for name in (SDIHC, SINGLE, PID)}
+    printed = {
+        name: max(cells[name] for t in tables for x, cells in t.printed.items() if "RMSE" in x)
+        for name in off
+    }
+    closer = {name: int(np.sum(np.less(off[SDIHC], off[name]))) for name in (SINGLE, PID)}
+    n = len(off[SDIHC])
+    experiment.says(
+        table_5=", ".join(f"{name} {max(own):.2f} mm" for name, own in off.items()),
+        table_5_printed=", ".join(f"{value:.2f} mm" for value in printed.values()),
+        table_5_closer=closer,
+        table_5_outputs=n,
+        table_5_first=Verdict(set(closer.values()) == {n}),
     )
 
 
@@ -189,4 +212,8 @@ def _shown(
     experiment.table(key, [*rows[name]], lines, **task.facts)
     if not alone:
         experiment.figure(key, panels)
+        printed = [experiment.paper.tables[key].printed[end][SDIHC] for end in ends]
+        steady = [rows[SDIHC][end] for end in ends]
+        within = Verdict(printed[0] <= steady[0] and steady[1] <= printed[1])
+        experiment.says(steady=steady, steady_printed=printed, steady_within=within)
     return dict(panels)

@@ -11,7 +11,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.channels import by_name
 from mckibben.metrics import err, loop_width, rmse
-from mckibben.papers.experiment import Cell, Experiment, Fitted, Runs, rms
+from mckibben.papers.experiment import Cell, Experiment, Fitted, Runs, Verdict, rms
 from mckibben.papers.sdchm import loops
 from mckibben.papers.sdchm.loops import BALANCE, OURS, PUBLISHED
 from mckibben.papers.sdchm.protocol import PATTERNS, quick
@@ -162,6 +162,8 @@ def _parts(experiment: Experiment, runs: Runs) -> None:
     gains = {f"G{i + 1}{j + 1}": [float(gain)] for (i, j), gain in every if i != j}
     radii = {"printed": experiment.paper.printed("sdchm-coupling").radius, "here": coupling.radius}
     experiment.table("gains", ["gain"], gains, **radii)
+    ends, converges = [f(*gains.values())[0] for f in (min, max)], Verdict(coupling.radius < 1)
+    experiment.says(gains=ends, radius=coupling.radius, converges=converges)
 
 
 def _off(experiment: Experiment, name: str, recordings: Sequence[Recording]) -> Array:
@@ -233,3 +235,20 @@ def _groups(experiment: Experiment, runs: Runs) -> None:
         experiment.table("groups", columns, groups, p0=min(runs.of(n, "p0") for n in names))
         experiment.figure("prediction", panels)
         experiment.table("levels", GROUPS, levels)
+        _predicted(experiment, groups)
+
+
+def _predicted(experiment: Experiment, groups: dict[str, list[Cell]]) -> None:
+    """Set how the paper's models compare in Table 4, and how large the Err of SDCHM is."""
+    theirs, raw = (GROUPS.index(name) for name in (PUBLISHED, RAW))
+    errs: Any = [row[theirs] for row in groups.values()]
+    closer = sum(row[theirs] < row[raw] for row in groups.values())  # type: ignore[operator]
+    printed = experiment.paper.tables["groups"].printed[f"Err [%], {PUBLISHED}"].values()
+    experiment.says(
+        predicted=[min(errs), max(errs)],
+        predicted_printed=[min(printed), max(printed)],
+        as_small=Verdict(max(errs) <= max(printed)),
+        closer=closer,
+        n_groups=len(groups),
+        closer_in_all=Verdict(closer == len(groups)),
+    )

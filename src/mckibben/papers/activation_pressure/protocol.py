@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.recording import Recording
-from mckibben.rigs import Rig
+from mckibben.rigs import Rig, share
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
@@ -39,10 +39,7 @@ RANDOM_TIME = 20.0
 
 def activation_pressure(rig: Rig | None = None) -> Protocol:
     """Return slow cycles, sines and random waves at every force, in shares of the ranges of a rig."""
-    stronger, wider = 1.0, 1.0
-    if rig is not None:
-        stronger = rig.limits("force").high / FORCES[-1]
-        wider = rig.limits("pressure").high / RANGE
+    stronger, wider = share(rig, "force", FORCES[-1]), share(rig, "pressure", RANGE)
     runs = []
     for paper_force in FORCES:
         force = stronger * paper_force

@@ -7,10 +7,13 @@ that training does not repeat.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.recording import Recording
+from mckibben.rigs import Rig, share
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine, triangle
 from mckibben.signals.loads import pulls, ramps
@@ -22,49 +25,64 @@ SAMPLE_TIME, TIME = 0.001, 60.0
 LOW, HIGH = 0.1, 10.0
 """Dead zone of the regulator and highest voltage [V]."""
 
+STRONGEST = 300.0
+"""Highest force of the rig [N], of which weights and pulls are shares."""
+
 PULLED_FROM = 20.0
 """At which the force begins while the voltage is held [s]."""
 
 
-def mpi_narmax() -> Protocol:
-    """Return statuses 1 to 4, the training pulls, the runs of Figures 1 to 3, and random ones."""
-    runs = [
-        _moving("status-1", "train", "status", 0.1, status=1),
-        _moving("status-2", "train", "weight", 0.2, mass=10.04, status=2),
-        _moving("status-3", "train", "weight", 0.2, mass=21.75, status=3),
-        _moving("training-pulls-100N", "train", "pulls", 0.1, hand=100.0),
-        _moving("status-4", "test", "pulls", 0.22, hand=150.0, status=4),
-    ]
+def mpi_narmax(rig: Rig | None = None) -> Protocol:
+    """Return statuses 1 to 4, the training pulls, the runs of Figures 1 to 3, and random ones.
+
+    On another rig voltages (or pressures, if these drive it) are in proportion to its highest, weights
+    and pulls to its highest force.
+    """
+    drive = "voltage" if rig is None else rig.inputs[0]
+    wide, strong = share(rig, drive, HIGH), share(rig, "force", STRONGEST)
+
+    def add(
+        name: str, role: Role, volts: Array, newtons: Array, mass: float = 0.0, **labels: Any
+    ) -> None:
+        inputs = Recording({drive: wide * volts, "force": strong * newtons}, SAMPLE_TIME)
+        settings = {"payload": round(strong * mass, 6), f"start.{drive}": wide * LOW}
+        runs.append(PlannedRun(name, role, inputs, settings, labels))
+
+    def moving(
+        name: str,
+        role: Role,
+        stage: str,
+        f: float,
+        mass: float = 0.0,
+        hand: float = 0.0,
+        **status: int,
+    ) -> None:
+        duration = max(TIME, 4 / f)
+        time = np.arange(round(duration / SAMPLE_TIME)) * SAMPLE_TIME
+        wave, pulled = sine(time, 1 / f, HIGH, LOW), pulls(time, hand, duration=duration / 6)
+        add(name, role, wave, pulled, mass, stage=stage, frequency=f, **status)
+
+    runs = list[PlannedRun]()
+    moving("status-1", "train", "status", 0.1, status=1)
+    moving("status-2", "train", "weight", 0.2, mass=10.04, status=2)
+    moving("status-3", "train", "weight", 0.2, mass=21.75, status=3)
+    moving("training-pulls-100N", "train", "pulls", 0.1, hand=100.0)
+    moving("status-4", "test", "pulls", 0.22, hand=150.0, status=4)
     for f in (0.05, 0.1, 0.2):
-        runs.append(_moving(f"free-{f:g}Hz", "train", "free", f))
-        runs.append(_moving(f"weight-{f:g}Hz", "test", "weight", f, mass=91 / 9.81))
-        runs.append(_moving(f"hand-{f:g}Hz", "test", "pulls", f, hand=100.0))
+        moving(f"free-{f:g}Hz", "train", "free", f)
+        moving(f"weight-{f:g}Hz", "test", "weight", f, mass=91 / 9.81)
+        moving(f"hand-{f:g}Hz", "test", "pulls", f, hand=100.0)
     time = np.arange(round(TIME / SAMPLE_TIME)) * SAMPLE_TIME
     pulled = np.where(time < PULLED_FROM, 0.0, triangle(time, 20.0, 150.0))
     for volt in (2.0, 4.0, 6.0, 8.0, 10.0):
         # From the lowest voltage on, so that a model knows how the muscle came there.
-        labels = {"stage": "held", "level": volt, "start": PULLED_FROM}
-        wave = ramps(time, (0.0, 10.0), (LOW, volt))
-        runs.append(PlannedRun(f"held-{volt:g}V", "test", _inputs(wave, pulled), labels=labels))
+        wave, level = ramps(time, (0.0, 10.0), (LOW, volt)), wide * volt
+        add(f"held-{volt:g}V", "test", wave, pulled, stage="held", level=level, start=PULLED_FROM)
     roles: tuple[Role, ...] = ("train", "train", "test")
     for seed, role in enumerate(roles, start=1):
         wave = random_wave(time, 0.2, HIGH, LOW, seed=seed)
-        inputs = _inputs(wave, random_wave(time, 0.2, 200.0, seed=100 + seed))
-        runs.append(PlannedRun(f"random-{seed}", role, inputs, labels={"stage": "random"}))
+        pulled = random_wave(time, 0.2, 200.0, seed=100 + seed)
+        add(f"random-{seed}", role, wave, pulled, stage="random")
     source = "Actuators 2022, 11(2), 51, doi:10.3390/act11020051, Sections 2 and 4"
     notes = "How the hand pulls three times is ours: the paper gives the peaks. So are random runs."
     return Protocol("mpi-narmax", "rail", source, tuple(runs), notes)
-
-
-def _inputs(voltage: Array, force: Array) -> Recording:
-    return Recording({"voltage": voltage, "force": force}, SAMPLE_TIME)
-
-
-def _moving(
-    name: str, role: Role, stage: str, f: float, mass: float = 0.0, hand: float = 0.0, **status: int
-) -> PlannedRun:
-    duration = max(TIME, 4 / f)
-    time = np.arange(round(duration / SAMPLE_TIME)) * SAMPLE_TIME
-    inputs = _inputs(sine(time, 1 / f, HIGH, LOW), pulls(time, hand, duration=duration / 6))
-    labels = {"stage": stage, "frequency": f, "mass": mass, "hand": hand, **status}
-    return PlannedRun(name, role, inputs, {"payload": round(mass, 6)}, labels)

@@ -12,7 +12,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.recording import Recording
-from mckibben.rigs import Rig
+from mckibben.rigs import Rig, share
 from mckibben.signals.excitations import irregular_triangle, triangle
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
 
@@ -41,7 +41,8 @@ VENTING, RISE = 10.0, 60.0
 def multistate_friction(rig: Rig | None = None) -> Protocol:
     """Return the isometric runs, the isobaric cycles, and one with minor loops.
 
-    On another test stand lengths are in proportion to its length at the start, pressures to its highest.
+    On another test stand lengths are in proportion to its length at the start, pressures to its highest;
+    one of less pressure contracts less, as far as the paper's muscle would at that pressure.
     """
     wide, strong = 1.0, 1.0
     if rig is not None:
@@ -49,7 +50,10 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
             remedy = "change a copy of the rig mas10-test-stand"
             raise DataError(f"the rig {rig.name!r} imposes no length", remedy=remedy)
         wide = rig.start.get("length", rig.limits("length").high) / LONGEST
-        strong = rig.limits("pressure").high / HIGHEST
+        strong = share(rig, "pressure", HIGHEST)
+    weak = min(strong, 1.0)
+    depths = [LONGEST - length for length in LENGTHS]
+    turns = [0.0, *SHORTEST], [0.0, *(LONGEST - shortest for shortest in SHORTEST.values())]
     runs = list[PlannedRun]()
 
     def add(name: str, role: Role, bars: Array, lengths: Array, lead: float = 0.0) -> None:
@@ -63,16 +67,19 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
     time = _time(lead + RISE)
     swung = SWING * np.clip(1.0 - time / (SWINGS * SWING_PERIOD), 0.0, 1.0)
     swinging = swung * np.sin(2 * np.pi * time / SWING_PERIOD)
-    for length, first in LENGTHS.items():
+    for first in LENGTHS.values():
+        length = LONGEST - float(np.interp(weak * first, [*LENGTHS.values()], depths))
         rising = np.interp(time, (lead - VENTING, lead, lead + RISE), (HIGHEST, first, HIGHEST))
         lengths = np.minimum(length + swinging, LONGEST)
         add(f"isometric-{wide * length:.4g}mm", "train", rising, lengths, lead)
-    for bar, shortest in SHORTEST.items():
-        period = 2 * (LONGEST - shortest) / SPEED
-        gone = triangle(_time(CYCLES * period), period, LONGEST - shortest)
+    for bar in SHORTEST:
+        depth = float(np.interp(weak * bar, *turns))
+        period = 2 * depth / SPEED
+        gone = triangle(_time(CYCLES * period), period, depth)
         role: Role = "train" if bar == IDENTIFIED_AT else "test"
         add(f"isobaric-{strong * bar:.3g}bar", role, np.full(gone.size, bar), LONGEST - gone)
-    gone = irregular_triangle(_time(120.0), 13, LONGEST - SHORTEST[IDENTIFIED_AT], seed=4)
+    depth = float(np.interp(weak * IDENTIFIED_AT, *turns))
+    gone = irregular_triangle(_time(120.0), 13, depth, seed=4)
     held = np.full(gone.size, IDENTIFIED_AT)
     add("isobaric-minor-loops", "test", held, LONGEST - gone)
     return Protocol(

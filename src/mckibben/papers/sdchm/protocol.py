@@ -17,12 +17,15 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.recording import Recording
+from mckibben.rigs import Rig, share
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
 
 PERIOD, HIGHEST = 50.0, 2.5
 """Of every sine [s], and the pressure that all muscles withstand [bar], Table 1."""
+
+EXTENSOR = "pressure_extensor"
 
 PATTERNS = ("1", "2", "3", "123")
 """Muscles that are driven together; the others have no pressure."""
@@ -70,8 +73,11 @@ QUICK_RUNS = (
 """How names of runs begin that the quick run records."""
 
 
-def sdchm() -> Protocol:
-    """Return all runs: identification, network, prediction, coupling, stiffness, joint random."""
+def sdchm(rig: Rig | None = None) -> Protocol:
+    """Return all runs: identification, network, prediction, coupling, stiffness, joint random.
+
+    On another arm pressures are in proportion to its highest, that of the extensor to its own.
+    """
     runs = [
         _sines(stage, role, d, p0, peaks)
         for stage, role, patterns, levels, peaks in STAGES
@@ -79,20 +85,30 @@ def sdchm() -> Protocol:
         for d in patterns
     ]
     runs += [_joint(role, number, p0) for role in JOINT for number, p0 in enumerate(JOINT[role])]
+    shares = share(rig, "pressure_1", HIGHEST), share(rig, EXTENSOR, HIGHEST)
     return Protocol(
         name="sdchm",
         rig="soft-arm",
         source="Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for "
         "Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator, Sections 2.2 and 5.1",
-        runs=tuple(runs),
+        runs=tuple(_scaled(run, *shares) for run in runs),
         notes="Sines start at their minimum; network runs have cycles of (1.5, 2.5) bar. "
         "Runs with all pressures random are ours.",
     )
 
 
-def quick() -> tuple[Protocol, list[str]]:
+def _scaled(run: PlannedRun, of_muscles: float, of_extensor: float) -> PlannedRun:
+    """Return a run with its pressures in proportion; its name has the paper's."""
+    factors = {name: of_muscles for name in run.inputs.channels} | {EXTENSOR: of_extensor}
+    waves = {name: factor * run.inputs[name] for name, factor in factors.items()}
+    p0 = of_extensor * run.labels["p0"]
+    labels, start = {**run.labels, "p0": p0}, {f"start.{EXTENSOR}": p0}
+    return replace(run, inputs=Recording(waves, run.inputs.step), settings=start, labels=labels)
+
+
+def quick(rig: Rig | None = None) -> tuple[Protocol, list[str]]:
     """Return the protocol with shortened runs, and the names of the runs of a quick run."""
-    whole = sdchm()
+    whole = sdchm(rig)
     names = [run.name for run in whole.runs if run.name.startswith(QUICK_RUNS)]
     return replace(whole, name="sdchm-quick", runs=tuple(map(_shortened, whole.runs))), names
 
@@ -108,10 +124,10 @@ def _sines(stage: str, role: Role, driven: str, p0: float, peaks: Sequence[float
     rate = 50.0 if stage == "hysteresis" else 20.0
     wave = sine(np.arange(round(PERIOD * len(peaks) * rate)) / rate, PERIOD, peaks)
     channels = {f"pressure_{k}": wave if k in driven else 0.0 * wave for k in "123"}
-    inputs = Recording(channels | {"pressure_extensor": np.full(wave.size, p0)}, 1 / rate)
+    inputs = Recording(channels | {EXTENSOR: np.full(wave.size, p0)}, 1 / rate)
     name = NAMES.get(stage, f"{stage}-p0-{{p0}}-drive-{{d}}").format(d=driven, p0=p0)
     labels = {"stage": stage, "p0": p0, "driven": driven}
-    return PlannedRun(name, role, inputs, {"start.pressure_extensor": p0}, labels)
+    return PlannedRun(name, role, inputs, {}, labels)
 
 
 def _joint(role: Role, number: int, p0: float | None) -> PlannedRun:
@@ -122,8 +138,8 @@ def _joint(role: Role, number: int, p0: float | None) -> PlannedRun:
     moving = random_wave(time, 0.02, HIGHEST, seed=seed)
     extensor = moving if p0 is None else np.full(time.size, p0)
     channels = {f"pressure_{k}": wave for k, wave in waves.items()}
-    inputs = Recording(channels | {"pressure_extensor": extensor}, 1 / 20.0)
+    inputs = Recording(channels | {EXTENSOR: extensor}, 1 / 20.0)
     start, kind = float(extensor[0]), "moving" if p0 is None else "constant"
     name = f"joint-{role}-moving-{number}" if p0 is None else f"joint-{role}-p0-{p0}"
     labels = {"stage": "joint", "p0": start, "driven": "123", "extensor": kind}
-    return PlannedRun(name, role, inputs, {"start.pressure_extensor": start}, labels)
+    return PlannedRun(name, role, inputs, {}, labels)

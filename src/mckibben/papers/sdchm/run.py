@@ -36,7 +36,7 @@ Panels = dict[str, dict[str, tuple[Array, Array]]]
 
 def run(experiment: Experiment) -> None:
     """Record the patterns, identify the coupled models, predict, and track with their inverses."""
-    runs = experiment.record(*(quick() if experiment.quick else ()))
+    runs = experiment.record(*(quick(experiment.rig) if experiment.quick else ()))
     _motions(experiment, runs)
     _fits(experiment, runs)
     _parts(experiment, runs)

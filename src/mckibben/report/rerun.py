@@ -12,7 +12,7 @@ from mckibben.errors import DataError
 from mckibben.files.sources import inside
 from mckibben.options import ReadOptions
 from mckibben.outputs import results_in
-from mckibben.papers.experiment import Progress, Reproduction, reproduce
+from mckibben.papers.experiment import Progress, Reproduction, Table, recognise, reproduce
 from mckibben.papers.paper import paper
 from mckibben.reading import read_files
 from mckibben.recording import Recording
@@ -34,14 +34,20 @@ def rerun(
     jobs: int | None = None,
     force: bool = False,
     progress: Progress | None = None,
+    recognised: Callable[[Table], None] | None = None,
 ) -> Reproduction:
     """Re-run a paper's experiment on a rig or on a folder of recordings, and write its report.
 
     It runs in a process of its own, which can be ended whatever it is at. Parameters are those of
-    `reproduce`; ``out`` is the folder for ``report.html`` and ``tables.json``.
+    `reproduce`; ``out`` is the folder for ``report.html`` and ``tables.json``, and ``recognised`` is
+    called with the table of which run each recording is, before anything is fitted.
     """
     paper(name)
     runs = None if data is None else _recordings(data, reading)
+    if runs is not None:
+        table = recognise(name, runs).table  # refuses what is missing, too
+        if recognised is not None:
+            recognised(table)
     given: dict[str, Any] = {
         "name": name,
         "rig": None if rig is None else load_rig(rig),

@@ -7,13 +7,17 @@ irregular turning points to test.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.papers.recognising import Labels
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, share
 from mckibben.signals.excitations import irregular_triangle, triangle
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
+from mckibben.signals.seen import Seen
 
 SAMPLE_TIME = 0.02
 PERIOD = 10.0
@@ -49,3 +53,11 @@ def field_models(rig: Rig | None = None) -> Protocol:
 def _run(name: str, role: Role, wave: Array) -> PlannedRun:
     start = {"start.pressure": float(wave[0])}
     return PlannedRun(name, role, Recording({"pressure": wave}, SAMPLE_TIME), start)
+
+
+def recognised(runs: Sequence[Seen]) -> list[Labels]:
+    """Return which run calibrates, by cycles of equal times, and which tests, by irregular ones."""
+    roles: list[Role] = ["train" if one.regular("pressure") else "test" for one in runs]
+    if len({*roles}) == 1:  # signals of other shapes, told apart by their names, or their order
+        roles = [one.hint or ("test" if k else "train") for k, one in enumerate(runs)]
+    return [Labels(role, {}) for role in roles]

@@ -15,11 +15,8 @@ from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.ranking import compare
 from mckibben.errors import MckibbenError, ModelError
 from mckibben.metrics import score
-from mckibben.papers.experiment import (
-    Cell,
-    Curves,
-    Experiment,
-)
+from mckibben.papers.experiment import Cell, Curves, Experiment
+from mckibben.papers.field_models.protocol import HIGH, LOW
 from mckibben.papers.paper import paper
 from mckibben.recording import Recording
 
@@ -33,20 +30,26 @@ PRINTED_PI, PRINTED_P2UZ = "field-models-pi", "field-models-p2uz"
 NARX, BJ, P2UZ, SLOPES = PAPERS = ("NARX", "BJ", "P2UZ", "PI")
 LEAST_SQUARES = "PI by least squares, ours"
 
+OWN_SPAN = 0.1
+"""Difference from the paper's span of pressure, relative to it, up to which its thresholds stay."""
+
 FAILED = [np.inf, -np.inf, np.inf, -np.inf]
 """RMSE and fitness on calibration, then on test, of a seed that gave no model."""
 
 
-def methods() -> dict[str, tuple[str, dict[str, Any]]]:
+def methods(span: float) -> dict[str, tuple[str, dict[str, Any]]]:
     """Return the paper's four methods as published, and its PI model by least squares.
 
     Of the NARX model the paper prints neither regressors nor mapping: this one is a sigmoid network on
     two past outputs and inputs, one sample late, fitted to one-step errors, of five starts the one with
     the least free-running error. Box-Jenkins has the printed orders, Eqs. (6) to (9): B has terms in q^0
-    and q^-2. Like P2UZ it starts at rest, as the muscle does. PI has the printed thresholds, and weights
-    by the slopes of segments, Eqs. (14) and (15).
+    and q^-2. Like P2UZ it starts at rest, as the muscle does. PI has the printed thresholds, in proportion
+    where the pressure has another span than the paper's, and weights by the slopes of segments, Eqs. (14)
+    and (15).
     """
-    thresholds = paper("field-models").models[PRINTED_PI]["thresholds"]
+    share = 1.0 if abs(span / (HIGH - LOW) - 1) < OWN_SPAN else span / (HIGH - LOW)
+    printed = paper("field-models").models[PRINTED_PI]["thresholds"]
+    thresholds = [share * r for r in printed]
     network = {"n_units": 10, "delay": 1, "refine": False, "allow_unstable": True, "n_starts": 5}
     return {
         NARX: ("narx-network", network),
@@ -128,13 +131,12 @@ def matched(model: Block, recording: Recording) -> Series:
 def _tried(
     experiment: Experiment, train: Recording, test: Recording, seeds: range
 ) -> dict[str, MethodResult]:
-    tell, every = experiment.within(0.05, 0.3), methods()
+    every = methods(float(np.ptp(np.percentile(train["pressure"], (1, 99)))))
     found: dict[str, MethodResult] = {}
-    for place, (name, (model, settings)) in enumerate(every.items()):
+    for name, (model, settings) in experiment.steps(0.05, 0.3, [*every.items()]):
         models: list[tuple[Block, Series]] = []
         errors, failures = [], []
-        for at, seed in enumerate(seeds):
-            tell((place + at / len(seeds)) / len(every), f"{name}, seed {seed}")
+        for seed in seeds:
             try:
                 own = settings | {"seed": seed}
                 plain = experiment.fit(f"{name} {seed}", model, train, own).block

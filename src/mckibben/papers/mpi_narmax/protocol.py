@@ -7,17 +7,21 @@ that training does not repeat.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.errors import DataError
+from mckibben.papers.recognising import Labels
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, share
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine, triangle
 from mckibben.signals.loads import pulls, ramps
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
+from mckibben.signals.seen import Seen
 
 SAMPLE_TIME, TIME = 0.001, 60.0
 """Of all runs, and how long they are, but for those at 0.05 Hz [s]."""
@@ -27,6 +31,13 @@ LOW, HIGH = 0.1, 10.0
 
 STRONGEST = 300.0
 """Highest force of the rig [N], of which weights and pulls are shares."""
+
+VARYING = 4
+"""Status in which the force varies."""
+
+GRAVITY, UNLOADED, STILL = 9.81, 0.1, 0.05
+"""[m/s2]; largest force of a run without load, relative to the largest of all; largest change of an input
+that is held, relative to its range."""
 
 PULLED_FROM = 20.0
 """At which the force begins while the voltage is held [s]."""
@@ -86,3 +97,64 @@ def mpi_narmax(rig: Rig | None = None) -> Protocol:
     source = "Actuators 2022, 11(2), 51, doi:10.3390/act11020051, Sections 2 and 4"
     notes = "How the hand pulls three times is ours: the paper gives the peaks. So are random runs."
     return Protocol("mpi-narmax", "rail", source, tuple(runs), notes)
+
+
+def driven(recordings: Sequence[Recording]) -> str:
+    """Return the input common to all recordings, besides displacement and force."""
+    shared = [x for x in ("voltage", "pressure") if all(x in one for one in recordings)]
+    if not shared:
+        remedy = "add the voltage of the valve to all of them, or the pressure"
+        raise DataError("the recordings share no input", channel="voltage", remedy=remedy)
+    return shared[0]
+
+
+def recognised(runs: Sequence[Seen]) -> list[Labels]:
+    """Return stages by drive and force, and the statuses: by weight, pull and frequency."""
+    drive = driven([one.recording for one in runs])
+    strongest = max(float(np.percentile(one.recording["force"], 99)) for one in runs)
+    every = [_stage(one, drive, strongest) for one in runs]
+
+    def marked(status: int, stage: str, rank: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
+        """Mark the run of a stage that ranks highest, and return its labels."""
+        those = [own for own in every if own["stage"] == stage and "status" not in own]
+        chosen = max(those, key=rank, default={})
+        chosen |= {"status": status} if chosen else {}
+        return chosen
+
+    heavy = marked(3, "weight", lambda own: (own["mass"], own["frequency"]))
+    marked(
+        2, "weight", lambda own: (own["mass"] < 0.9 * heavy["mass"], own["frequency"], own["mass"])
+    )
+    rates = sorted(own["frequency"] for own in every if own["stage"] == "free")
+    usual = rates[len(rates) // 2] if rates else 0.0
+    marked(1, "free", lambda own: -abs(own["frequency"] - usual))
+    marked(VARYING, "pulls", lambda own: own["hand"])
+    weaker = [own for own in every if own["stage"] == "pulls" and "status" not in own]
+    learned = min(weaker, key=lambda own: abs(own["frequency"] - usual), default=None)
+    *_, last = [None, *(own for own in every if own["stage"] == "random")]
+    train = [
+        own for own in every if own["stage"] in ("free", "random") or own.get("status") in (2, 3)
+    ]
+    train += [learned] if learned else []
+    kept = {id(own) for own in train} - {id(last)}
+    return [Labels("train" if id(own) in kept else "test", own) for own in every]
+
+
+def _stage(one: Seen, drive: str, strongest: float) -> dict[str, Any]:
+    """Return the labels of a run by what moves in it."""
+    u, force = one.recording[drive], one.recording["force"]
+    level = float(np.median(u[len(u) // 2 :]))
+    away = np.flatnonzero(np.abs(u - level) > STILL * one.spans[drive])
+    start = 0 if not away.size else int(away[-1]) + 1
+    if start < len(u) // 2 and one.moves("force"):
+        pulled = np.abs(force[start:] - force[start]) > STILL * one.spans["force"]
+        start += int(np.argmax(pulled))
+        return {"stage": "held", "level": round(level, 2), "start": start * one.recording.step}
+    if not one.regular(drive):
+        return {"stage": "random"}
+    labels = {"frequency": float(f"{one.frequency(drive):.2g}")}
+    if one.moves("force"):
+        return labels | {"stage": "pulls", "hand": float(np.percentile(force, 99))}
+    mass = one.level("force") / GRAVITY
+    free = abs(one.level("force")) < UNLOADED * strongest
+    return labels | ({"stage": "free"} if free else {"stage": "weight", "mass": round(mass, 2)})

@@ -7,14 +7,18 @@ at held pressures of 1 to 6 bar the length is cycled (total force). Friction is 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
+from mckibben.papers.recognising import Labels
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, share
 from mckibben.signals.excitations import irregular_triangle, triangle
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
+from mckibben.signals.seen import Seen, grouped
 
 SAMPLE_TIME, LONGEST, HIGHEST = 0.02, 200.0, 6.0
 """Time between samples [s]; length at rest [mm] and highest pressure [bar] of the paper's muscle."""
@@ -94,3 +98,21 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
 
 def _time(duration: float) -> Array:
     return np.asarray(np.arange(round(duration / SAMPLE_TIME) + 1) * SAMPLE_TIME, dtype=float)
+
+
+def recognised(runs: Sequence[Seen]) -> list[Labels]:
+    """Return stages by what moves; the friction is identified at two thirds of the highest pressure."""
+    isometric = [one.moved("pressure") > one.moved("length") for one in runs]
+    held = ["length" if still else "pressure" for still in isometric]
+    levels = [one.level(channel) for one, channel in zip(runs, held, strict=True)]
+    cycled = [k for k, one in enumerate(runs) if not isometric[k] and one.regular("length")]
+    target = IDENTIFIED_AT / HIGHEST * max((levels[k] for k in cycled), default=0.0)
+    chosen = min(cycled, key=lambda k: abs(levels[k] - target), default=None)
+    tolerance = {channel: 0.02 * span for channel, span in runs[0].spans.items()}
+    found: list[Labels] = []
+    for k, (still, channel) in enumerate(zip(isometric, held, strict=True)):
+        alike = [level for level, other in zip(levels, held, strict=True) if other == channel]
+        level = dict(zip(alike, grouped(alike, tolerance[channel]), strict=True))[levels[k]]
+        role: Role = "train" if still or k == chosen else "test"
+        found.append(Labels(role, {"stage": "static" if still else "friction", channel: level}))
+    return found

@@ -21,7 +21,7 @@ from mckibben.blocks.base import Block
 from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelWarning
 from mckibben.papers.paper import FigureText, Paper, TableText, paper
-from mckibben.papers.recognising import Labels, Runs
+from mckibben.papers.recognising import Labels, Runs, by_unit, renamed
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, load_rig, record
 from mckibben.signals.protocol import Protocol, protocol, scaling
@@ -354,9 +354,10 @@ def recognise(name: str, data: Sequence[Recording]) -> Recognised:
     DataError
         If a channel is absent, or all runs of a kind without which nothing can be fitted.
     """
-    about, every = paper(name), dict[str, Recording]()
+    about, every, measured = paper(name), dict[str, Recording](), dict[str, str]()
     for one in data:
-        whole = one.with_derived(about.channels)
+        measured |= (names := by_unit(one, about.channels))
+        whole = renamed(one, names).with_derived(about.channels)
         whole.matrix(about.channels)  # raises an error for what is absent
         every[f"{one.name}, {len(every) + 1}" if one.name in every else str(one.name)] = whole
     noted = {n for n, one in every.items() if one.meta.get("protocol") == name}
@@ -381,7 +382,11 @@ def recognise(name: str, data: Sequence[Recording]) -> Recognised:
     runs = Runs(used, {n: labels[n] for n in used})
     columns = ("file", "run of the paper", "role", "why")
     lacking = tuple(f"Without {kind.what}, so without {kind.gives}." for kind in absent)
-    return Recognised(runs, Table("recognised", RECOGNISED, columns, tuple(rows)), lacking)
+    text = RECOGNISED
+    if measured:
+        by = ", ".join(f"{own} is {channel}" for own, channel in measured.items())
+        text = text.model_copy(update={"note": f"By their units: {by}."})
+    return Recognised(runs, Table("recognised", text, columns, tuple(rows)), lacking)
 
 
 def reproduce(

@@ -43,9 +43,9 @@ def methods(span: float) -> dict[str, tuple[str, dict[str, Any]]]:
     Of the NARX model the paper prints neither regressors nor mapping: this one is a sigmoid network on
     two past outputs and inputs, one sample late, fitted to one-step errors, of five starts the one with
     the least free-running error. Box-Jenkins has the printed orders, Eqs. (6) to (9): B has terms in q^0
-    and q^-2. Like P2UZ it starts at rest, as the muscle does. PI has the printed thresholds, in proportion
-    where the pressure has another span than the paper's, and weights by the slopes of segments, Eqs. (14)
-    and (15).
+    and q^-2. Like P2UZ it starts at rest, as the muscle does. PI has the printed thresholds, in
+    proportion where the pressure has another span than the paper's, and weights by the slopes of
+    segments, Eqs. (14) and (15).
     """
     share = 1.0 if abs(span / (HIGH - LOW) - 1) < OWN_SPAN else span / (HIGH - LOW)
     printed = paper("field-models").models[PRINTED_PI]["thresholds"]
@@ -136,7 +136,7 @@ def _tried(
     for name, (model, settings) in experiment.steps(0.05, 0.3, [*every.items()]):
         models: list[tuple[Block, Series]] = []
         errors, failures = [], []
-        for seed in seeds:
+        for seed in experiment.steps(*experiment.part, seeds):
             try:
                 own = settings | {"seed": seed}
                 plain = experiment.fit(f"{name} {seed}", model, train, own).block

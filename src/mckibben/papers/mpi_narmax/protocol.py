@@ -36,8 +36,8 @@ VARYING = 4
 """Status in which the force varies."""
 
 GRAVITY, UNLOADED, STILL = 9.81, 0.1, 0.05
-"""[m/s2]; largest force of a run without load, relative to the largest of all; largest change of an input
-that is held, relative to its range."""
+"""[m/s2]; largest force of a run without load, relative to the largest of all; largest change of an
+input that is held, relative to its range."""
 
 PULLED_FROM = 20.0
 """At which the force begins while the voltage is held [s]."""

@@ -9,9 +9,8 @@ import string
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -21,11 +20,12 @@ from mckibben.blocks.base import Block
 from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelWarning
 from mckibben.papers.paper import FigureText, Paper, TableText, paper
-from mckibben.papers.recognising import Labels, Runs, by_unit, renamed
+from mckibben.papers.recognising import Labels as Labels
+from mckibben.papers.recognising import Recognised, recognise
+from mckibben.papers.recognising import Runs as Runs
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, load_rig, record
 from mckibben.signals.protocol import Protocol, protocol, scaling
-from mckibben.signals.seen import seen
 from mckibben.system.progress import telling, words_of
 from mckibben.system.showing import Result
 from mckibben.system.threads import one_blas_thread
@@ -37,10 +37,9 @@ Item = TypeVar("Item")
 
 OWN = "User recordings; descriptions of signals refer to the paper's rig."
 
-RECOGNISED = TableText(title="Which run of the paper each recording is", rows="file")
+RECOGNISED = "Which run of the paper each recording is"
 SCALED = TableText(title="How the protocol is scaled for this rig", rows="command")
 SCALED_COLUMNS = ("command", "in the paper, from", "to", "here, from", "here, to", "factor")
-NOTED, UNLIKE = "as its rig noted", "like no run of the paper, not used"
 
 MOST = 2000
 """Points of a curve that is drawn."""
@@ -165,8 +164,8 @@ class Experiment:
         self.figures: list[Figure] = []
         self.facts: dict[str, Any] = {}
         self.warned: dict[str, None] = {}
-        self.part: tuple[float, ...] = (0.0, 0.0)
-        self.absent: tuple[str, ...] = ()
+        self.part = (0.0, 0.0)
+        self.absent: list[str] = []
         self._free: dict[tuple[str, int], tuple[Recording, Recording]] = {}
 
     def within(self, low: float, high: float) -> Progress:
@@ -176,7 +175,8 @@ class Experiment:
     def steps(self, low: float, high: float, items: Sequence[Item]) -> Iterator[Item]:
         """Yield items between two shares of the whole; a fit reports how far it is in its own."""
         for place, item in enumerate(items):
-            self.part = tuple(low + (high - low) * (place + k) / len(items) for k in (0, 1))
+            each = (high - low) / len(items)
+            self.part = low + each * place, low + each * (place + 1)
             yield item
 
     def record(
@@ -199,8 +199,8 @@ class Experiment:
         """
         if self.data is not None:
             found = recognise(self.name, self.data)
-            self.tables.append(found.table)
-            self.absent = found.absent
+            self.tables.append(recognised_table(found))
+            self.absent = [f"Not recorded: {found.absent}."] if found.absent else []
             return found.runs
         plan = protocol(self.name, self.rig) if what is None else what
         rows = [(o.what, *o.printed, *o.here, o.factor) for o in scaling(self.name, self.rig)]
@@ -338,55 +338,11 @@ class Experiment:
         )
 
 
-class Recognised(NamedTuple):
-    """Recordings with their roles and labels, a table of them, and what is absent for want of others."""
-
-    runs: Runs
-    table: Table
-    absent: tuple[str, ...]
-
-
-def recognise(name: str, data: Sequence[Recording]) -> Recognised:
-    """Return which runs of a paper recordings are: as a rig noted, else by their signals.
-
-    Raises
-    ------
-    DataError
-        If a channel is absent, or all runs of a kind without which nothing can be fitted.
-    """
-    about, every, measured = paper(name), dict[str, Recording](), dict[str, str]()
-    for one in data:
-        measured |= (names := by_unit(one, about.channels))
-        whole = renamed(one, names).with_derived(about.channels)
-        whole.matrix(about.channels)  # raises an error for what is absent
-        every[f"{one.name}, {len(every) + 1}" if one.name in every else str(one.name)] = whole
-    noted = {n for n, one in every.items() if one.meta.get("protocol") == name}
-    others = [one for n, one in every.items() if n not in noted]
-    by_signals = import_module(registry.load("protocols", name).__module__).recognised
-    found = iter(by_signals(seen(others)) if others else ())
-    labels = {
-        n: Labels(one.meta["role"], one.meta["labels"]) if n in noted else next(found)
-        for n, one in every.items()
-    }
-    kinds = {n: about.kind_of(*own) for n, own in labels.items()}
-    rows: list[tuple[Cell, ...]] = []
-    for n, kind in kinds.items():
-        why = NOTED if n in noted else kind.why.format(**labels[n].labels) if kind else UNLIKE
-        rows.append((n, kind.what if kind else None, labels[n].role if kind else None, why))
-    absent = [kind for kind in about.runs.values() if kind not in kinds.values()]
-    if needed := [kind.what for kind in absent if kind.needed]:
-        remedy = "record them: what is needed is moved as the paper does, levels are yours"
-        problem = f"among {len(every)} recordings there is no run of these: {'; '.join(needed)}"
-        raise DataError(problem, file=data[0].source, remedy=remedy)
-    used = {n: one for n, one in every.items() if kinds[n]}
-    runs = Runs(used, {n: labels[n] for n in used})
-    columns = ("file", "run of the paper", "role", "why")
-    lacking = tuple(f"Without {kind.what}, so without {kind.gives}." for kind in absent)
-    text = RECOGNISED
-    if measured:
-        by = ", ".join(f"{own} is {channel}" for own, channel in measured.items())
-        text = text.model_copy(update={"note": f"By their units: {by}."})
-    return Recognised(runs, Table("recognised", text, columns, tuple(rows)), lacking)
+def recognised_table(found: Recognised) -> Table:
+    """Return the table of which run of the paper each recording is, and why."""
+    by = ", ".join(f"{own} is {channel}" for own, channel in found.measured.items())
+    text = TableText(title=RECOGNISED, rows="file", note=f"By their units: {by}." if by else "")
+    return Table("recognised", text, ("file", "run of the paper", "role", "why"), found.rows)
 
 
 def reproduce(

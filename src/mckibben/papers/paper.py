@@ -42,15 +42,15 @@ class Item(_Strict):
 class RunKind(_Strict):
     """A kind of run: what it is, and by what signals; the first kind that has its labels is a run's.
 
-    ``where`` are its role and labels, ``why`` what is seen, with labels in braces. Without a ``needed``
-    one nothing can be fitted; without another one only ``gives`` is absent.
+    ``where`` are its role and labels, ``why`` what is seen, with labels in braces. With fewer than
+    ``least`` nothing can be fitted; without one that may be absent, only ``gives`` is.
     """
 
     what: Words
     why: Words
     where: dict[str, Any]
     gives: Words = "every table"
-    needed: bool = False
+    least: int = 0
 
 
 class TableText(_Strict):

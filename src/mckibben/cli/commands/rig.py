@@ -140,8 +140,8 @@ def record(
         )  # fmt: skip
     more = f", {len(earlier)} were there already" if earlier else ""
     lines = [f"Written: {len(recorded)} recordings to {out}{more}; roles are in protocol.json"]
-    about = {"folder": str(out), "recorded": recorded, "earlier": sorted(earlier)}
-    about["scaled"] = [one._asdict() for one in scaled]
+    about: dict[str, Any] = {"folder": str(out), "recorded": recorded, "earlier": sorted(earlier)}
+    about |= {"scaled": [one._asdict() for one in scaled]}
     show(about, lambda: [*text.lines(results.scaled(scaled)), *lines], as_json)
 
 

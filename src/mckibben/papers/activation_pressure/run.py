@@ -206,7 +206,7 @@ def _extremes(study: Study) -> None:
             "after": np.polyfit(*points(study.found, force), 3),
         }
         along = np.linspace(ends[0, 0], ends[1, 0], 400)
-        named = f"{abs(force):.3g} N"
+        named = f"{round(force, 1) + 0.0:.3g} N"
         spans = float(np.ptp(e)), float(np.ptp(y))
         rows[named] = [_distance(c, along, end, spans) for c in cubics.values() for end in ends]
         for when, cubic in cubics.items():

@@ -135,8 +135,8 @@ def _tried(
     found: dict[str, MethodResult] = {}
     for name, (model, settings) in experiment.steps(0.05, 0.3, [*every.items()]):
         models: list[tuple[Block, Series]] = []
-        errors, failures = [], []
-        for seed in experiment.steps(*experiment.part, seeds):
+        errors, failures, part = [], [], experiment.part
+        for seed in experiment.steps(*part, seeds):
             try:
                 own = settings | {"seed": seed}
                 plain = experiment.fit(f"{name} {seed}", model, train, own).block

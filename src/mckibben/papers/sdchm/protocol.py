@@ -209,13 +209,15 @@ def _moving(one: Seen, muscles: Sequence[str], p0: float, apart: float) -> dict[
 def _roles(levels: set[float], highest: float) -> dict[float, Role]:
     """Return the role of every pressure of the extensor."""
     printed: dict[float, Role] = dict.fromkeys(TRAINING, "train")
-    printed |= dict.fromkeys(VALIDATION, "validation") | dict.fromkeys(TEST, "test")
+    validation: Role = "validation"
+    test: Role = "test"
+    printed |= dict.fromkeys(VALIDATION, validation) | dict.fromkeys(TEST, test)
     scaled = {p0: p0 / (highest or 1.0) * HIGHEST for p0 in levels}
     near = {p0: min(printed, key=lambda known: abs(known - own)) for p0, own in scaled.items()}
     roles = {p0: printed[known] for p0, known in near.items()}
     if {*roles.values()} == {*printed.values()}:
         return roles
-    others: tuple[Role, Role] = ("test", "validation")
+    others = test, validation
     ordered = sorted(levels)
     ranked: dict[float, Role] = {p0: others[k // 2 % 2] for k, p0 in enumerate(ordered)}
     return ranked | dict.fromkeys((*ordered[::2], *ordered[-1:]), "train")

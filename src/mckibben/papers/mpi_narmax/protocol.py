@@ -52,11 +52,9 @@ def mpi_narmax(rig: Rig | None = None) -> Protocol:
     drive = "voltage" if rig is None else rig.inputs[0]
     wide, strong = share(rig, drive, HIGH), share(rig, "force", STRONGEST)
 
-    def add(
-        name: str, role: Role, volts: Array, newtons: Array, mass: float = 0.0, **labels: Any
-    ) -> None:
+    def add(name: str, role: Role, volts: Array, newtons: Array, **labels: Any) -> None:
         inputs = Recording({drive: wide * volts, "force": strong * newtons}, SAMPLE_TIME)
-        settings = {"payload": round(strong * mass, 6), f"start.{drive}": wide * LOW}
+        settings = {"payload": round(labels.get("mass", 0.0), 6), f"start.{drive}": wide * LOW}
         runs.append(PlannedRun(name, role, inputs, settings, labels))
 
     def moving(
@@ -71,7 +69,8 @@ def mpi_narmax(rig: Rig | None = None) -> Protocol:
         duration = max(TIME, 4 / f)
         time = np.arange(round(duration / SAMPLE_TIME)) * SAMPLE_TIME
         wave, pulled = sine(time, 1 / f, HIGH, LOW), pulls(time, hand, duration=duration / 6)
-        add(name, role, wave, pulled, mass, stage=stage, frequency=f, **status)
+        labels = {"stage": stage, "frequency": f, "mass": strong * mass, "hand": strong * hand}
+        add(name, role, wave, pulled, **labels, **status)
 
     runs = list[PlannedRun]()
     moving("status-1", "train", "status", 0.1, status=1)
@@ -152,9 +151,9 @@ def _stage(one: Seen, drive: str, strongest: float) -> dict[str, Any]:
         return {"stage": "held", "level": round(level, 2), "start": start * one.recording.step}
     if not one.regular(drive):
         return {"stage": "random"}
-    labels = {"frequency": float(f"{one.frequency(drive):.2g}")}
+    labels = {"frequency": float(f"{one.frequency(drive):.2g}"), "mass": 0.0, "hand": 0.0}
     if one.moves("force"):
         return labels | {"stage": "pulls", "hand": float(np.percentile(force, 99))}
-    mass = one.level("force") / GRAVITY
-    free = abs(one.level("force")) < UNLOADED * strongest
-    return labels | ({"stage": "free"} if free else {"stage": "weight", "mass": round(mass, 2)})
+    if abs(one.level("force")) < UNLOADED * strongest:
+        return labels | {"stage": "free"}
+    return labels | {"stage": "weight", "mass": round(one.level("force") / GRAVITY, 2)}

@@ -6,15 +6,16 @@ They are resolved once, by `channels_of`, and handed down to what fits, compares
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.recording import COMMAND, REFERENCE, Recording
+from mckibben.recording import COMMAND, REFERENCE, Recording, standard_unit
 
 Names = str | Sequence[str] | None
 """One channel, several, or None to choose by the recordings' names."""
@@ -470,3 +471,28 @@ def _loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tupl
         if any(name in one and one.units[name] in LOADS for one in recordings)
     )
     return found if len(found) < len(inputs) else ()
+
+
+MEASURES = {"bar": "pressure", "V": "voltage", "N": "force", "mm": "displacement"}
+"""What a channel of another name measures, by its unit."""
+
+
+def by_unit(one: Recording, wanted: Sequence[str]) -> dict[str, str]:
+    """Return what channels of other names measure: by their units, and the number or place in the name.
+
+    So ``p1`` in bar is ``pressure_1``. Where two would be the same channel, neither is.
+    """
+    kinds = MEASURES | ({"mm": "length"} if "length" in wanted else {})
+    found: dict[str, str] = {}
+    for name in one.channels:
+        unit, place = one.units.get(name) or "", re.search(r"(\d+|extensor)$", name)
+        if unit in kinds and standard_unit(name) is None:
+            found[name] = f"{kinds[unit]}_{place[1]}" if place else kinds[unit]
+    counts = Counter([*found.values(), *one.channels])
+    return {name: channel for name, channel in found.items() if counts[channel] == 1}
+
+
+def renamed(one: Recording, names: Mapping[str, str]) -> Recording:
+    """Return a recording with other names of channels."""
+    channels = {names.get(name, name): samples for name, samples in one.channels.items()}
+    return replace(one, channels=channels, units={names.get(n, n): u for n, u in one.units.items()})

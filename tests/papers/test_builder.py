@@ -187,20 +187,19 @@ def test_pages_name_the_paper_and_its_figures() -> None:
     assert len(ids) == len(set(ids))  # scripts find their data by them
 
 
-def test_recordings_are_runs_of_the_protocol_by_name() -> None:
+def test_recordings_need_the_channels_and_the_runs_of_the_paper() -> None:
     time = np.arange(0.0, 60.0, 0.02)
     runs = [
         Recording({"pressure": u, "displacement": 5 * u}, 0.02, meta={"name": name})
-        for name in ("irregular-triangle", "decaying-triangle")
+        for name in ("a", "b")
         for u in [3.0 + np.sin(time)]
     ]
     made = experiment()
     made.data = runs
-    assert made.record().names("train") == ["decaying-triangle"]
-    with pytest.raises(DataError, match="decaying-triangle"):
+    assert made.record().names("train") == ["a"]
+    assert [table.key for table in made.tables] == ["recognised"]
+    with pytest.raises(DataError, match="irregular"):
         reproduce("field-models", data=runs[:1])
-    with pytest.raises(DataError, match="other"):
-        reproduce("field-models", data=[*runs, runs[0].with_meta(name="other")])
     with pytest.raises(DataError, match="displacement"):
         reproduce("field-models", data=[one.select(["pressure"]) for one in runs])
     with pytest.raises(DataError, match="no recording"):

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import string
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -20,18 +20,26 @@ from mckibben.blocks.base import Block
 from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelWarning
 from mckibben.papers.paper import FigureText, Paper, TableText, paper
+from mckibben.papers.recognising import Labels as Labels
+from mckibben.papers.recognising import Recognised, recognise
+from mckibben.papers.recognising import Runs as Runs
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, load_rig, record
-from mckibben.signals.protocol import Protocol, Role, protocol
-from mckibben.system.progress import telling
+from mckibben.signals.protocol import Protocol, protocol, scaling
+from mckibben.system.progress import telling, words_of
 from mckibben.system.showing import Result
 from mckibben.system.threads import one_blas_thread
 
 Cell = str | float | None
 Curves = Mapping[str, tuple[Array, Array]]
 Progress = Callable[[float, str], None]
+Item = TypeVar("Item")
 
 OWN = "User recordings; descriptions of signals refer to the paper's rig."
+
+RECOGNISED = "Which run of the paper each recording is"
+SCALED = TableText(title="How the protocol is scaled for this rig", rows="command")
+SCALED_COLUMNS = ("command", "in the paper, from", "to", "here, from", "here, to", "factor")
 
 MOST = 2000
 """Points of a curve that is drawn."""
@@ -138,38 +146,6 @@ class Verdict(NamedTuple):
         return texts.split("|")[not self.agrees]
 
 
-class Labels(NamedTuple):
-    """Role of a recording, and labels as in the paper's protocol (stage, load, frequency)."""
-
-    role: Role
-    labels: Mapping[str, Any]
-
-
-class Runs(dict[str, Recording]):
-    """Recordings by name, in the order of the protocol, with roles and labels."""
-
-    def __init__(self, recordings: Mapping[str, Recording], labels: Mapping[str, Labels]) -> None:
-        super().__init__(recordings)
-        self.labels = labels
-
-    def names(self, role: Role | None = None, **labels: Any) -> list[str]:
-        """Return the names of recordings of a role that have all of the labels."""
-        return [
-            name
-            for name, given in self.labels.items()
-            if role in (None, given.role)
-            and all(given.labels.get(key) == value for key, value in labels.items())
-        ]
-
-    def select(self, role: Role | None = None, **labels: Any) -> list[Recording]:
-        """Return the recordings of a role that have all of the labels."""
-        return [self[name] for name in self.names(role, **labels)]
-
-    def of(self, name: str, label: str) -> Any:
-        """Return a label of a recording."""
-        return self.labels[name].labels[label]
-
-
 @dataclass
 class Experiment:
     """A paper's experiment in progress.
@@ -200,11 +176,20 @@ class Experiment:
         self.figures: list[Figure] = []
         self.facts: dict[str, Any] = {}
         self.warned: dict[str, None] = {}
+        self.part = (0.0, 0.0)
+        self.absent: list[str] = []
         self._free: dict[tuple[str, int], tuple[Recording, Recording]] = {}
 
     def within(self, low: float, high: float) -> Progress:
         """Return the progress callback of a part."""
         return lambda share, text: self.tell(low + (high - low) * share, text)
+
+    def steps(self, low: float, high: float, items: Sequence[Item]) -> Iterator[Item]:
+        """Yield items between two shares of the whole; a fit reports how far it is in its own."""
+        for place, item in enumerate(items):
+            each = (high - low) / len(items)
+            self.part = low + each * place, low + each * (place + 1)
+            yield item
 
     def record(
         self,
@@ -225,8 +210,14 @@ class Experiment:
             Share of the whole work that is done then.
         """
         if self.data is not None:
-            return self._labelled(self.data)
+            found = recognise(self.name, self.data)
+            self.tables.append(recognised_table(found))
+            self.absent = [f"Not recorded: {found.absent}."] if found.absent else []
+            return found.runs
         plan = protocol(self.name, self.rig) if what is None else what
+        rows = [(o.what, *o.printed, *o.here, o.factor) for o in scaling(self.name, self.rig)]
+        if any(abs(row[-1] - 1) > 1e-6 for row in rows):
+            self.tables.append(Table("scaled", SCALED, SCALED_COLUMNS, tuple(rows)))
         names = [run.name for run in plan.runs] if names is None else names
         tell, runs = self.within(0.0, until), dict[str, Recording]()
         recorded = record(plan, self.rig, runs=names, seed=self.seed, jobs=self.jobs)
@@ -234,30 +225,6 @@ class Experiment:
             runs[run.name] = recording
             tell(len(runs) / len(names), f"recorded {run.name}")
         return Runs(runs, {name: Labels(plan[name].role, plan[name].labels) for name in runs})
-
-    def _labelled(self, data: Sequence[Recording]) -> Runs:
-        """Return recordings of the protocol, by what the rig noted or by their names."""
-        plan = protocol(self.name)
-        planned = {run.name: Labels(run.role, run.labels) for run in plan.runs}
-        runs = Runs({}, labels := {})
-        for one in data:
-            noted = one.meta.get("protocol") == self.name
-            own = Labels(one.meta["role"], one.meta["labels"]) if noted else planned.get(one.name)
-            if own is None:
-                raise DataError(
-                    f"{one.name!r} is no run of the protocol",
-                    file=one.source,
-                    remedy=f"name it as the run that it is: {', '.join([*planned][:6])}, ...",
-                )
-            whole = one.with_derived(self.paper.channels)
-            whole.matrix(self.paper.channels)  # raises an error for what is absent
-            runs[one.name], labels[one.name] = whole, own
-        there = {(label.role, label.labels.get("stage")) for label in labels.values()}
-        for name, label in planned.items():
-            if (label.role, label.labels.get("stage")) not in there:
-                remedy = "record at least one run of every kind"
-                raise DataError(f"there is no run like {name} of the protocol", remedy=remedy)
-        return runs
 
     def fit(
         self,
@@ -277,16 +244,20 @@ class Experiment:
         search: list[float] = []
 
         def fit() -> Fitted:
+            def heard(share: float, best: float) -> None:
+                search.append(float(best))
+                self.within(*self.part)(share, f"{name}, {words_of(best)}")
+
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ModelWarning)
-                heard = {"progress": lambda share, best: search.append(float(best))}
-                estimator.fit(recordings, **heard | how)
+                estimator.fit(recordings, **{"progress": heard} | how)
             found = estimator.diagnostics_
             errors = tuple(getattr(found, "standard_errors", ()))
             best = tuple(cost for cost in search if np.isfinite(cost))
             error = float(np.max(found.rmse))
             return Fitted(estimator.model_, error, found.seconds, found.n_free, errors, best)
 
+        self.within(*self.part)(0.0, name)
         depends = model, estimator.get_params(), recordings, how
         fitted = self.kept.once(name, Fitted, fit, *depends)
         self.models[name] = fitted.block
@@ -319,7 +290,7 @@ class Experiment:
         columns : sequence of str
             Headings of what was found, with units.
         rows : mapping of str to sequence, or sequence of sequences
-            The name of each row, and a cell for every column.
+            The name of each row, and a cell for every column; without rows there is no table.
         **facts
             That fill the fields of its title and note.
         """
@@ -334,6 +305,8 @@ class Experiment:
         for column in dict.fromkeys((*ours, *theirs)):
             every |= {f"{column}, printed": theirs[column]} if column in theirs else {}
             every |= {column: ours[column]} if column in ours else {}
+        if not lines:
+            return
         full = {column: cells for column, cells in every.items() if {*cells} - {None}}
         words = {"title": text.title.format(**facts), "note": text.note.format(**facts)}
         filled = text.model_copy(update=words)
@@ -363,7 +336,7 @@ class Experiment:
             fields = (name for _, name, _, _ in string.Formatter().parse(text) if name)
             if {name.partition("[")[0] for name in fields} <= {*self.facts}:
                 sentences.append(text.format(**self.facts))
-        own = [] if self.data is None else [OWN]
+        own = [] if self.data is None else [OWN, *self.absent]
         return Reproduction(
             self.name,
             self.paper,
@@ -375,6 +348,13 @@ class Experiment:
             self.quick,
             self.seed,
         )
+
+
+def recognised_table(found: Recognised) -> Table:
+    """Return the table of which run of the paper each recording is, and why."""
+    by = ", ".join(f"{own} is {channel}" for own, channel in found.measured.items())
+    text = TableText(title=RECOGNISED, rows="file", note=f"By their units: {by}." if by else "")
+    return Table("recognised", text, ("file", "run of the paper", "role", "why"), found.rows)
 
 
 def reproduce(
@@ -398,7 +378,7 @@ def reproduce(
     rig : Rig or str, optional
         That is recorded, and on which loops are closed; default the protocol's, with ``data`` none.
     data : sequence of Recording, optional
-        Recordings of the protocol instead, as a rig wrote them or named as its runs.
+        Recordings of the paper's runs instead, of any size; see `recognise`.
     quick : bool
         Whether to leave out what takes long.
     seed, jobs

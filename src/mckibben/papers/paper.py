@@ -39,6 +39,20 @@ class Item(_Strict):
     command: str = ""
 
 
+class RunKind(_Strict):
+    """A kind of run: what it is, and by what signals; the first kind that has its labels is a run's.
+
+    ``where`` are its role and labels, ``why`` what is seen, with labels in braces. With fewer than
+    ``least`` nothing can be fitted; without one that may be absent, only ``gives`` is.
+    """
+
+    what: Words
+    why: Words
+    where: dict[str, Any]
+    gives: Words = "every table"
+    least: int = 0
+
+
 class TableText(_Strict):
     """Title of a re-run's table, and the paper's printed values.
 
@@ -71,8 +85,8 @@ class Paper(_Strict):
 
     ``given`` is what is taken from the paper or set, ``found`` what the recordings determine.
     Sentences of ``summary`` have fields in braces, which the experiment fills; one without its fields
-    is left out. ``notes`` are differences from the paper, ``quick`` what a quick run omits. Tables,
-    figures and printed models are by key.
+    is left out. ``notes`` are differences from the paper, ``quick`` what a quick run omits. Kinds of
+    runs, tables, figures and printed models are by key.
     """
 
     number: int
@@ -89,6 +103,7 @@ class Paper(_Strict):
     notes: tuple[Words, ...]
     quick: Words
     items: tuple[Item, ...]
+    runs: dict[str, RunKind]
     tables: dict[str, TableText]
     figures: dict[str, FigureText]
     models: dict[str, dict[str, Any]] = {}
@@ -96,6 +111,12 @@ class Paper(_Strict):
     def about(self) -> dict[str, Any]:
         """Return its number, title and question, for JSON."""
         return {key: getattr(self, key) for key in ("number", "title", "question")}
+
+    def kind_of(self, role: str, labels: Mapping[str, Any]) -> RunKind | None:
+        """Return the kind of a run by its role and labels, None if it is of none."""
+        own = {"role": role, **labels}
+        each = (kind for kind in self.runs.values() if kind.where.items() <= own.items())
+        return next(each, None)
 
     def printed(self, name: str) -> Any:
         """Return the block of a model as printed."""

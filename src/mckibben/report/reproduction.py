@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -60,7 +60,7 @@ def reproduction_page(found: Reproduction) -> str:
             ),
             Section("results", "Results", [Text(found.summary, listed=True)]),
             Section("comparison", "Printed and ours", charts),
-            Section("tables", "Tables", tables(found)),
+            Section("tables", "Tables", tables(found.tables, found.quick)),
             Section("differences", "What differs from the paper", [Text(found.notes, listed=True)]),
             Section("figures", "Figures", figures),
             Section("method", "How to repeat", [code]),
@@ -70,15 +70,15 @@ def reproduction_page(found: Reproduction) -> str:
 
 def items(found: Reproduction) -> list[Item]:
     """Return the tables of a re-run, and their findings."""
-    return [*tables(found), Text(["", *found.summary])]
+    return [*tables(found.tables, found.quick), Text(["", *found.summary])]
 
 
-def tables(found: Reproduction) -> list[Item]:
+def tables(given: Sequence[Table], quick: bool = False) -> list[Item]:
     """Return every table under its heading, with its note."""
     shown: list[Item] = []
-    for one in found.tables:
+    for one in given:
         shown += [
-            Text([heading(one, quick=found.quick)], "lead"),
+            Text([heading(one, quick=quick)], "lead"),
             builder.Table(one.columns, one.rows),
         ]
         shown.append(Text([one.text.note], "muted") if one.text.note else None)
@@ -192,7 +192,7 @@ def _lines(found: Reproduction, date: str, pictures: str) -> Iterator[str]:
             Text([f"Found: {text}" for text in paper.found], listed=True),
         ],
         "What differs from the paper": [Text(found.notes, listed=True)],
-        "Tables": tables(found),
+        "Tables": tables(found.tables, found.quick),
     }
     for title, shown in parts.items():
         yield f"\n## {title}\n\n{builder.markdown(shown)}"
@@ -202,8 +202,9 @@ def _lines(found: Reproduction, date: str, pictures: str) -> Iterator[str]:
         yield f"![{figure.text.title}]({pictures}/{figure.key}.png)\n"
     yield "## On your own rig\n"
     yield (
-        f"`mckibben reproduce {found.name} --data FOLDER` takes recordings of the same protocol, from "
-        f"`mckibben rig record {found.name}` or in files named as its runs.\n"
+        f"`mckibben reproduce {found.name} --data FOLDER` takes recordings of its runs on a rig of any "
+        f"size, in files of any name, and shows first which run each is; `mckibben rig record "
+        f"{found.name} --rig FILE` moves your rig so, and shows how each level is scaled.\n"
     )
 
 

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from mckibben.checkpoints import Checkpoints
-from mckibben.errors import DataError
+from mckibben.errors import DataError, DataWarning
 from mckibben.files.sources import inside
 from mckibben.options import ReadOptions
 from mckibben.outputs import results_in
-from mckibben.papers.experiment import Progress, Reproduction, reproduce
+from mckibben.papers.experiment import (
+    Progress,
+    Reproduction,
+    Table,
+    recognised_table,
+    reproduce,
+)
 from mckibben.papers.paper import paper
+from mckibben.papers.recognising import recognise
 from mckibben.reading import read_files
-from mckibben.recording import Recording
+from mckibben.recording import Recording, notes_by_file
 from mckibben.report.reproduction import reproduction_page
 from mckibben.rigs import Rig, load_rig
 from mckibben.system import threads, workers
@@ -34,14 +42,20 @@ def rerun(
     jobs: int | None = None,
     force: bool = False,
     progress: Progress | None = None,
+    recognised: Callable[[Table], None] | None = None,
 ) -> Reproduction:
     """Re-run a paper's experiment on a rig or on a folder of recordings, and write its report.
 
     It runs in a process of its own, which can be ended whatever it is at. Parameters are those of
-    `reproduce`; ``out`` is the folder for ``report.html`` and ``tables.json``.
+    `reproduce`; ``out`` is the folder for ``report.html`` and ``tables.json``, and ``recognised`` is
+    called with the table of which run each recording is, before anything is fitted.
     """
     paper(name)
     runs = None if data is None else _recordings(data, reading)
+    if runs is not None:
+        known = recognise(name, runs)  # refuses what is missing, too
+        if recognised is not None:
+            recognised(recognised_table(known))
     given: dict[str, Any] = {
         "name": name,
         "rig": None if rig is None else load_rig(rig),
@@ -77,8 +91,17 @@ def _recordings(folder: Path, reading: ReadOptions | None) -> list[Recording]:
         raise DataError("there is no such folder", file=folder, remedy="name one with recordings")
     found: list[Recording] = []
     for path in inside(folder):
-        parts = read_files(path, None, reading)
+        with warnings.catch_warnings():  # which are said once for all files
+            warnings.simplefilter("ignore", DataWarning)
+            parts = read_files(path, None, reading)
         for place, one in enumerate(parts, start=1):
             name = f"{path.stem}-{place}" if len(parts) > 1 else path.stem
             found.append(replace(one.with_meta(name=name), start_time=0.0))
+    files: dict[str, list[str]] = {}
+    for file, notes in notes_by_file(found).items():
+        for note in notes:
+            files.setdefault(note, []).append(file)
+    for note, those in files.items():
+        more = f" and {len(those) - 1} more" if len(those) > 1 else ""
+        warnings.warn(DataWarning(f"{those[0]}{more}: {note}"), stacklevel=2)
     return found

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from mckibben.reading import Contents
     from mckibben.recording import Recording
     from mckibben.rigs.rig import Rig
+    from mckibben.signals.protocol import Scaled
     from mckibben.simulation import Simulation
     from mckibben.studying.results import Exported, Fit, Inverse, Tracking
     from mckibben.studying.study import Study
@@ -492,6 +493,13 @@ def calibration(found: Calibration) -> list[Item]:
 
 
 # --- Papers, rigs and devices -----------------------------------------------------------------------
+
+
+def scaled(found: Sequence[Scaled]) -> list[Item]:
+    """Return how the levels of a protocol are scaled for a rig."""
+    columns = ("command", "in the paper, from", "to", "here, from", "to", "factor")
+    rows = [(one.what, *one.printed, *one.here, one.factor) for one in found]
+    return [Text(["How the protocol is scaled for this rig"], "lead"), Table(columns, rows)]
 
 
 def papers(found: Mapping[str, Paper]) -> list[Item]:

@@ -16,6 +16,11 @@ from mckibben.signals.protocol import PlannedRun, Protocol, protocol
 from mckibben.system.threads import cores
 
 
+def share(rig: Rig | None, channel: str, printed: float) -> float:
+    """Return the highest command of a rig relative to that of a paper's rig; 1 without a rig."""
+    return 1.0 if rig is None else rig.limits(channel).high / printed
+
+
 def record(
     what: Protocol | str,
     rig: Rig | None = None,

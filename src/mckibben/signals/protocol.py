@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from inspect import signature
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from mckibben import registry
 from mckibben.errors import DataError
@@ -109,3 +109,36 @@ def protocol(name: str, rig: object = None) -> Protocol:
     adapts = rig is not None and signature(maker).parameters
     made: Protocol = maker(rig) if adapts else maker()
     return made
+
+
+Extent = tuple[float, float]
+"""Lowest and highest value."""
+
+
+class Scaled(NamedTuple):
+    """A command of a protocol: its extent for the paper's rig and for another, and the factor."""
+
+    what: str
+    printed: Extent
+    here: Extent
+    factor: float
+
+
+def scaling(name: str, rig: object) -> list[Scaled]:
+    """Return how the commands of a protocol, loads and times are scaled for a rig."""
+    printed, own = (_extents(protocol(name, one)) for one in (None, rig))
+    return [
+        Scaled(what, *both, both[1][1] / both[0][1] if both[0][1] else 1.0)
+        for what, both in zip(own, zip(printed.values(), own.values(), strict=True), strict=True)
+    ]
+
+
+def _extents(plan: Protocol) -> dict[str, Extent]:
+    every: dict[str, list[float]] = {}
+    for run in plan.runs:
+        for channel, extent in run.inputs.ranges.items():
+            every.setdefault(f"{channel} [{run.inputs.units.get(channel, '')}]", []).extend(extent)
+        if "payload" in run.settings:
+            every.setdefault("payload [kg]", []).append(run.settings["payload"])
+        every.setdefault("time [s]", []).append(len(run.inputs) * run.inputs.step)
+    return {what: (min(values), max(values)) for what, values in every.items()}

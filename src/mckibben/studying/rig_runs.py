@@ -16,7 +16,7 @@ from mckibben.rigs.files import rig_names
 from mckibben.rigs.recording import record
 from mckibben.rigs.rig import Rig, load_rig
 from mckibben.signals import build, settings_of
-from mckibben.signals.protocol import Protocol, protocol
+from mckibben.signals.protocol import Protocol, Scaled, protocol, scaling
 from mckibben.system import ordinary
 from mckibben.system.atomic import to_json, write_text, written
 
@@ -117,13 +117,13 @@ def record_protocol(
     jobs: int | None = None,
     force: bool = False,
     progress: Callable[[float, str], None] | None = None,
-) -> tuple[list[str], list[str]]:
+) -> tuple[list[str], list[str], list[Scaled]]:
     """Record a protocol to a folder: one file per run, and ``protocol.json``.
 
     Returns
     -------
-    (list of str, list of str)
-        Runs recorded, and runs that were there already.
+    (list of str, list of str, list of Scaled)
+        Runs recorded, runs that were there already, and how levels were scaled for the rig.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def record_protocol(
         write(recording, files[made.name])
         if progress is not None:
             progress(done / len(wanted), made.name)
-    return wanted, there
+    return wanted, there, scaling(name, plant)
 
 
 def _roles(plan: Protocol, rig: Rig, seed: int) -> dict[str, Any]:

@@ -24,6 +24,9 @@ Show = Callable[[float, str], None]
 
 Item = TypeVar("Item")
 
+LINE = 0.01
+"""Least progress between two lines, as a share of the whole."""
+
 
 @contextmanager
 def telling(
@@ -115,7 +118,7 @@ def _in_lines(what: str) -> Iterator[Show]:
 
     def show(share: float, words: str) -> None:
         nonlocal last
-        if share > last:
+        if share >= last + LINE or share == 1.0 > last:
             with suppress(OSError):
                 print(_line(what, words), file=sys.stderr, flush=True)
             last = share

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -399,6 +400,7 @@ def reproduce(
     out: str | Path | None = None,
     force: bool = False,
     progress: Progress = None,
+    recognised: Callable[[Any], None] | None = None,
     **keywords: Unpack[ReproduceKeywords],
 ) -> Reproduction:
     """Run a paper's protocol on its rig, with its methods and ours, and compare the tables.
@@ -408,7 +410,9 @@ def reproduce(
     paper : str
         Short name.
     data : path, optional
-        Folder with recordings of the protocol, instead of the rig's.
+        Folder with recordings of the paper's runs, of any size and name, instead of the rig's.
+    recognised : callable, optional
+        Called with the table of which run each recording is, before anything is fitted.
     options, reading, out, force, progress
         See `mckibben.workflow`; options are those of `mckibben.options.ReproduceOptions`.
     """
@@ -429,4 +433,5 @@ def reproduce(
             jobs=chosen.jobs,
             force=force,
             progress=tell,
+            recognised=recognised,
         )

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.output import show
+from mckibben.cli.output import say, show
 from mckibben.cli.parameters import Force, Json, command
 from mckibben.cli.stopping import stoppable
 from mckibben.options import Argument, Option, ReadOptions, ReproduceOptions
@@ -21,7 +21,7 @@ def reproduce(
     name: Annotated[str | None, Argument("[PAPER]", "Short name; see --list.")] = None,
     listed: Annotated[bool, Option("List the papers.", flag="--list")] = False,
     data: Annotated[
-        Path | None, Option("Recordings of the protocol, instead of the rig's.", "FOLDER")
+        Path | None, Option("Your recordings of its runs, of any size and name.", "FOLDER")
     ] = None,
     out: Annotated[
         Path | None, Option("Folder for report.html and tables.json.", "DIR", "-o")
@@ -33,6 +33,7 @@ def reproduce(
     from mckibben.errors import DataError
     from mckibben.papers.paper import papers
     from mckibben.report import results, text
+    from mckibben.report.reproduction import tables
 
     if listed:
         every = papers()
@@ -43,7 +44,8 @@ def reproduce(
         raise DataError("there is no paper to run again", remedy="name one, or give `listed`")
     with stoppable(out):
         found = workflow.reproduce(
-            name, options, data=data, reading=reading, out=out, force=force, progress=True
-        )
+            name, options, data=data, reading=reading, out=out, force=force, progress=True,
+            recognised=lambda table: say("\n".join(text.lines(tables([table]))), error=True),
+        )  # fmt: skip
     written = [out / "report.html", out / "tables.json"] if out else []
     show(found, lambda: text.shown(found), as_json, found.notes, written)

@@ -130,17 +130,19 @@ def record(
 
     Files of a recording that was stopped are not made again.
     """
+    from mckibben.report import results, text
     from mckibben.studying.rig_runs import record_protocol
 
     with stoppable(out), telling(True, f"recording {protocol}") as tell:
-        recorded, earlier = record_protocol(
+        recorded, earlier, scaled = record_protocol(
             protocol, out, rig=rig, changes=changes, only=only, seed=seed,
             jobs=jobs, force=force, progress=tell,
         )  # fmt: skip
     more = f", {len(earlier)} were there already" if earlier else ""
     lines = [f"Written: {len(recorded)} recordings to {out}{more}; roles are in protocol.json"]
-    about = {"folder": str(out), "recorded": recorded, "earlier": sorted(earlier)}
-    show(about, lambda: lines, as_json)
+    about: dict[str, Any] = {"folder": str(out), "recorded": recorded, "earlier": sorted(earlier)}
+    about |= {"scaled": [one._asdict() for one in scaled]}
+    show(about, lambda: [*text.lines(results.scaled(scaled)), *lines], as_json)
 
 
 rig = click.Group(

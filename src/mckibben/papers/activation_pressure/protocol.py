@@ -7,13 +7,17 @@ random wave with minor loops; before them, a slow cycle at every force for the s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from mckibben.papers.recognising import Labels
 from mckibben.recording import Recording
-from mckibben.rigs import Rig
+from mckibben.rigs import Rig, share
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
+from mckibben.signals.seen import Seen, grouped
 
 SAMPLE_TIME = 0.005
 FORCES = (0.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
@@ -33,16 +37,16 @@ STATIC_HIGH = 4.0
 RANGE = 5.0
 """Highest pressure of the rig [bar]."""
 
+SLOW = 0.25
+"""Highest frequency of a slow cycle, relative to the median of all."""
+
 CYCLES = 8
 RANDOM_TIME = 20.0
 
 
 def activation_pressure(rig: Rig | None = None) -> Protocol:
     """Return slow cycles, sines and random waves at every force, in shares of the ranges of a rig."""
-    stronger, wider = 1.0, 1.0
-    if rig is not None:
-        stronger = rig.limits("force").high / FORCES[-1]
-        wider = rig.limits("pressure").high / RANGE
+    stronger, wider = share(rig, "force", FORCES[-1]), share(rig, "pressure", RANGE)
     runs = []
     for paper_force in FORCES:
         force = stronger * paper_force
@@ -84,3 +88,24 @@ def _run(
         settings={"start.pressure": float(wave[0]), "start.force": force},
         labels={"stage": stage, "force": force, "frequency": frequency},
     )
+
+
+def recognised(runs: Sequence[Seen]) -> list[Labels]:
+    """Return stages by the shape and rate of the pressure, at the force that is held."""
+    apart = 0.03 * runs[0].spans["force"]
+    forces = grouped([one.level("force") for one in runs], apart)
+    regular = [one.regular("pressure") for one in runs]
+    rates = [float(f"{one.frequency('pressure'):.2g}") for one in runs]
+    usual = float(np.median([f for f, sine_ in zip(rates, regular, strict=True) if sine_] or [0.0]))
+    known = sorted(
+        {f for f, sine_ in zip(rates, regular, strict=True) if sine_ and f >= SLOW * usual}
+    )
+    found: list[Labels] = []
+    for one, force, sine_, rate in zip(runs, forces, regular, rates, strict=True):
+        if not sine_:  # of the sine whose frequency is its highest
+            highest = one.highest_frequency("pressure")
+            rate = min(known, key=lambda f: abs(f - highest), default=round(highest, 2))
+        stage = "random" if not sine_ else "static" if rate < SLOW * usual else "hysteresis"
+        labels = {"stage": stage, "force": force, "frequency": 0.0 if stage == "static" else rate}
+        found.append(Labels("train" if sine_ else "test", labels))
+    return found

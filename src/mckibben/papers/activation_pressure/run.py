@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -16,17 +16,16 @@ from mckibben.estimators.force.activation import (
     by_force,
     outermost,
 )
-from mckibben.papers.experiment import (
-    Curves,
-    Experiment,
-    Runs,
-    Verdict,
-    rms,
-)
+from mckibben.papers.experiment import Cell, Curves, Experiment, Runs, Verdict, rms
 from mckibben.recording import Recording
 from mckibben.signals.protocol import protocol
 
 THEIRS, OURS, SWARM = "the paper's", "ours", "the paper's, by particle swarm"
+FITS: dict[str, tuple[str, dict[str, Any]]] = {
+    THEIRS: ("activation-pressure", {}),
+    SWARM: ("activation-pressure", {"method": "pso"}),
+    OURS: ("activation-memory", {}),
+}
 QUALITIES = ("RMSE [% of range]", "correlation")
 
 QUICK = 3
@@ -68,11 +67,10 @@ def run(experiment: Experiment) -> None:
 
     slow, sines, waves = (by_condition(runs, s) for s in ("static", "hysteresis", "random"))
     train = [*slow.values(), *sines.values()]
-    experiment.tell(0.82, "the paper's model")
-    theirs: Any = experiment.fit(THEIRS, "activation-pressure", train).block
-    swarm: Any = experiment.fit(SWARM, "activation-pressure", train, {"method": "pso"}).block
-    experiment.tell(0.9, "ours")
-    experiment.fit(OURS, "activation-memory", train)
+    for name, (model, settings) in experiment.steps(0.82, 0.98, [*FITS.items()]):
+        experiment.fit(name, model, train, settings)
+    theirs: Any = experiment.models[THEIRS]
+    swarm: Any = experiment.models[SWARM]
     printed = experiment.paper.printed("activation-pressure-profile")
     study = Study(experiment, slow, sines, waves, printed, theirs, swarm)
     _scores(study, "sines", sines)
@@ -116,8 +114,10 @@ def _percent(model: ActivationPressure, at: tuple[float, float, str], one: Recor
     return 100 * rms(p - one["pressure"]) / float(np.ptp(one["pressure"]))
 
 
-def static_rmse(model: ActivationPressure, runs: Iterable[Recording]) -> float:
-    """Return the RMSE of the static pressure over runs [bar]."""
+def static_rmse(model: ActivationPressure, runs: Collection[Recording]) -> float | None:
+    """Return the RMSE of the static pressure over runs [bar], None without any."""
+    if not runs:
+        return None
     return rms(np.concatenate([static(model, run) - run["pressure"] for run in runs]))
 
 
@@ -150,17 +150,18 @@ def _profile(study: Study) -> None:
     experiment, slow = study.experiment, study.slow
     known = all(-0.1 * STRONGEST <= force <= 1.1 * STRONGEST for force, *_ in slow)
     models = {"printed": study.printed} if known else {}
-    rows: dict[str, list[float]] = {}
-    for force in dict.fromkeys(force for force, *_ in slow):
+    rows: dict[str, list[Cell]] = {}
+    for force in dict.fromkeys(force for force, *_ in slow or study.sines):
         own = [one for at, one in slow.items() if at[0] == force]
         for whose, model in (models | {"here": study.found}).items():
             cells = np.concatenate([values[ORDER] for values in points(model, force)]).tolist()
             rows[f"{force:.3g} N, {whose}"] = [*cells, static_rmse(model, own)]
     names = [f"e_{j + 1}" for j in ORDER] + [f"y_{j + 1} [bar]" for j in ORDER]
     experiment.table("points", [*names, "static RMSE [bar]"], rows)
-    experiment.says(static=static_rmse(study.found, slow.values()))
-    for model in models.values():
-        experiment.says(static_printed=static_rmse(model, slow.values()))
+    if slow:
+        experiment.says(static=static_rmse(study.found, slow.values()))
+        for model in models.values():
+            experiment.says(static_printed=static_rmse(model, slow.values()))
     experiment.says(slope=study.found.gamma[0], slope_printed=study.printed.gamma[0])
 
 
@@ -221,7 +222,7 @@ def _extremes(study: Study) -> None:
             "after": np.polyfit(*points(study.found, force), 3),
         }
         along = np.linspace(ends[0, 0], ends[1, 0], 400)
-        named = f"{abs(force):.3g} N"
+        named = f"{round(force, 1) + 0.0:.3g} N"
         spans = float(np.ptp(e)), float(np.ptp(y))
         rows[named] = [_distance(c, along, end, spans) for c in cubics.values() for end in ends]
         for when, cubic in cubics.items():

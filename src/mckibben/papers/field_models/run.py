@@ -15,12 +15,8 @@ from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.ranking import compare
 from mckibben.errors import MckibbenError, ModelError
 from mckibben.metrics import score
-from mckibben.papers.experiment import (
-    Cell,
-    Curves,
-    Experiment,
-    Verdict,
-)
+from mckibben.papers.experiment import Cell, Curves, Experiment, Verdict
+from mckibben.papers.field_models.protocol import HIGH, LOW
 from mckibben.papers.paper import paper
 from mckibben.recording import Recording
 
@@ -37,26 +33,26 @@ ALL_LAGS, LEAST_SQUARES = "BJ, B with q^-1", "PI by least squares, ours"
 GOOD = 90.0
 """Fitness that all four methods exceed in the paper [%]."""
 
-SAME = 0.05
-"""Difference of a range of pressure from the paper's, relative to it, up to which both are the same."""
+OWN_SPAN = 0.1
+"""Difference from the paper's span of pressure, relative to it, up to which its thresholds stay."""
 
 FAILED = [np.inf, -np.inf, np.inf, -np.inf]
 """RMSE and fitness on calibration, then on test, of a seed that gave no model."""
 
 
-def methods(pressure: Array) -> dict[str, tuple[str, dict[str, Any]]]:
+def methods(span: float) -> dict[str, tuple[str, dict[str, Any]]]:
     """Return the paper's four methods as published, and other readings of two of them.
 
     Of the NARX model the paper prints neither regressors nor mapping: this one is a sigmoid network on
     two past outputs and inputs, one sample late, fitted to one-step errors, of five starts the one with
     the least free-running error. Box-Jenkins has the printed orders, Eqs. (6) to (9): B has terms in q^0
     and q^-2, or, as its text has it ("second-order polynomials"), one in q^-1 as well. Like P2UZ it
-    starts at rest, as the muscle does. PI has the printed thresholds, or on another range of pressure
-    thresholds in proportion to it, and weights by the slopes of segments, Eqs. (14) and (15).
+    starts at rest, as the muscle does. PI has the printed thresholds, in proportion where the pressure
+    has another span than the paper's, and weights by the slopes of segments, Eqs. (14) and (15).
     """
-    printed = paper("field-models").models[PRINTED_PI]
-    wider = float(np.ptp(pressure) / np.ptp(printed["input_range"]))
-    thresholds = np.multiply(printed["thresholds"], wider if abs(wider - 1) > SAME else 1).tolist()
+    share = 1.0 if abs(span / (HIGH - LOW) - 1) < OWN_SPAN else span / (HIGH - LOW)
+    printed = paper("field-models").models[PRINTED_PI]["thresholds"]
+    thresholds = [share * r for r in printed]
     network = {"n_units": 10, "delay": 1, "refine": False, "allow_unstable": True, "n_starts": 5}
     return {
         NARX: ("narx-network", network),
@@ -135,13 +131,12 @@ def matched(model: Block, recording: Recording) -> Series:
 def _tried(
     experiment: Experiment, train: Recording, test: Recording, seeds: range
 ) -> dict[str, MethodResult]:
-    tell, every = experiment.within(0.05, 0.3), methods(train["pressure"])
+    every = methods(float(np.ptp(np.percentile(train["pressure"], (1, 99)))))
     found: dict[str, MethodResult] = {}
-    for place, (name, (model, settings)) in enumerate(every.items()):
+    for name, (model, settings) in experiment.steps(0.05, 0.3, [*every.items()]):
         models: list[tuple[Block, Series]] = []
-        errors, failures = [], []
-        for at, seed in enumerate(seeds):
-            tell((place + at / len(seeds)) / len(every), f"{name}, seed {seed}")
+        errors, failures, part = [], [], experiment.part
+        for seed in experiment.steps(*part, seeds):
             try:
                 own = settings | {"seed": seed}
                 plain = experiment.fit(f"{name} {seed}", model, train, own).block

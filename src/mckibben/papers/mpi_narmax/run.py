@@ -13,7 +13,6 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import BlockController, EstimatedLoad, track, tune_pid
-from mckibben.errors import DataError
 from mckibben.metrics import mae, rmse
 from mckibben.papers.experiment import (
     Cell,
@@ -23,11 +22,11 @@ from mckibben.papers.experiment import (
     Verdict,
 )
 from mckibben.papers.mpi_narmax import protocol
+from mckibben.papers.mpi_narmax.protocol import VARYING, driven
 from mckibben.recording import Recording
 from mckibben.rigs import Rig
 from mckibben.signals import cycles, resample, sine
 
-VARYING = 4  # status in which the force varies
 AS_PRINTED, ALL_RATES, PLAIN = "MPI-NARMAX", "MPI-NARMAX, all rates", "MPI-NARMAX, ours"
 MORE, OURS, PRESSURE = "MPI-NARMAX, more records", "balance", "balance, on recorded pressure"
 HEADLINE = (AS_PRINTED, ALL_RATES, PLAIN, OURS)
@@ -78,15 +77,6 @@ def run(experiment: Experiment) -> None:
         _track(study, experiment.rig)
 
 
-def driven(recordings: Sequence[Recording]) -> str:
-    """Return the input common to all recordings, besides displacement and force."""
-    shared = [x for x in ("voltage", "pressure") if all(x in one for one in recordings)]
-    if not shared:
-        remedy = "add the voltage of the valve to all of them, or the pressure"
-        raise DataError("the recordings share no input", channel="voltage", remedy=remedy)
-    return shared[0]
-
-
 def _fit(study: Study) -> None:
     """Fit models of single statuses without the force, then those with it."""
     experiment, runs, step = study.experiment, study.runs, study.step
@@ -120,8 +110,7 @@ def _fit(study: Study) -> None:
     left_out = [MORE] * experiment.quick + [PRESSURE] * (not sensed)  # MORE takes longest
     learners = [one for one in learners if one[0] not in left_out]
     rows: dict[str, tuple[Cell, ...]] = {}
-    for place, (name, family, settings, names) in enumerate(learners):
-        experiment.tell(0.1 + 0.75 * place / len(learners), name)
+    for name, family, settings, names in experiment.steps(0.1, 0.85, learners):
         own = {"input": (study.drive,)} | settings
         fitted = experiment.fit(name, family, [runs[run] for run in names], own)
         study.learned[name] = names

@@ -7,14 +7,18 @@ at held pressures of 1 to 6 bar the length is cycled (total force). Friction is 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
+from mckibben.papers.recognising import Labels
 from mckibben.recording import Recording
-from mckibben.rigs import Rig
+from mckibben.rigs import Rig, share
 from mckibben.signals.excitations import irregular_triangle, triangle
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
+from mckibben.signals.seen import Seen, grouped
 
 SAMPLE_TIME, LONGEST, HIGHEST = 0.02, 200.0, 6.0
 """Time between samples [s]; length at rest [mm] and highest pressure [bar] of the paper's muscle."""
@@ -41,7 +45,8 @@ VENTING, RISE = 10.0, 60.0
 def multistate_friction(rig: Rig | None = None) -> Protocol:
     """Return the isometric runs, the isobaric cycles, and one with minor loops.
 
-    On another test stand lengths are in proportion to its length at the start, pressures to its highest.
+    On another test stand lengths are in proportion to its length at the start, pressures to its highest;
+    one of less pressure contracts less, as far as the paper's muscle would at that pressure.
     """
     wide, strong = 1.0, 1.0
     if rig is not None:
@@ -49,7 +54,10 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
             remedy = "change a copy of the rig mas10-test-stand"
             raise DataError(f"the rig {rig.name!r} imposes no length", remedy=remedy)
         wide = rig.start.get("length", rig.limits("length").high) / LONGEST
-        strong = rig.limits("pressure").high / HIGHEST
+        strong = share(rig, "pressure", HIGHEST)
+    weak = min(strong, 1.0)
+    depths = [LONGEST - length for length in LENGTHS]
+    turns = [0.0, *SHORTEST], [0.0, *(LONGEST - shortest for shortest in SHORTEST.values())]
     runs = list[PlannedRun]()
 
     def add(name: str, role: Role, bars: Array, lengths: Array, lead: float = 0.0) -> None:
@@ -63,16 +71,19 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
     time = _time(lead + RISE)
     swung = SWING * np.clip(1.0 - time / (SWINGS * SWING_PERIOD), 0.0, 1.0)
     swinging = swung * np.sin(2 * np.pi * time / SWING_PERIOD)
-    for length, first in LENGTHS.items():
+    for first in LENGTHS.values():
+        length = LONGEST - float(np.interp(weak * first, [*LENGTHS.values()], depths))
         rising = np.interp(time, (lead - VENTING, lead, lead + RISE), (HIGHEST, first, HIGHEST))
         lengths = np.minimum(length + swinging, LONGEST)
         add(f"isometric-{wide * length:.4g}mm", "train", rising, lengths, lead)
-    for bar, shortest in SHORTEST.items():
-        period = 2 * (LONGEST - shortest) / SPEED
-        gone = triangle(_time(CYCLES * period), period, LONGEST - shortest)
+    for bar in SHORTEST:
+        depth = float(np.interp(weak * bar, *turns))
+        period = 2 * depth / SPEED
+        gone = triangle(_time(CYCLES * period), period, depth)
         role: Role = "train" if bar == IDENTIFIED_AT else "test"
         add(f"isobaric-{strong * bar:.3g}bar", role, np.full(gone.size, bar), LONGEST - gone)
-    gone = irregular_triangle(_time(120.0), 13, LONGEST - SHORTEST[IDENTIFIED_AT], seed=4)
+    depth = float(np.interp(weak * IDENTIFIED_AT, *turns))
+    gone = irregular_triangle(_time(120.0), 13, depth, seed=4)
     held = np.full(gone.size, IDENTIFIED_AT)
     add("isobaric-minor-loops", "test", held, LONGEST - gone)
     return Protocol(
@@ -87,3 +98,21 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
 
 def _time(duration: float) -> Array:
     return np.asarray(np.arange(round(duration / SAMPLE_TIME) + 1) * SAMPLE_TIME, dtype=float)
+
+
+def recognised(runs: Sequence[Seen]) -> list[Labels]:
+    """Return stages by what moves; the friction is identified at two thirds of the highest pressure."""
+    isometric = [one.moved("pressure") > one.moved("length") for one in runs]
+    held = ["length" if still else "pressure" for still in isometric]
+    levels = [one.level(channel) for one, channel in zip(runs, held, strict=True)]
+    cycled = [k for k, one in enumerate(runs) if not isometric[k] and one.regular("length")]
+    target = IDENTIFIED_AT / HIGHEST * max((levels[k] for k in cycled), default=0.0)
+    chosen = min(cycled, key=lambda k: abs(levels[k] - target), default=None)
+    tolerance = {channel: 0.02 * span for channel, span in runs[0].spans.items()}
+    found: list[Labels] = []
+    for k, (still, channel) in enumerate(zip(isometric, held, strict=True)):
+        alike = [level for level, other in zip(levels, held, strict=True) if other == channel]
+        level = dict(zip(alike, grouped(alike, tolerance[channel]), strict=True))[levels[k]]
+        role: Role = "train" if still or k == chosen else "test"
+        found.append(Labels(role, {"stage": "static" if still else "friction", channel: level}))
+    return found

@@ -86,8 +86,7 @@ def run(experiment: Experiment) -> None:
     isometric = runs.select(stage="static")
     experiment.tell(0.42, "static laws")
     found = _hysteresis(runs, _static_laws(experiment, isometric))
-    experiment.tell(0.45, "friction")
-    for model, name in CLOSED.items():
+    for model, name in experiment.steps(0.45, 0.65, [*CLOSED.items()]):
         of, settings = MODELS[model]
         fewer = {"n_refined": 4} if experiment.quick and model in FRICTIONS else {}
         closed = settings | FROM_FIRST_SAMPLE | fewer
@@ -119,11 +118,11 @@ def _static_laws(experiment: Experiment, isometric: Sequence[Recording]) -> Poly
     names = ("a_1 [N/bar]", "a_3 [N/(bar mm)]", "a_0 [N]", "a_2 [N/mm]", "a_4 [N/mm^2]")
     both = [experiment.paper.printed("multistate-static-force"), law.unscaled()]
     cells = sorted(zip(names, *(one.pack().tolist() for one in both), strict=True))
-    for bar in sorted({round(share * top) for share in (1 / 6, 2 / 3, 1.0)}):
+    for bar in sorted({float(f"{share * top:.2g}") for share in (1 / 6, 2 / 3, 1.0)}):
         for length in (min(held), max(held)):
             forces = [float(np.dot((bar, 1.0), one.terms(np.array(length)))) for one in both]
             given = forces[0] if 160 <= length <= 202 else None  # its muscle's lengths
-            cells.append((f"force at {length} mm, {bar} bar [N]", given, forces[1]))
+            cells.append((f"force at {length} mm, {bar:g} bar [N]", given, forces[1]))
     experiment.table("static", ["printed", "here"], cells)
     return law
 

@@ -18,12 +18,11 @@ from mckibben.estimators.coupled.fuzzy import Search, printed_swarm
 from mckibben.estimators.coupled.sdchm import learned_inverse
 from mckibben.metrics import crosstalk, loop_width
 from mckibben.papers.experiment import Cell, Curves, Experiment, Runs, Verdict
-from mckibben.papers.sdchm.protocol import PERIOD
+from mckibben.papers.sdchm.protocol import EXTENSOR, HIGHEST, PERIOD
 from mckibben.recording import REFERENCE, Recording
-from mckibben.rigs import Rig
+from mckibben.rigs import Rig, share
 from mckibben.system.workers import Tell, all_of
 
-EXTENSOR = "pressure_extensor"
 PUBLISHED, INDIVIDUAL = "SDCHM, as published", "individual hysteresis"
 OURS, BALANCE = "SDCHM, ours", "balance"
 SDIHC, SINGLE, SDIHC_OURS = "SDIHC, as published", "individual inverse", "SDIHC, ours"
@@ -78,7 +77,7 @@ def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
     outputs = by_name([*runs.values()])[1]
     quick, seed, step = experiment.quick, experiment.seed, 0.1 if experiment.quick else 0.05
     levels = [float(one[EXTENSOR].mean()) for one in runs.values()]
-    wanted = [1.0, *(p0 for _, p0 in MOVES), TASK_LEVEL]
+    wanted = np.array([1.0, *(p0 for _, p0 in MOVES), TASK_LEVEL]) * share(rig, EXTENSOR, HIGHEST)
     middle, *at, p0 = np.clip(wanted, min(levels), max(levels)).tolist()
     reached = min(max(float(one[y].max()) for one in runs.values()) for y in outputs)
     scale = min(1.0, REACHED * reached / (AMPLITUDE + OFFSET))

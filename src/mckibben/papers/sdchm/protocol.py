@@ -13,16 +13,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from mckibben.channels import by_name
+from mckibben.papers.recognising import Labels
 from mckibben.recording import Recording
+from mckibben.rigs import Rig, share
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
+from mckibben.signals.seen import Seen, grouped
 
 PERIOD, HIGHEST = 50.0, 2.5
 """Of every sine [s], and the pressure that all muscles withstand [bar], Table 1."""
+
+EXTENSOR = "pressure_extensor"
 
 PATTERNS = ("1", "2", "3", "123")
 """Muscles that are driven together; the others have no pressure."""
@@ -70,8 +77,11 @@ QUICK_RUNS = (
 """How names of runs begin that the quick run records."""
 
 
-def sdchm() -> Protocol:
-    """Return all runs: identification, network, prediction, coupling, stiffness, joint random."""
+def sdchm(rig: Rig | None = None) -> Protocol:
+    """Return all runs: identification, network, prediction, coupling, stiffness, joint random.
+
+    On another arm pressures are in proportion to its highest, that of the extensor to its own.
+    """
     runs = [
         _sines(stage, role, d, p0, peaks)
         for stage, role, patterns, levels, peaks in STAGES
@@ -79,20 +89,30 @@ def sdchm() -> Protocol:
         for d in patterns
     ]
     runs += [_joint(role, number, p0) for role in JOINT for number, p0 in enumerate(JOINT[role])]
+    shares = share(rig, "pressure_1", HIGHEST), share(rig, EXTENSOR, HIGHEST)
     return Protocol(
         name="sdchm",
         rig="soft-arm",
         source="Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for "
         "Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator, Sections 2.2 and 5.1",
-        runs=tuple(runs),
+        runs=tuple(_scaled(run, *shares) for run in runs),
         notes="Sines start at their minimum; network runs have cycles of (1.5, 2.5) bar. "
         "Runs with all pressures random are ours.",
     )
 
 
-def quick() -> tuple[Protocol, list[str]]:
+def _scaled(run: PlannedRun, of_muscles: float, of_extensor: float) -> PlannedRun:
+    """Return a run with its pressures in proportion; its name has the paper's."""
+    factors = dict.fromkeys(run.inputs.channels, of_muscles) | {EXTENSOR: of_extensor}
+    waves = {name: factor * run.inputs[name] for name, factor in factors.items()}
+    p0 = of_extensor * run.labels["p0"]
+    labels, start = {**run.labels, "p0": p0}, {f"start.{EXTENSOR}": p0}
+    return replace(run, inputs=Recording(waves, run.inputs.step), settings=start, labels=labels)
+
+
+def quick(rig: Rig | None = None) -> tuple[Protocol, list[str]]:
     """Return the protocol with shortened runs, and the names of the runs of a quick run."""
-    whole = sdchm()
+    whole = sdchm(rig)
     names = [run.name for run in whole.runs if run.name.startswith(QUICK_RUNS)]
     return replace(whole, name="sdchm-quick", runs=tuple(map(_shortened, whole.runs))), names
 
@@ -108,10 +128,10 @@ def _sines(stage: str, role: Role, driven: str, p0: float, peaks: Sequence[float
     rate = 50.0 if stage == "hysteresis" else 20.0
     wave = sine(np.arange(round(PERIOD * len(peaks) * rate)) / rate, PERIOD, peaks)
     channels = {f"pressure_{k}": wave if k in driven else 0.0 * wave for k in "123"}
-    inputs = Recording(channels | {"pressure_extensor": np.full(wave.size, p0)}, 1 / rate)
+    inputs = Recording(channels | {EXTENSOR: np.full(wave.size, p0)}, 1 / rate)
     name = NAMES.get(stage, f"{stage}-p0-{{p0}}-drive-{{d}}").format(d=driven, p0=p0)
     labels = {"stage": stage, "p0": p0, "driven": driven}
-    return PlannedRun(name, role, inputs, {"start.pressure_extensor": p0}, labels)
+    return PlannedRun(name, role, inputs, {}, labels)
 
 
 def _joint(role: Role, number: int, p0: float | None) -> PlannedRun:
@@ -122,8 +142,82 @@ def _joint(role: Role, number: int, p0: float | None) -> PlannedRun:
     moving = random_wave(time, 0.02, HIGHEST, seed=seed)
     extensor = moving if p0 is None else np.full(time.size, p0)
     channels = {f"pressure_{k}": wave for k, wave in waves.items()}
-    inputs = Recording(channels | {"pressure_extensor": extensor}, 1 / 20.0)
+    inputs = Recording(channels | {EXTENSOR: extensor}, 1 / 20.0)
     start, kind = float(extensor[0]), "moving" if p0 is None else "constant"
     name = f"joint-{role}-moving-{number}" if p0 is None else f"joint-{role}-p0-{p0}"
     labels = {"stage": "joint", "p0": start, "driven": "123", "extensor": kind}
-    return PlannedRun(name, role, inputs, {"start.pressure_extensor": start}, labels)
+    return PlannedRun(name, role, inputs, {}, labels)
+
+
+SAME = 0.02
+"""Largest difference of pressures that are meant to be equal, relative to the highest."""
+
+
+def recognised(runs: Sequence[Seen]) -> list[Labels]:
+    """Return stages by the muscles that move and their peaks, at the pressure of the extensor.
+
+    Pressures of the extensor train, validate and test as the paper's do where they are these, relative
+    to the highest; else every other one trains.
+    """
+    muscles = [name for name in by_name([runs[0].recording])[0] if name != EXTENSOR]
+    highest = max(float(np.percentile(one.recording[name], 99)) for one in runs for name in muscles)
+    apart = SAME * highest
+    levels = grouped([one.level(EXTENSOR) for one in runs], apart)
+    labels = [_moving(one, muscles, p0, apart) for one, p0 in zip(runs, levels, strict=True)]
+    single = [own for own in labels if own["stage"] == "single"]
+    peaks = grouped([own["peaks"][0] for own in single], apart)
+    for own, peak in zip(single, peaks, strict=True):
+        own["peaks"] = [peak]
+    for own in single:
+        weak = own["peaks"][0] < max(peaks)
+        alone = {len(each["driven"]) for each in single if each["peaks"] == own["peaks"]} == {1}
+        own["stage"] = "stiffness" if weak and alone else "coupling" if weak else "prediction"
+    roles = _roles({own["p0"] for own in labels if own["stage"] == "network"}, max(levels))
+    joint = [k for k, own in enumerate(labels) if own["stage"] == "joint"]
+    found: list[Labels] = []
+    for k, (one, own) in enumerate(zip(runs, labels, strict=True)):
+        alike = [j for j in joint if labels[j].get("extensor") == own.get("extensor")]
+        role: Role = "train" if own["stage"] == "hysteresis" else "test"
+        role = roles[own["p0"]] if own["stage"] == "network" else role
+        if k in joint:  # which are all alike: the last third tests
+            later = alike[::-1].index(k) / len(alike)
+            role = one.hint or (
+                "test" if later < 1 / 3 else "validation" if later < 1 / 2 else "train"
+            )
+        found.append(Labels(role, own))
+    return found
+
+
+def _moving(one: Seen, muscles: Sequence[str], p0: float, apart: float) -> dict[str, Any]:
+    """Return the labels of a run by the muscles that move in it."""
+    moving = [name for name in muscles if one.moves(name)]
+    driven = "".join(name.rpartition("_")[2] for name in moving)
+    labels: dict[str, Any] = {"p0": p0, "driven": driven}
+    if not moving:
+        return labels | {"stage": "rest"}
+    waves = [one.recording[name] for name in moving]
+    alike = all(np.percentile(np.abs(wave - waves[0]), 90) < 2 * apart for wave in waves)
+    if one.moves(EXTENSOR) or not alike or not one.regular(moving[0]):
+        extensor = "moving" if one.moves(EXTENSOR) else "constant"
+        return labels | {"stage": "joint", "extensor": extensor}
+    peaks = sorted({*grouped(one.peaks(moving[0]), apart)})
+    rising = len(peaks) > 2 and len(moving) == 1
+    stage = "single" if len(peaks) == 1 else "hysteresis" if rising else "network"
+    return labels | {"stage": stage, "peaks": peaks}
+
+
+def _roles(levels: set[float], highest: float) -> dict[float, Role]:
+    """Return the role of every pressure of the extensor."""
+    printed: dict[float, Role] = dict.fromkeys(TRAINING, "train")
+    validation: Role = "validation"
+    test: Role = "test"
+    printed |= dict.fromkeys(VALIDATION, validation) | dict.fromkeys(TEST, test)
+    scaled = {p0: p0 / (highest or 1.0) * HIGHEST for p0 in levels}
+    near = {p0: min(printed, key=lambda known: abs(known - own)) for p0, own in scaled.items()}
+    roles = {p0: printed[known] for p0, known in near.items()}
+    if {*roles.values()} == {*printed.values()}:
+        return roles
+    others = test, validation
+    ordered = sorted(levels)
+    ranked: dict[float, Role] = {p0: others[k // 2 % 2] for k, p0 in enumerate(ordered)}
+    return ranked | dict.fromkeys((*ordered[::2], *ordered[-1:]), "train")

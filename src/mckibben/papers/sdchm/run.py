@@ -36,7 +36,7 @@ Panels = dict[str, dict[str, tuple[Array, Array]]]
 
 def run(experiment: Experiment) -> None:
     """Record the patterns, identify the coupled models, predict, and track with their inverses."""
-    runs = experiment.record(*(quick() if experiment.quick else ()))
+    runs = experiment.record(*(quick(experiment.rig) if experiment.quick else ()))
     _motions(experiment, runs)
     _fits(experiment, runs)
     _parts(experiment, runs)
@@ -128,8 +128,7 @@ def _fits(experiment: Experiment, runs: Runs) -> None:
     sets = [runs.select(role, stage="network") for role in ("validation", "test")]
     rows: dict[str, list[Cell]] = {}
     by_seed: list[list[Cell]] = []
-    for place, (name, (model, changes)) in enumerate(chosen.items()):
-        experiment.tell(0.32 + 0.38 * place / len(chosen), name)
+    for name, (model, changes) in experiment.steps(0.32, 0.7, [*chosen.items()]):
         train = patterns + (joint if name.endswith(TOO) else [])
         several = name in (RAW, PUBLISHED) and all(sets) and not short
         tried: dict[float, Fitted] = {}

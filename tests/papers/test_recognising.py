@@ -1,0 +1,112 @@
+"""Recordings of rigs of any size are recognised as runs of a paper, whatever their names."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import Recording, registry
+from mckibben.errors import DataError
+from mckibben.papers.recognising import Recognised, recognise
+from mckibben.rigs import Rig, load_rig
+from mckibben.signals.protocol import PlannedRun, Protocol, protocol, scaling
+
+SMALLER: dict[str, dict[str, Any]] = {
+    "field-models": {"range.pressure.high": 3.0, "start.pressure": 0.5},
+    "mpi-narmax": {"range.voltage.high": 5.0, "range.force.high": 120.0},
+    "multistate-friction": {
+        "range.pressure.high": 3.0,
+        "range.length.high": 303.0,
+        "muscle.length": 300.0,
+        "start.length": 300.0,
+    },
+    "activation-pressure": {"range.pressure.high": 2.5, "range.force.high": 120.0},
+    "sdchm": {"range.pressure.high": 1.25},
+}
+"""Rigs of another size than the papers'."""
+
+PAPERS = registry.names("papers")
+
+
+def rig_of(paper: str, size: str) -> Rig:
+    rig = load_rig(protocol(paper).rig)
+    return rig.changed(SMALLER[paper]) if size == "smaller" else rig
+
+
+def measured(run: PlannedRun, name: str) -> Recording:
+    """Return a recording of a run, as far as recognition goes: its commands with noise."""
+    rng = np.random.default_rng(len(name))
+    lead = round(run.lead / run.inputs.step)
+    inputs = run.inputs.slice(lead, len(run.inputs))
+    channels = dict(inputs.channels)
+    if "force" in channels:
+        channels["force"] = channels["force"] + 9.81 * run.settings.get("payload", 0.0)
+    channels = {k: x + 0.001 * rng.standard_normal(x.size) for k, x in channels.items()}
+    still = np.zeros(len(inputs))
+    for channel in ("displacement", "contraction", "force", "displacement_1"):
+        channels.setdefault(channel, still)
+    return Recording(channels, inputs.step, meta={"name": name})
+
+
+def found_of(plan: Protocol, paper: str) -> tuple[Recognised, dict[str, PlannedRun]]:
+    named = {f"{2026 + k}": run for k, run in enumerate(plan.runs)}
+    return recognise(paper, [measured(run, name) for name, run in named.items()]), named
+
+
+@pytest.mark.parametrize("size", ["paper's", "smaller"])
+@pytest.mark.parametrize("paper", PAPERS)
+def test_runs_are_recognised_by_their_signals(paper: str, size: str) -> None:
+    plan = protocol(paper, rig_of(paper, size))
+    found, named = found_of(plan, paper)
+    assert found.absent == ""
+    assert [row[0] for row in found.rows] == [*named]
+    for name, run in named.items():
+        role, labels = found.runs.labels[name]
+        if run.labels.get("stage") == "joint":
+            continue  # all alike, so that roles are by order
+        assert role == run.role, run.name
+        for key in {*run.labels} - {"start"} - ({"stage"} if "status" in run.labels else set()):
+            planned = run.labels[key]
+            if isinstance(planned, float):
+                assert labels[key] == pytest.approx(planned, rel=0.03, abs=0.05), (run.name, key)
+            else:
+                assert labels[key] == planned, (run.name, key)
+
+
+@pytest.mark.parametrize("size", ["paper's", "smaller"])
+@pytest.mark.parametrize("paper", PAPERS)
+def test_no_command_is_beyond_the_rig(paper: str, size: str) -> None:
+    rig = rig_of(paper, size)
+    for run in protocol(paper, rig).runs:
+        changed = rig.changed(run.settings)
+        for channel, (low, high) in run.inputs.ranges.items():
+            limits = changed.limits(channel)
+            assert limits.low - 1e-9 <= low <= high <= limits.high + 1e-9, (run.name, channel)
+    factors = {one.factor for one in scaling(paper, rig)}
+    assert (factors == {1.0}) == (size == "paper's")
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_all_kinds_that_are_missing_are_named_at_once(paper: str) -> None:
+    run = protocol(paper).runs[-1]  # random, ours, or a test
+    with pytest.raises(DataError, match="needed, 0 there") as refused:
+        recognise(paper, [measured(run, "a")])
+    assert refused.value.remedy
+
+
+def test_channels_of_other_names_are_known_by_their_units() -> None:
+    plan = protocol("field-models")
+    own = [
+        Recording(
+            {"regulator": one["pressure"], "wire": one["displacement"]},
+            one.step,
+            units={"regulator": "bar", "wire": "mm"},
+            meta={"name": name},
+        )
+        for name, one in ((run.name, measured(run, run.name)) for run in plan.runs)
+    ]
+    found = recognise("field-models", own)
+    assert found.measured == {"regulator": "pressure", "wire": "displacement"}
+    assert found.runs.names("train") == ["decaying-triangle"]

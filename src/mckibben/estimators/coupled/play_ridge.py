@@ -2,8 +2,8 @@
 
 Linear in the readout: least squares on what a block with a unit readout gives, with a penalty that is
 chosen for every output by leaving out blocks of time, since generalized cross-validation, of one sample
-left out at a time, takes for evidence that samples which follow one another are alike. Inputs count from
-the least that is recorded, so that absolute and gauge pressure are penalised alike.
+left out at a time, takes for evidence that samples which follow one another are alike. Pressures count
+from the least that is recorded, so that absolute and gauge ones are penalised alike.
 
 Source: Hoerl and Kennard, "Ridge regression", Technometrics, 1970.
 """
@@ -87,6 +87,8 @@ class PlayRidgeEstimator(CoupledEstimator):
         lags = self.lags if data.sample_time is not None else (0.0,)
         inputs = data.stacked("inputs")
         spans = np.ptp(inputs, axis=0)
+        every = (*data.inputs, *data.scheduled)
+        relative = [channel.unit == "bar" for channel in every]  # a load of 0 is none
         width = readout_width(
             spans.size, len(lags), len(self.thresholds), self.degree, self.crossed
         )
@@ -99,7 +101,7 @@ class PlayRidgeEstimator(CoupledEstimator):
             data.scheduled,
             data.outputs,
             self.crossed,
-            vector(inputs.min(axis=0)),
+            vector(np.where(relative, inputs.min(axis=0), 0.0)),
         )
         blocks = []
         for place, run in enumerate(data.runs):

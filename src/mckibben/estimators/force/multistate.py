@@ -238,6 +238,16 @@ class MultistateEstimator(SeparableEstimator):
         law = force_law(self.static, linear[n:], offset, data, self.channels(data))
         return Parallel((law, friction))
 
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
+        """Return the model; of the eighteen parameters and the eleven the better: more are never worse.
+
+        Eleven are eighteen of which two elements have no F_c lengthening, which no search over positive
+        ones comes to.
+        """
+        if self.elements != "eighteen":
+            return super().identify(data, tracker)
+        return self.best_of("elements", ("eleven", EIGHTEEN), data, tracker)
+
 
 class EachWayMultistateEstimator(MultistateEstimator):
     """Multistate friction with one shared element and one for each direction: eleven parameters."""
@@ -267,13 +277,3 @@ class Multistate18Estimator(MultistateEstimator):
     can = "The paper's friction model of eighteen parameters; of eleven where these fit better."
     cannot = "Its structure is that of the paper's muscle; many parameters are poorly determined."
     elements = "eighteen"
-
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        """Return the better of eighteen and eleven parameters: more are never worse.
-
-        Eleven are eighteen of which two elements have no F_c lengthening, which no search over positive
-        ones comes to.
-        """
-        if self.elements != "eighteen":
-            return super().identify(data, tracker)
-        return self.best_of("elements", ("eleven", EIGHTEEN), data, tracker)

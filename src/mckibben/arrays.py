@@ -10,6 +10,9 @@ from mckibben.errors import DataError
 Array = NDArray[np.float64]
 """Double-precision numbers, of any shape."""
 
+Rows = NDArray[np.intp]
+"""Numbers of rows or samples."""
+
 Mask = NDArray[np.bool_]
 """Which of some samples are meant."""
 

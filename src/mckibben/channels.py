@@ -32,6 +32,9 @@ COORDINATES = "[xyz]"
 MOVED = (*ALONG, *TURNED, "output", COORDINATES)
 """Names of outputs."""
 
+QUANTITIES = {"mm": "displacement", "N": "force", "bar": "pressure", "V": "voltage", "rad": "angle"}
+"""Unit -> the channel of what has no name of a channel."""
+
 UNITS_DRIVING, UNITS_MOVED = ("bar", "V"), ("mm", "rad")
 """Units of inputs and of outputs, for names that are not recognised."""
 
@@ -473,16 +476,12 @@ def _loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tupl
     return found if len(found) < len(inputs) else ()
 
 
-MEASURES = {"bar": "pressure", "V": "voltage", "N": "force", "mm": "displacement"}
-"""What a channel of another name measures, by its unit."""
-
-
 def by_unit(one: Recording, wanted: Sequence[str]) -> dict[str, str]:
     """Return what channels of other names measure: by their units, and the number or place in the name.
 
     So ``p1`` in bar is ``pressure_1``. Where two would be the same channel, neither is.
     """
-    kinds = MEASURES | ({"mm": "length"} if "length" in wanted else {})
+    kinds = QUANTITIES | ({"mm": "length"} if "length" in wanted else {})
     found: dict[str, str] = {}
     for name in one.channels:
         unit, place = one.units.get(name) or "", re.search(r"(\d+|extensor)$", name)

@@ -97,13 +97,22 @@ PROVENANCE = ("file", "sha256")
 """Entries of ``meta`` on the file of a recording; recordings are compared without them."""
 
 
+def base_name(channel: str) -> str:
+    """Return a channel's name up to its first underscore: its quantity, or that it is set or asked for.
+
+    >>> base_name("pressure_extensor"), base_name("reference_displacement")
+    ('pressure', 'reference')
+    """
+    return channel.partition("_")[0]
+
+
 def standard_unit(channel: str) -> str | None:
     """Return the package's unit of a channel of this name, or None.
 
     >>> standard_unit("pressure_extensor"), standard_unit("displacement_model")
     ('bar', 'mm')
     """
-    return STANDARD_UNITS.get(channel.partition("_")[0])
+    return STANDARD_UNITS.get(base_name(channel))
 
 
 def conversion(wanted: str, given: str, rest_length: float | None) -> tuple[float, float] | None:

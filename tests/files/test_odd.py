@@ -12,6 +12,7 @@ import pytest
 
 import mckibben
 from mckibben.errors import DataError, DataWarning
+from mckibben.files.request import merged
 from mckibben.recording import Recording
 from tests.files.odd import UNITS, Odd, odd
 
@@ -59,14 +60,6 @@ def known(file: Odd, channel: str) -> dict[str, dict[str, str]]:
     return {"columns": {channel: header}, **units}
 
 
-def with_more(options: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    both: dict[str, Any] = {**options, **more}
-    for name in options.keys() & more.keys():
-        if isinstance(options[name], Mapping):
-            both[name] = {**options[name], **more[name]}
-    return both
-
-
 def followed(file: Odd) -> tuple[Recording | DataError, dict[str, Any]]:
     """Return what a file is read as if the remedies are followed, or the last refusal."""
     (path,) = file.paths
@@ -91,7 +84,7 @@ def followed(file: Odd) -> tuple[Recording | DataError, dict[str, Any]]:
                 raise WrongError(f"no remedy is right: {error}") from None
             if stated >= STEPS:
                 raise WrongError(f"after {stated} remedies: {error}") from None
-            options, stated = with_more(options, right[0]), stated + 1
+            options, stated = merged(options, right[0]), stated + 1
             continue
         unsure = [channel for channel in file.channels if channel not in found]
         counted = "sample number" in file.about or file.facts["time"] is None
@@ -106,9 +99,9 @@ def followed(file: Odd) -> tuple[Recording | DataError, dict[str, Any]]:
         if not unsure:
             return found, options
         more = known(file, unsure[0])
-        if with_more(options, more) == options:
+        if merged(options, more) == options:
             raise WrongError(f"{unsure[0]} is left out")
-        options = with_more(options, more)
+        options = merged(options, more)
     raise WrongError("it goes in a circle")
 
 

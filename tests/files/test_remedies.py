@@ -10,6 +10,7 @@ import pytest
 
 import mckibben
 from mckibben.errors import DataError
+from mckibben.files.request import Request
 from tests.files.made import Cells, one, put, refused, several
 
 N = 200
@@ -67,6 +68,19 @@ def test_a_second_question_with_one_answer_is_answered_at_once(tmp_path: Path) -
     (options,) = refused(path).options
     assert options == {"units": {"force": "kgf"}, "sample_time": 0.02}
     assert one(path, **options)["force"] == pytest.approx(9.80665 * Y)
+
+
+def test_an_option_without_a_value_takes_back_what_was_stated() -> None:
+    request = Request(units={"contraction": "mm"}, rate=50.0)
+    more = {"units": {"contraction": None, "displacement": "mm"}, "rate": None}
+    assert request.changed(more) == Request(units={"displacement": "mm"})
+
+
+def test_millimetres_stated_of_a_contraction_are_offered_as_a_displacement(tmp_path: Path) -> None:
+    path = put(tmp_path / "run.csv", "t_s,p_bar,contraction", T, P, Y)
+    (options,) = refused(path, units={"contraction": "mm"}).options
+    assert options["units"] == {"displacement": "mm", "contraction": None}
+    assert options["columns"] == {"displacement": "contraction"}
 
 
 STATED: dict[str, tuple[str, Cells, Options, Cells]] = {

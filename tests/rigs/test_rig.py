@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from mckibben import DataError, DataWarning
-from mckibben.recording import Recording
+from mckibben.recording import Recording, base_name
 from mckibben.rigs import load_rig, rig_names, save_rig
-from mckibben.rigs.rig import quantity
 from mckibben.signals import irregular_triangle, sine
 
 
@@ -35,7 +34,7 @@ def test_saved_stepped_and_finely_integrated_rigs_agree(name: str, tmp_path: Pat
     coarse = rig.run(given, ideal=True)
     fine = rig.changed({"integration_step": rig.integration_step / 2}).run(given, ideal=True)
     for channel in rig.outputs:
-        sensor = rig.sensor[quantity(channel)]
+        sensor = rig.sensor[base_name(channel)]
         change = np.sqrt(np.mean((coarse[channel] - fine[channel]) ** 2))
         assert change <= max(sensor.noise, sensor.resolution)
 

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Rows
 from mckibben.files.headers import names_channel, parse, unit_of
 from mckibben.files.request import Source
 from mckibben.files.table import Column
 from mckibben.files.timebase import GAP
 from mckibben.files.units import find
-
-Spots = NDArray[np.intp]
-"""Rows, counted from 0."""
+from mckibben.recording import base_name
 
 FEWEST_RENEWALS = 20
 """Changes of a channel by which the rate at which it is renewed is recognised."""
@@ -36,6 +32,9 @@ CAUSES = ("pressure", "voltage", "command")
 
 SET = ("voltage", "command", "reference")
 """Quantities that are set from outside: they hold until they are set anew."""
+
+DRIVES = {*CAUSES, *SET}
+"""Quantities that may jump."""
 
 
 def apart(named: Mapping[str, Column], time: Array) -> tuple[dict[str, Column], dict[str, float]]:
@@ -60,39 +59,38 @@ def apart(named: Mapping[str, Column], time: Array) -> tuple[dict[str, Column], 
     numbers = {
         name: column.values
         for name, column in named.items()
-        if name != "time" and column.values is not None and column.flaw is None
+        if column.values is not None and column.flaw is None
     }
-    there = {name: np.flatnonzero(np.isfinite(values)) for name, values in numbers.items()}
-    there = {name: rows for name, rows in there.items() if rows.size}
-    complete = reduce(np.intersect1d, there.values()) if there else np.arange(time.size)
+    there = {name: np.isfinite(values) for name, values in numbers.items()}
+    there = {name: mask for name, mask in there.items() if mask.any()}
     renewed: dict[str, float] = {}
-    if complete.size < time.size / 2:
-        rows = there
+    if there and np.logical_and.reduce(list(there.values())).mean() < 0.5:
+        rows = {name: np.flatnonzero(mask) for name, mask in there.items()}
     else:
-        drives = [values for name, values in numbers.items() if name.partition("_")[0] in CAUSES]
+        drives = [values for name, values in numbers.items() if base_name(name) in CAUSES]
         outputs = {name: x for name, x in numbers.items() if _is_output(name, named[name])}
         found = {name: _renewals(x, drives) for name, x in outputs.items()}
         rows = {name: at for name, at in found.items() if at is not None}
         renewed = {name: time.size / at.size for name, at in rows.items()}
     if not rows:
         return dict(named), {}
-    columns = {name: column for name, column in named.items() if name != "time"}
+    columns = dict(named)
     for name, values in numbers.items():
         at = rows.get(name, np.arange(time.size))
-        held = columns[name].held or name.partition("_")[0] in SET
+        held = columns[name].held or base_name(name) in SET
         columns[name] = replace(columns[name], values=values[at], times=time[at], held=held)
     return columns, renewed
 
 
 def _is_output(name: str, column: Column) -> bool:
     """Return whether a column is a length, an angle, a force or a torque, by name or by unit."""
-    if name.partition("_")[0] in SET:
+    if base_name(name) in SET:
         return False
     unit = find(column.unit or parse(column.label).unit or "")
     return bool({unit_of(name), unit and unit.target} & {"mm", "rad", *PULLS})
 
 
-def _renewals(values: Array, drives: Sequence[Array]) -> Spots | None:
+def _renewals(values: Array, drives: Sequence[Array]) -> Rows | None:
     """Return the rows in which a slow sensor was read, or None for one that was read in every row.
 
     Its changes are on a grid of more than one row, unlike each other in size, as those of a coarse
@@ -102,10 +100,10 @@ def _renewals(values: Array, drives: Sequence[Array]) -> Spots | None:
     changes = np.flatnonzero(steps) + 1
     if changes.size < FEWEST_RENEWALS:
         return None
-    sizes, apart = np.abs(steps[changes - 1]), np.diff(changes)
-    pitch = float(apart[apart <= 1.5 * np.median(apart)].mean())
-    missed = np.maximum(1.0, np.rint(apart / pitch))
-    on_grid = np.abs(apart - pitch * missed) < min(1.0, 0.25 * pitch)
+    sizes, gaps = np.abs(steps[changes - 1]), np.diff(changes)
+    pitch = float(gaps[gaps <= 1.5 * np.median(gaps)].mean())
+    missed = np.maximum(1.0, np.rint(gaps / pitch))
+    on_grid = np.abs(gaps - pitch * missed) < min(1.0, 0.25 * pitch)
     coarse = np.median(sizes) < 1.5 * np.quantile(sizes, 0.05)
     if pitch < 1.5 or np.mean(on_grid) < REGULAR or coarse:
         return None
@@ -113,11 +111,11 @@ def _renewals(values: Array, drives: Sequence[Array]) -> Spots | None:
     inside = np.interp(np.arange(count[-1] + 1), count, changes)
     before = changes[0] - pitch * np.arange(int(changes[0] / pitch), 0, -1)
     after = changes[-1] + pitch * np.arange(1, int((values.size - 1 - changes[-1]) / pitch) + 1)
-    rows: Spots = np.rint(np.concatenate([before, inside, after])).astype(np.intp)
+    rows: Rows = np.rint(np.concatenate([before, inside, after])).astype(np.intp)
     return rows if any(_moves_between(values, drive, rows) for drive in drives) else None
 
 
-def _moves_between(values: Array, drive: Array, rows: Spots) -> bool:
+def _moves_between(values: Array, drive: Array, rows: Rows) -> bool:
     """Return whether a drive moves steadily between rows in which a signal is renewed, and with it."""
     whole, within = np.diff(drive[rows]), drive[rows[1:] - 1] - drive[rows[:-1]]
     share = 1.0 - 1.0 / np.mean(np.diff(rows))
@@ -195,7 +193,7 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
     left_out: list[str] = []
     for name, column in named.items():
         own = clocks.get(name)
-        if own is None and name != "time" and column.values is not None:
+        if own is None and column.values is not None:
             values = np.full(grid.size, column.values[0])  # a constant that the folder describes
             columns[name] = replace(column, values=values)
         elif own is not None and (name in needed or _spans(own, grid)):
@@ -224,11 +222,9 @@ def _at(column: Column, times: Array, grid: Array) -> Array:
     if column.held:
         return np.where((grid >= times[0]) & (grid <= times[-1]), column.values[before], np.nan)
     found: Array = np.interp(grid, times, column.values)
-    steps = np.append(np.diff(times), 0.0)
-    step = float(np.median(np.diff(times)))
-    found[(grid <= times[0] - step) | (grid >= times[-1] + step)] = (
-        np.nan
-    )  # a sample holds that long
-    widest = max(GAP * float(np.median(np.diff(times))), float(np.median(np.diff(grid))))
-    found[(steps[before] > widest) & (grid > times[before])] = np.nan
+    steps = np.diff(times)
+    step = float(np.median(steps))
+    found[(grid <= times[0] - step) | (grid >= times[-1] + step)] = np.nan
+    widest = max(GAP * step, float(np.median(np.diff(grid))))
+    found[(np.append(steps, 0.0)[before] > widest) & (grid > times[before])] = np.nan
     return found

@@ -8,21 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Rows
 from mckibben.errors import DataError
 from mckibben.files import clocks, instants, quality, timebase, wrapping
 from mckibben.files.channels import NAME, Channel, Time
 from mckibben.files.choosing import assign
+from mckibben.files.clocks import DRIVES
 from mckibben.files.headers import is_time, parse, snake_case, time_unit, unit_of, unknown_ending
 from mckibben.files.notices import listed
 from mckibben.files.request import GAPS_BRIDGED, Source
 from mckibben.files.table import Column
 from mckibben.files.timebase import Times
 from mckibben.files.units import COUNTS, Unit, convert, find, weight
-from mckibben.recording import COMMAND, REFERENCE, REST_LENGTH, conversion, standard_unit
-
-DRIVES = ("pressure", "voltage", REFERENCE.rstrip("_"), COMMAND.rstrip("_"))
-"""What is set from outside: it may jump, and be held."""
+from mckibben.recording import REST_LENGTH, base_name, conversion, standard_unit
 
 ASSUMED = "no unit is given, so these are assumed: "
 """Beginning of a note on assumed units."""
@@ -60,13 +58,13 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     if any(column.times is not None for column in columns.values()):
         columns, dropped = clocks.on_one(columns, source)
         left_out |= dict.fromkeys(dropped, "it does not cover the times of the others")
-        began = None if times is None else times.began
-        times = replace(times_of(columns.pop("time"), source, "s"), began=began)
+        grid = np.asarray(columns.pop("time").values)
+        times = Times(grid, began=None if times is None else times.began)
         source = replace(source, table=replace(source.table, lines=None))
     signals: dict[str, Signal] = {}
     flawed: DataError | None = None
     derived = source.derived(columns)
-    drives = [c.values for n, c in columns.items() if n.partition("_")[0] in DRIVES]
+    drives = [c.values for n, c in columns.items() if base_name(n) in DRIVES]
     jumps = wrapping.jumps_of(values for values in drives if values is not None)
     for name, column in columns.items():
         try:
@@ -186,10 +184,8 @@ def _apart(columns: dict[str, Column], times: Times | None, source: Source) -> d
     return found
 
 
-def times_of(column: Column, source: Source, unit: str | None = None) -> Times:
-    """Return the times in a column of numbers, perhaps in a known unit, or of dates."""
-    if unit is not None and column.values is not None:
-        return Times(column.values, unit)
+def times_of(column: Column, source: Source) -> Times:
+    """Return the times in a column of numbers or dates."""
     if column.values is None:
         since, began = instants.seconds(column.texts, source)
         return Times(since, began=began)
@@ -203,13 +199,13 @@ def times_of(column: Column, source: Source, unit: str | None = None) -> Times:
     return Times(values, unit, stated or unit != "s", assumed)
 
 
-def _signal(channel: str, column: Column, jumps: wrapping.Rows, source: Source) -> Signal:
+def _signal(channel: str, column: Column, jumps: Rows, source: Source) -> Signal:
     """Return a channel in the package's unit, NaN for missing samples; drives have ``jumps``."""
     raw = _numbers(channel, column, source)
     calibration = _calibration(channel, column, source)
     own, standard = source.table.own, unit_of(channel)
     cleaned = not own and not source.request.raw
-    if cleaned and channel.partition("_")[0] not in DRIVES:  # a sawtooth can be commanded
+    if cleaned and base_name(channel) not in DRIVES:  # a sawtooth can be commanded
         raw = wrapping.unwrapped(channel, raw, jumps, source)
     values = raw
     if "gain" in calibration:

@@ -9,12 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
+from mckibben.channels import QUANTITIES
 from mckibben.files.names import AMBIGUOUS, CHANNELS, ROLES, UNITS, words_of
 from mckibben.files.units import COUNTS, GAUGE, find, find_listed, weight
 from mckibben.recording import standard_unit
-
-QUANTITIES = {"mm": "displacement", "N": "force", "bar": "pressure", "V": "voltage", "rad": "angle"}
-"""Unit -> the channel of what has no name of a channel."""
 
 LONGEST = 256
 """Characters of a header."""

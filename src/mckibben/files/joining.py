@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise, permutations
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from mckibben.files.headers import unit_of
 from mckibben.files.notices import listed, warn
 from mckibben.files.request import GAPS_BRIDGED, Request, Source
 from mckibben.files.table import Column, Table
+from mckibben.files.timebase import YEARS_2001_TO_2103
 from mckibben.recording import SAME_TIME, Recording
 
 MEETS = 0.02
@@ -24,9 +26,6 @@ MEETS = 0.02
 
 STEPS_BETWEEN = 3.0
 """The same in median steps of the channel; and the longest gap of pieces in sample times."""
-
-EPOCH = 1e9
-"""Times above this [s] are since 1970."""
 
 MOST_PAIRED = 20
 """Recordings of which all pairs are compared."""
@@ -78,28 +77,47 @@ def _joined(recordings: Sequence[Recording], request: Request) -> Recording:
     return _side_by_side(_on_one_clock(own), request)
 
 
-def continues(before: Recording, after: Recording) -> bool:
-    """Return whether a recording begins where another ends, away from where that began."""
-    if list(before.channels) != list(after.channels) or not _same_step(before, after):
-        return False
-    if _follows(before, after):
-        return True
-    drives = by_name([before])[0]
+class _Extent(NamedTuple):
+    """First and last sample of a channel, its range, and its usual step."""
+
+    first: float
+    last: float
+    low: float
+    high: float
+    step: float
+
+
+def _extents(recording: Recording) -> dict[str, _Extent]:
+    return {
+        name: _Extent(x[0], x[-1], x.min(), x.max(), float(np.median(np.abs(np.diff(x)))))
+        for name, x in recording.channels.items()
+    }
+
+
+def _meet(
+    before: Mapping[str, _Extent], after: Mapping[str, _Extent], drives: Sequence[str]
+) -> bool:
+    """Return whether channels begin where others end, away from where a drive of these began."""
     whole = True
-    for name, samples in before.channels.items():
-        width = float(np.ptp(np.concatenate([samples, after[name]])))
-        near = MEETS * width + STEPS_BETWEEN * float(np.median(np.abs(np.diff(samples))))
-        if abs(after[name][0] - samples[-1]) > near:
+    for name, one in before.items():
+        other = after[name]
+        width = max(one.high, other.high) - min(one.low, other.low)
+        if abs(other.first - one.last) > MEETS * width + STEPS_BETWEEN * one.step:
             return False
-        whole &= name not in drives or abs(samples[-1] - samples[0]) < AWAY * width
+        whole &= name not in drives or abs(one.last - one.first) < AWAY * width
     return not whole
 
 
 def continued(recordings: Sequence[Recording]) -> Iterator[tuple[Recording, str]]:
     """Yield recordings of several files that may be one run with another, and why."""
-    pairs = permutations(recordings, 2) if len(recordings) <= MOST_PAIRED else pairwise(recordings)
-    for before, after in pairs:
-        if before.source != after.source and continues(before, after):
+    if len({one.source for one in recordings}) < 2:
+        return
+    each = [(one, _extents(one), by_name([one])[0]) for one in recordings]
+    pairs = permutations(each, 2) if len(each) <= MOST_PAIRED else pairwise(each)
+    for (before, ends, drives), (after, starts, _) in pairs:
+        if before.source == after.source or list(ends) != list(starts):
+            continue
+        if _same_step(before, after) and (_follows(before, after) or _meet(ends, starts, drives)):
             yield after, f"it begins where {before.name} ends; if both are one run, use `join`"
     names = [{name for name in one if unit_of(name)} for one in recordings]
     if len(names) == 2 and all(names) and not names[0] & names[1]:
@@ -142,7 +160,7 @@ def _moment(recording: Recording) -> float | None:
     if isinstance(began, str):
         dated = "T" in began
         return pd.Timestamp(began if dated else f"1970-01-01T{began}").timestamp()
-    return recording.start_time if recording.start_time > EPOCH else None
+    return recording.start_time if recording.start_time > YEARS_2001_TO_2103[0] else None
 
 
 def _starting(recording: Recording, start: float) -> Recording:

@@ -9,15 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.arrays import Rows
 from mckibben.errors import DataError
 from mckibben.files.headers import is_time, parse
 from mckibben.files.instants import may_be_instant
 from mckibben.files.notices import warn
 from mckibben.files.sniffing import Layout
 from mckibben.files.units import find
-
-Rows = NDArray[np.intp]
-"""Numbers of lines, counted from 1."""
 
 MOST = 0.1
 """Largest share of lines with digits that are no samples; a file with more is refused."""

@@ -5,13 +5,16 @@ from __future__ import annotations
 import inspect
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
+from typing import TypeVar
 
 from mckibben.errors import DataWarning
 from mckibben.printing import printable
 from mckibben.recording import Recording
+
+Item = TypeVar("Item")
 
 _HERE = str(Path(__file__).parent)
 _NOTED: ContextVar[list[str] | None] = ContextVar("noted", default=None)
@@ -24,26 +27,24 @@ def listed(items: Sequence[str], most: int = 30) -> str:
     return ", ".join(items[:most]) + more
 
 
-@contextmanager
-def noted() -> Iterator[list[str]]:
+def noted() -> AbstractContextManager[list[str]]:
     """Collect the texts of warnings issued within the context."""
-    notes: list[str] = []
-    token = _NOTED.set(notes)
-    try:
-        yield notes
-    finally:
-        _NOTED.reset(token)
+    return _collecting(_NOTED)
+
+
+def observed() -> AbstractContextManager[list[Recording]]:
+    """Collect the recordings that are read within the context."""
+    return _collecting(_OBSERVED)
 
 
 @contextmanager
-def observed() -> Iterator[list[Recording]]:
-    """Collect the recordings that are read within the context."""
-    recordings: list[Recording] = []
-    token = _OBSERVED.set(recordings)
+def _collecting(where: ContextVar[list[Item] | None]) -> Iterator[list[Item]]:
+    items: list[Item] = []
+    token = where.set(items)
     try:
-        yield recordings
+        yield items
     finally:
-        _OBSERVED.reset(token)
+        where.reset(token)
 
 
 def observe(recordings: list[Recording]) -> list[Recording]:

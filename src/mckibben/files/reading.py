@@ -27,7 +27,7 @@ from mckibben.files.table import Table
 from mckibben.files.timebase import Times
 from mckibben.keywords import ReadKeywords
 from mckibben.options import ReadOptions, given_options
-from mckibben.recording import Recording
+from mckibben.recording import Recording, base_name
 from mckibben.signals import resample, zeroed
 from mckibben.signals.lags import comes_first, lags
 
@@ -313,13 +313,15 @@ def _stated_step(times: Times | None, source: Source) -> float | None:
         return step if table.sample_time is None else table.sample_time
     problem = f"{problem}, which is not the {1 / step:g} a second requested"
     given = {name: None for name in ("rate", "sample_time") if getattr(request, name) is not None}
-    raise source.error(problem, "delete the column of times", "time", options=[given])
+    raise source.error(
+        problem, "delete the column of times", "time", options=[given] if given else []
+    )
 
 
 def _refuse_constant(pieces: Sequence[gaps_in.Piece], source: Source) -> None:
     for name in source.request.channels or ():
         samples = np.concatenate([piece.samples[name] for piece in pieces])
-        held = name.partition("_")[0] in MAY_BE_HELD or name in source.request.constants
+        held = base_name(name) in MAY_BE_HELD or name in source.request.constants
         if not held and np.ptp(samples) == 0:
             remedy = (
                 f"give a recording in which it changes, or another column, `columns[{name}]=COLUMN`"

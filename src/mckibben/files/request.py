@@ -90,8 +90,12 @@ class Request(ReadOptions):
                 )
 
     def changed(self, options: Mapping[str, Any]) -> Request:
-        """Return the request with more options, or with others in place of what it has."""
-        return replace(self, **merged({name: getattr(self, name) for name in options}, options))
+        """Return the request with more options, or with others in place of what it has; None is none."""
+        more = merged({name: getattr(self, name) for name in options}, options)
+        for name, value in more.items():
+            if isinstance(value, Mapping):
+                more[name] = {key: each for key, each in value.items() if each is not None}
+        return replace(self, **more)
 
     @property
     def interprets(self) -> bool:
@@ -128,7 +132,7 @@ class Request(ReadOptions):
 
 
 def merged(before: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return options with others, also within mappings; None leaves one out."""
+    """Return options with others, also within mappings."""
     both: dict[str, Any] = {**before}
     for name, value in more.items():
         both[name] = merged(both.get(name) or {}, value) if isinstance(value, Mapping) else value

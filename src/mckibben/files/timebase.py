@@ -9,16 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Rows
 from mckibben.errors import DataError
 from mckibben.files.headers import snake_case
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.units import convert
 from mckibben.files.wrapping import wraps
-
-Rows = NDArray[np.intp]
-"""Numbers of rows, counted from 0, shape (m,)."""
 
 Spans = NDArray[np.intp]
 """Start and stop of each span of samples, stop excluded, shape (m, 2)."""
@@ -35,13 +32,13 @@ STEPS = (
 )
 """Names of scalars that are sample times [s]."""
 
-_SINCE_1970 = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
-"""Units of times since 1970, and how many are a second."""
+_PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+"""Units of times that are counted, and how many are a second."""
 
 MOST_WITHOUT_TIME = 0.05
 """Largest share of rows without a time that are left out."""
 
-_YEARS_2001_TO_2103 = (1e9, 4.2e9)
+YEARS_2001_TO_2103 = (1e9, 4.2e9)
 """Seconds since 1970."""
 
 
@@ -221,8 +218,8 @@ def unit_by_size(time: Array, source: Source) -> str | None:
             "spreadsheets count them, or seconds"
         )
         raise source.error(problem, "", "time", 0, _time_units("day", "s"))
-    first, last = _YEARS_2001_TO_2103
-    for unit, per_second in _SINCE_1970.items():
+    first, last = YEARS_2001_TO_2103
+    for unit, per_second in _PER_SECOND.items():
         within = first <= low / per_second and high / per_second < last
         if within and unit in plausible_units(time):
             source.warn(
@@ -251,9 +248,9 @@ def plausible_units(time: Array) -> list[str]:
     """
     steps, duration = np.diff(time), float(time[-1] - time[0])
     step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
-    sizes = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-    units = [unit for unit, size in sizes.items() if 1e-4 <= size * step <= 5.0]
-    return sorted(units, key=lambda unit: not 2.0 <= sizes[unit] * duration <= 86_400.0) or ["ms"]
+    units = [unit for unit, size in _PER_SECOND.items() if 1e-4 <= step / size <= 5.0]
+    usual = {unit: 2.0 <= duration / _PER_SECOND[unit] <= 86_400.0 for unit in units}
+    return sorted(units, key=lambda unit: not usual[unit]) or ["ms"]
 
 
 def _time_units(*units: str) -> list[dict[str, dict[str, str]]]:

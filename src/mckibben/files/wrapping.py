@@ -10,13 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, Rows
 from mckibben.files.request import Source
-
-Rows = NDArray[np.intp]
-"""Numbers of rows, counted from 0."""
 
 SOON = 5
 """Rows after a jump of a drive in which an output may follow."""

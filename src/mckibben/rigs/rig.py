@@ -19,7 +19,7 @@ from pydantic import PrivateAttr, ValidationError, model_validator
 from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.recording import PROVENANCE, Recording
+from mckibben.recording import PROVENANCE, Recording, base_name
 from mckibben.rigs.commands import Commands
 from mckibben.rigs.files import PUBLISHED, REMEDY, describe, fields_of, rig_names
 from mckibben.rigs.parameters import AGEING, Air, Muscle, Range, Section, Sensor, parameter
@@ -73,9 +73,9 @@ class Rig(DrawsItself, Section, ABC):
     @model_validator(mode="after")
     def _channels_fit(self) -> Self:
         for name in self.inputs:
-            if not {name, quantity(name)} & set(self.range):
+            if not {name, base_name(name)} & set(self.range):
                 raise ValueError(f"range: there is none for the input {name!r}")
-        known = {*self.inputs, *map(quantity, self.inputs)}
+        known = {*self.inputs, *map(base_name, self.inputs)}
         for section, given in (("range", self.range), ("start", self.start)):
             for name in given:
                 if name not in known:
@@ -250,7 +250,7 @@ class Rig(DrawsItself, Section, ABC):
         return Recording(
             {**applied, **readings},
             inputs.sample_time,
-            units={name: "ml" for name in readings if quantity(name) == "volume"},
+            units={name: "ml" for name in readings if base_name(name) == "volume"},
             start_time=inputs.start_time,
             meta={
                 **{key: value for key, value in inputs.meta.items() if key not in PROVENANCE},
@@ -270,7 +270,7 @@ class Rig(DrawsItself, Section, ABC):
             "displacement": 10 * (self.rest_length or np.inf),
         }
         for name, samples in readings.items():
-            if not (np.abs(samples) < highest.get(quantity(name), np.inf)).all():
+            if not (np.abs(samples) < highest.get(base_name(name), np.inf)).all():
                 raise DataError(
                     f"the simulation of {self.name!r} diverges: its steps are too long for it",
                     channel=name,
@@ -322,7 +322,7 @@ class Rig(DrawsItself, Section, ABC):
 
     def limits(self, name: str) -> Range:
         """Return the hardware limits of an input channel."""
-        return self.range[name] if name in self.range else self.range[quantity(name)]
+        return self.range[name] if name in self.range else self.range[base_name(name)]
 
     @property
     def signature(self) -> str:
@@ -352,7 +352,7 @@ class Rig(DrawsItself, Section, ABC):
         )
 
     def _sensed(self, name: str, true: Array, noise: Array | float) -> Array:
-        sensor = self.sensor[quantity(name)]
+        sensor = self.sensor[base_name(name)]
         shown = true + sensor.offset + sensor.noise * noise
         if sensor.resolution:
             shown = np.round(np.round(shown / sensor.resolution) * sensor.resolution, 12)
@@ -393,7 +393,7 @@ class Rig(DrawsItself, Section, ABC):
         return self._rest
 
     def _start(self, name: str) -> float:
-        rest = self.start.get(name, self.start.get(quantity(name)))
+        rest = self.start.get(name, self.start.get(base_name(name)))
         return self.limits(name).low if rest is None else rest
 
 
@@ -409,11 +409,6 @@ def _volumes(traces: Traces) -> dict[str, Array]:
     """Return the volume of every muscle [ml], which no sensor measures."""
     m = traces.room.shape[1]
     return {f"volume_{j + 1}" if m > 1 else "volume": 1e-3 * traces.room[:, j] for j in range(m)}
-
-
-def quantity(channel: str) -> str:
-    """Return the quantity of a channel: ``pressure_2`` and ``pressure_extensor`` are ``pressure``."""
-    return channel.partition("_")[0]
 
 
 # -- its file, and the published rig of its name ---------------------------------------------

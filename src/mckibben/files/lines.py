@@ -36,7 +36,7 @@ def samples(rows: Sequence[bytes], layout: Layout, path: Path) -> tuple[list[int
     lines = np.array(rows, dtype=object)[numbers - 1]
     counts, begins = _measured(lines, numbers, layout, path)
     wrong = (counts > len(layout.headers)) | (counts < layout.least)
-    end = _end(lines, numbers, begins & ~wrong, path)
+    end = _end(lines, numbers, begins & ~wrong, len(layout.headers), path)
     numbers, lines, begins, wrong = numbers[:end], lines[:end], begins[:end], wrong[:end]
     if 2 * begins.sum() >= begins.size:
         wrong[[k for k in np.flatnonzero(~begins) if _is_of_words(lines[k], layout)]] = True
@@ -90,22 +90,26 @@ def _measured(
     return np.diff(cells, prepend=0) + 1, begins
 
 
-def _end(lines: Sequence[bytes], numbers: Rows, sound: NDArray[np.bool_], path: Path) -> int:
+def _end(
+    lines: Sequence[bytes], numbers: Rows, sound: NDArray[np.bool_], width: int, path: Path
+) -> int:
     """Return the number of lines before words behind a blank line, such as "Maximum", with a note.
 
     Unless a good part of the samples follows.
     """
     named = re.compile(rb"[\s\"]*[A-Za-z\x80-\xff]").match
-    blank = re.compile(rb"[\s\",;|]*$").match  # separators alone
-    behind = [
-        k for k in range(1, len(lines)) if numbers[k] - numbers[k - 1] > 1 or blank(lines[k - 1])
-    ]
+    if named(lines[0]):
+        return len(lines)
+    separators = re.compile(rb"[\s\",;|]*$").match
+    short = np.flatnonzero(np.fromiter(map(len, lines), np.intp) <= 2 * width)
+    blank = [int(k) for k in short if separators(lines[k])]
+    behind = np.union1d(np.flatnonzero(np.diff(numbers) > 1), blank).astype(np.intp) + 1
     so_far = np.cumsum(sound)
-    for at in map(int, behind) if not named(lines[0]) else ():
+    for at in map(int, behind[behind < len(lines)]):
         if named(lines[at]) and so_far[-1] - so_far[at] <= MOST * so_far[at]:
             rest = lines[at].decode("utf-8", "replace")
             warn(path, f"from row {numbers[at]} on it is no table, left out: {rest[:60]!r}")
-            while blank(lines[at - 1]):
+            while separators(lines[at - 1]):
                 at -= 1
             return at
     return len(lines)

@@ -57,8 +57,7 @@ def _is_code(code: float, known: Array) -> bool:
     # a muscle rests at 0 before and after it moves, and as often as not
     if not at.any() or at.all() or (code == 0 and (at[0] or at[-1] or at.mean() > 0.25)):
         return False
-    runs = true_runs(at)
-    if code == 0 and np.median(runs[:, 1] - runs[:, 0]) > LONGEST_DROPOUT:
+    if code == 0 and np.median(np.diff(true_runs(at))) > LONGEST_DROPOUT:
         return False
     others = known[~at]
     low, high = others.min(), others.max()

@@ -16,8 +16,9 @@ from mckibben import Recording, registry
 from mckibben.checkpoints import Checkpoints
 from mckibben.cli.main import app
 from mckibben.errors import DataError, ModelError
-from mckibben.papers.experiment import Experiment, Labels, Runs, Verdict, reproduce
+from mckibben.papers.experiment import Experiment, Verdict, reproduce
 from mckibben.papers.paper import Paper, paper, papers
+from mckibben.papers.recognising import Labels, Runs
 from mckibben.report.reproduction import comparison, drawing, heading, markdown, reproduction_page
 from mckibben.rigs import load_rig, rig_names
 from mckibben.signals.protocol import protocol

@@ -14,7 +14,8 @@ from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.checkpoints import Checkpoints
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.papers.activation_pressure.run import by_condition
-from mckibben.papers.experiment import Experiment, Labels, Runs
+from mckibben.papers.experiment import Experiment
+from mckibben.papers.recognising import Labels, Runs
 from mckibben.rigs import load_rig
 from mckibben.signals import triangle
 from mckibben.signals.protocol import protocol

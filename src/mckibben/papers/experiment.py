@@ -20,9 +20,7 @@ from mckibben.blocks.base import Block
 from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelWarning
 from mckibben.papers.paper import FigureText, Paper, TableText, paper
-from mckibben.papers.recognising import Labels as Labels
-from mckibben.papers.recognising import Recognised, recognise
-from mckibben.papers.recognising import Runs as Runs
+from mckibben.papers.recognising import Labels, Recognised, Runs, recognise
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, load_rig, record
 from mckibben.signals.protocol import Protocol, protocol, scaling

@@ -11,8 +11,8 @@ from mckibben.channels import by_unit, renamed
 from mckibben.errors import DataError
 from mckibben.papers.paper import paper
 from mckibben.recording import Recording
+from mckibben.signals.features import features_of
 from mckibben.signals.protocol import Role
-from mckibben.signals.seen import seen
 
 NOTED, UNLIKE = "as its rig noted", "like no run of the paper, not used"
 
@@ -95,7 +95,7 @@ def recognise(name: str, data: Sequence[Recording]) -> Recognised:
 def _labels(name: str, every: Mapping[str, Recording], noted: Collection[str]) -> dict[str, Labels]:
     others = [one for n, one in every.items() if n not in noted]
     by_signals = import_module(registry.load("protocols", name).__module__).recognised
-    found = iter(by_signals(seen(others)) if others else ())
+    found = iter(by_signals(features_of(others)) if others else ())
     return {
         n: Labels(one.meta["role"], one.meta["labels"]) if n in noted else next(found)
         for n, one in every.items()

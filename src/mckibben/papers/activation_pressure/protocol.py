@@ -16,8 +16,8 @@ from mckibben.recording import Recording
 from mckibben.rigs import Rig, share
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
+from mckibben.signals.features import Features, grouped
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
-from mckibben.signals.seen import Seen, grouped
 
 SAMPLE_TIME = 0.005
 FORCES = (0.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
@@ -90,7 +90,7 @@ def _run(
     )
 
 
-def recognised(runs: Sequence[Seen]) -> list[Labels]:
+def recognised(runs: Sequence[Features]) -> list[Labels]:
     """Return stages by the shape and rate of the pressure, at the force that is held."""
     apart = 0.03 * runs[0].spans["force"]
     forces = grouped([one.level("force") for one in runs], apart)

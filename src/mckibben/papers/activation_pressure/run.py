@@ -16,7 +16,8 @@ from mckibben.estimators.force.activation import (
     by_force,
     outermost,
 )
-from mckibben.papers.experiment import Cell, Curves, Experiment, Runs, Verdict, rms
+from mckibben.papers.experiment import Cell, Curves, Experiment, Verdict, rms
+from mckibben.papers.recognising import Runs
 from mckibben.recording import Recording
 from mckibben.signals.protocol import protocol
 

@@ -16,8 +16,8 @@ from mckibben.papers.recognising import Labels
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, share
 from mckibben.signals.excitations import irregular_triangle, triangle
+from mckibben.signals.features import Features
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
-from mckibben.signals.seen import Seen
 
 SAMPLE_TIME = 0.02
 PERIOD = 10.0
@@ -55,7 +55,7 @@ def _run(name: str, role: Role, wave: Array) -> PlannedRun:
     return PlannedRun(name, role, Recording({"pressure": wave}, SAMPLE_TIME), start)
 
 
-def recognised(runs: Sequence[Seen]) -> list[Labels]:
+def recognised(runs: Sequence[Features]) -> list[Labels]:
     """Return which run calibrates, by cycles of equal times, and which tests, by irregular ones."""
     roles: list[Role] = ["train" if one.regular("pressure") else "test" for one in runs]
     if len({*roles}) == 1:  # signals of other shapes, told apart by their names, or their order

@@ -17,11 +17,12 @@ from mckibben.errors import DataError
 from mckibben.papers.recognising import Labels
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, share
+from mckibben.rigs.physics.compiled import GRAVITY
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine, triangle
+from mckibben.signals.features import Features
 from mckibben.signals.loads import pulls, ramps
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
-from mckibben.signals.seen import Seen
 
 SAMPLE_TIME, TIME = 0.001, 60.0
 """Of all runs, and how long they are, but for those at 0.05 Hz [s]."""
@@ -35,8 +36,8 @@ STRONGEST = 300.0
 VARYING = 4
 """Status in which the force varies."""
 
-GRAVITY, UNLOADED, STILL = 9.81, 0.1, 0.05
-"""[m/s2]; largest force of a run without load, relative to the largest of all; largest change of an
+UNLOADED, STILL = 0.1, 0.05
+"""Largest force of a run without load, relative to the largest of all; largest change of an
 input that is held, relative to its range."""
 
 PULLED_FROM = 20.0
@@ -80,7 +81,7 @@ def mpi_narmax(rig: Rig | None = None) -> Protocol:
     moving("status-4", "test", "pulls", 0.22, hand=150.0, status=4)
     for f in (0.05, 0.1, 0.2):
         moving(f"free-{f:g}Hz", "train", "free", f)
-        moving(f"weight-{f:g}Hz", "test", "weight", f, mass=91 / 9.81)
+        moving(f"weight-{f:g}Hz", "test", "weight", f, mass=91 / GRAVITY)
         moving(f"hand-{f:g}Hz", "test", "pulls", f, hand=100.0)
     time = np.arange(round(TIME / SAMPLE_TIME)) * SAMPLE_TIME
     pulled = np.where(time < PULLED_FROM, 0.0, triangle(time, 20.0, 150.0))
@@ -107,7 +108,7 @@ def driven(recordings: Sequence[Recording]) -> str:
     return shared[0]
 
 
-def recognised(runs: Sequence[Seen]) -> list[Labels]:
+def recognised(runs: Sequence[Features]) -> list[Labels]:
     """Return stages by drive and force, and the statuses: by weight, pull and frequency."""
     drive = driven([one.recording for one in runs])
     strongest = max(float(np.percentile(one.recording["force"], 99)) for one in runs)
@@ -139,7 +140,7 @@ def recognised(runs: Sequence[Seen]) -> list[Labels]:
     return [Labels("train" if id(own) in kept else "test", own) for own in every]
 
 
-def _stage(one: Seen, drive: str, strongest: float) -> dict[str, Any]:
+def _stage(one: Features, drive: str, strongest: float) -> dict[str, Any]:
     """Return the labels of a run by what moves in it."""
     u, force = one.recording[drive], one.recording["force"]
     level = float(np.median(u[len(u) // 2 :]))

@@ -14,15 +14,10 @@ from mckibben.arrays import Array
 from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import BlockController, EstimatedLoad, track, tune_pid
 from mckibben.metrics import mae, rmse
-from mckibben.papers.experiment import (
-    Cell,
-    Curves,
-    Experiment,
-    Runs,
-    Verdict,
-)
+from mckibben.papers.experiment import Cell, Curves, Experiment, Verdict
 from mckibben.papers.mpi_narmax import protocol
 from mckibben.papers.mpi_narmax.protocol import VARYING, driven
+from mckibben.papers.recognising import Runs
 from mckibben.recording import Recording
 from mckibben.rigs import Rig
 from mckibben.signals import cycles, resample, sine

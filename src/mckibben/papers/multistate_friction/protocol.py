@@ -17,8 +17,8 @@ from mckibben.papers.recognising import Labels
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, share
 from mckibben.signals.excitations import irregular_triangle, triangle
+from mckibben.signals.features import Features, grouped
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
-from mckibben.signals.seen import Seen, grouped
 
 SAMPLE_TIME, LONGEST, HIGHEST = 0.02, 200.0, 6.0
 """Time between samples [s]; length at rest [mm] and highest pressure [bar] of the paper's muscle."""
@@ -100,7 +100,7 @@ def _time(duration: float) -> Array:
     return np.asarray(np.arange(round(duration / SAMPLE_TIME) + 1) * SAMPLE_TIME, dtype=float)
 
 
-def recognised(runs: Sequence[Seen]) -> list[Labels]:
+def recognised(runs: Sequence[Features]) -> list[Labels]:
     """Return stages by what moves; the friction is identified at two thirds of the highest pressure."""
     isometric = [one.moved("pressure") > one.moved("length") for one in runs]
     held = ["length" if still else "pressure" for still in isometric]

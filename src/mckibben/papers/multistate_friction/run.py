@@ -17,16 +17,9 @@ from mckibben.control import track
 from mckibben.estimators.catalogue import full_name
 from mckibben.estimators.force.multistate import extract_hysteresis
 from mckibben.metrics import score
-from mckibben.papers.experiment import (
-    Cell,
-    Curves,
-    Experiment,
-    Fitted,
-    Runs,
-    Verdict,
-    rms,
-)
+from mckibben.papers.experiment import Cell, Curves, Experiment, Fitted, Verdict, rms
 from mckibben.papers.multistate_friction.protocol import SAMPLE_TIME
+from mckibben.papers.recognising import Runs
 from mckibben.recording import Recording
 from mckibben.signals import cycles
 from mckibben.signals.excitations import irregular_triangle

@@ -17,7 +17,8 @@ from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.fuzzy import Search, printed_swarm
 from mckibben.estimators.coupled.sdchm import learned_inverse
 from mckibben.metrics import crosstalk, loop_width
-from mckibben.papers.experiment import Cell, Curves, Experiment, Runs, Verdict
+from mckibben.papers.experiment import Cell, Curves, Experiment, Verdict
+from mckibben.papers.recognising import Runs
 from mckibben.papers.sdchm.protocol import EXTENSOR, HIGHEST, PERIOD
 from mckibben.recording import REFERENCE, Recording
 from mckibben.rigs import Rig, share

@@ -23,8 +23,8 @@ from mckibben.recording import Recording
 from mckibben.rigs import Rig, share
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
+from mckibben.signals.features import Features, grouped
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
-from mckibben.signals.seen import Seen, grouped
 
 PERIOD, HIGHEST = 50.0, 2.5
 """Of every sine [s], and the pressure that all muscles withstand [bar], Table 1."""
@@ -153,7 +153,7 @@ SAME = 0.02
 """Largest difference of pressures that are meant to be equal, relative to the highest."""
 
 
-def recognised(runs: Sequence[Seen]) -> list[Labels]:
+def recognised(runs: Sequence[Features]) -> list[Labels]:
     """Return stages by the muscles that move and their peaks, at the pressure of the extensor.
 
     Pressures of the extensor train, validate and test as the paper's do where they are these, relative
@@ -188,7 +188,7 @@ def recognised(runs: Sequence[Seen]) -> list[Labels]:
     return found
 
 
-def _moving(one: Seen, muscles: Sequence[str], p0: float, apart: float) -> dict[str, Any]:
+def _moving(one: Features, muscles: Sequence[str], p0: float, apart: float) -> dict[str, Any]:
     """Return the labels of a run by the muscles that move in it."""
     moving = [name for name in muscles if one.moves(name)]
     driven = "".join(name.rpartition("_")[2] for name in moving)

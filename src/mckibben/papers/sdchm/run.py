@@ -11,7 +11,8 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.channels import by_name
 from mckibben.metrics import err, loop_width, rmse
-from mckibben.papers.experiment import Cell, Experiment, Fitted, Runs, Verdict, rms
+from mckibben.papers.experiment import Cell, Experiment, Fitted, Verdict, rms
+from mckibben.papers.recognising import Runs
 from mckibben.papers.sdchm import loops
 from mckibben.papers.sdchm.loops import BALANCE, OURS, PUBLISHED
 from mckibben.papers.sdchm.protocol import PATTERNS, quick

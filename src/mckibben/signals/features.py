@@ -38,7 +38,7 @@ HINTS: Mapping[Role, str] = {
 
 
 @dataclass(frozen=True)
-class Seen:
+class Features:
     """What the signals of a recording show; ``spans`` are the ranges of channels over all recordings."""
 
     recording: Recording
@@ -98,7 +98,7 @@ class Seen:
         return np.diff(np.array(rises, dtype=np.float64)) * self.recording.step
 
 
-def seen(recordings: Sequence[Recording]) -> list[Seen]:
+def features_of(recordings: Sequence[Recording]) -> list[Features]:
     """Return what the signals of every recording show."""
     lows, highs = dict[str, float](), dict[str, float]()
     for one in recordings:
@@ -107,7 +107,7 @@ def seen(recordings: Sequence[Recording]) -> list[Seen]:
             lows[channel] = min(low, lows.get(channel, np.inf))
             highs[channel] = max(high, highs.get(channel, -np.inf))
     spans = {channel: max(highs[channel] - lows[channel], 1e-9) for channel in lows}
-    return [Seen(one, spans) for one in recordings]
+    return [Features(one, spans) for one in recordings]
 
 
 def grouped(values: Sequence[float], apart: float) -> list[float]:

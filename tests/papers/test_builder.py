@@ -4,24 +4,18 @@ from __future__ import annotations
 
 import re
 import subprocess
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
-import click
 import numpy as np
 import pytest
 
 from mckibben import Recording, registry
 from mckibben.checkpoints import Checkpoints
-from mckibben.cli.main import app
 from mckibben.errors import DataError, ModelError
 from mckibben.papers.experiment import Experiment, Verdict, reproduce
-from mckibben.papers.paper import Paper, paper, papers
+from mckibben.papers.paper import paper, papers
 from mckibben.papers.recognising import Labels, Runs
 from mckibben.report.reproduction import comparison, drawing, heading, markdown, reproduction_page
-from mckibben.rigs import load_rig, rig_names
-from mckibben.signals.protocol import protocol
 
 ROOT = Path(__file__).parents[2]
 PAGES = ROOT / "docs" / "papers"
@@ -45,71 +39,6 @@ def test_papers_are_numbered_one_after_another() -> None:
     assert [each.number for each in papers().values()] == [*range(1, len(PAPERS) + 1)]
     with pytest.raises(ModelError, match="field-models"):
         paper("nobody")
-
-
-def exists(where: str) -> bool:
-    """Tell whether a dotted name can be imported, or is of a rig."""
-    if where in rig_names():
-        return True
-    parts = where.split(".")
-    for end in range(len(parts), 0, -1):
-        try:
-            found = import_module(".".join(parts[:end]))
-        except ImportError:
-            continue
-        for name in parts[end:]:
-            found = getattr(found, name, None)  # type: ignore[assignment]
-        return found is not None
-    return False
-
-
-@pytest.mark.parametrize("name", PAPERS)
-def test_every_line_of_an_index_leads_somewhere(name: str) -> None:
-    about: Paper = paper(name)
-    for item in about.items:
-        kind, _, key = item.here.partition(":")
-        keys = {"table": [*about.tables], "figure": [*about.figures], "model": [*about.models]}
-        known = keys.get(kind)
-        assert not item.here or (exists(item.here) if known is None else key in known), item
-    listed = {item.here for item in about.items}
-    redrawn = {f"table:{key}": text.of for key, text in about.tables.items()}
-    redrawn |= {f"figure:{key}": text.of for key, text in about.figures.items()}
-    assert {key for key, of in redrawn.items() if of} <= listed
-
-
-MODELLED = {
-    "activation-pressure": {"contraction"},
-    "field-models": {"pressure"},
-    "mpi-narmax": {"voltage"},
-    "multistate-friction": {"length", "pressure"},  # the latter is the input of the static law
-    "sdchm": {"pressure_1", "pressure_2", "pressure_3"},
-}
-"""What each paper's models are driven by."""
-
-
-@pytest.mark.parametrize("name", PAPERS)
-def test_commands_of_an_index_are_whole_and_fit_what_the_paper_fits(name: str) -> None:
-    rig = load_rig(protocol(name).rig)
-    channels = sorted({*rig.inputs, *rig.outputs, *paper(name).channels})
-    waves = np.random.default_rng(0).uniform(1.0, 2.0, (len(channels), 100))
-    whole = Recording(dict(zip(channels, waves, strict=True)), 0.1)
-    still = {one: np.ones(100) for one in rig.inputs}
-    alone = [whole.with_channels(**still | {one: whole[one]}) for one in rig.inputs]
-    for words in (item.command.split() for item in paper(name).items if item.command):
-        command: Any = app
-        for word in words[1:]:
-            if isinstance(command, click.Group):
-                command = command.get_command(click.Context(app), word)
-        wanted = [{*one.opts} for one in command.params if one.required and one.opts[0][0] == "-"]
-        assert all(options & {*words} for options in wanted), words
-        if words[1] == "fit":
-            given = {side: words[words.index(side) + 1] for side in words if side[:2] == "--"}
-            model = registry.load("estimators", words[2])
-            found = model.resolved(
-                [whole, *alone], given.get("--input"), given.get("--output"), None
-            )
-            assert model.objection([whole, *alone], found) is None, words
-            assert {*model.own_roles(found).inputs} <= MODELLED[name], words
 
 
 @pytest.mark.parametrize("name", PAPERS)

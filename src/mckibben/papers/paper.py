@@ -5,6 +5,7 @@ All of it is data, ``paper.toml`` in the paper's folder; the code there computes
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from functools import cache
@@ -29,7 +30,8 @@ class Item(_Strict):
 
     ``of`` is its number in the paper. ``here`` is a table or figure of the re-run or a printed model by
     its key (``table:KEY``, ``figure:KEY``, ``model:NAME``), a rig, a module or class, or nothing.
-    ``differs`` is empty where it is exact; ``command`` computes it.
+    ``differs`` is empty where it is exact. ``command`` is the name of the command that computes it; of a
+    table or figure of the re-run, by default that of the re-run.
     """
 
     of: Words
@@ -37,6 +39,11 @@ class Item(_Strict):
     here: str = ""
     differs: str = ""
     command: str = ""
+
+    @property
+    def computed_by(self) -> str:
+        """Name of the command that computes it, empty if none does."""
+        return self.command or ("reproduce" if re.match("table:|figure:", self.here) else "")
 
 
 class RunKind(_Strict):
@@ -85,8 +92,9 @@ class Paper(_Strict):
 
     ``given`` is what is taken from the paper or set, ``found`` what the recordings determine.
     Sentences of ``summary`` have fields in braces, which the experiment fills; one without its fields
-    is left out. ``notes`` are differences from the paper, ``quick`` what a quick run omits. Kinds of
-    runs, tables, figures and printed models are by key.
+    is left out. ``notes`` are differences from the paper, ``quick`` what a quick run omits. Command lines
+    run in one folder, in the order of the items, once ``record`` has. Commands, kinds of runs, tables,
+    figures and printed models are by key.
     """
 
     number: int
@@ -102,6 +110,7 @@ class Paper(_Strict):
     summary: dict[str, Words]
     notes: tuple[Words, ...]
     quick: Words
+    commands: dict[str, Words]
     items: tuple[Item, ...]
     runs: dict[str, RunKind]
     tables: dict[str, TableText]

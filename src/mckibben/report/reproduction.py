@@ -182,6 +182,10 @@ def _lines(found: Reproduction, date: str, pictures: str) -> Iterator[str]:
     )
     yield f"{paper.protocol}\n"
     yield "## Where everything is\n"
+    yield (
+        "The commands run in one folder, in the order of the rows, once "
+        f"`{paper.commands['record']}` has recorded the rig.\n"
+    )
     yield "| in the paper | what it is | here | exact, or how it differs | command |"
     yield "|---|---|---|---|---|"
     yield from (_indexed(item, found) for item in paper.items)
@@ -216,7 +220,7 @@ def _indexed(item: Indexed, found: Reproduction) -> str:
     here = f'`printed("{key}")`' if kind == "model" else f"`{item.here}`" if item.here else "–"
     here = f"[{key}](#{_anchor(titles[0])})" if titles else here
     differs = item.differs or ("the same quantities, on the rig" if titles else "exact")
-    command = f"`{item.command}`" if item.command else ""
+    command = f"`{found.paper.commands[item.computed_by]}`" if item.computed_by else ""
     return f"| {item.of} | {item.what} | {here} | {differs} | {command} |"
 
 

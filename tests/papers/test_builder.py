@@ -31,7 +31,7 @@ def experiment(name: str = "field-models", quick: bool = True) -> Experiment:
         seed=0,
         jobs=1,
         kept=Checkpoints(None),
-        tell=lambda share, text: None,
+        progress=lambda share, text: None,
     )
 
 
@@ -80,6 +80,43 @@ def test_printed_figures_stand_before_ours() -> None:
     (panel,) = comparison(table).panels
     assert [curve.style for curve in panel.curves] == ["rings", "dots"]
     assert "quick" in heading(table, quick=True)
+
+
+def test_printed_figures_in_units_are_of_rigs_of_the_papers_size() -> None:
+    made = experiment("sdchm")
+    made.of_its_size = False
+    made.table("gains", ["gain"], {"G21": [0.2]}, printed=0.4, here=0.5)
+    errors = ["Err [%], SDCHM, as published", "RMSE [mm], SDCHM, as published"]
+    made.table("groups", errors, {"(a) p1, y1": [2.0, 1.0]}, p0=0.1)
+    gains, groups = made.tables
+    assert gains.columns == ("of", "gain, printed", "gain")
+    assert f"{errors[0]}, printed" in groups.columns
+    assert f"{errors[1]}, printed" not in groups.columns
+    profile = experiment("activation-pressure")
+    profile.of_its_size = False
+    profile.table("points", ["e_1"], {"0 N, printed": [0.1], "0 N, here": [0.2]})
+    profile.says(slope=0.2, slope_printed=0.267)
+    x = np.linspace(0.0, 1.0, 9)
+    profile.figure("rates", {"gamma": {"printed": (x, x), "here": (x, x)}})
+    assert profile.tables[0].rows == (("0 N, here", 0.2),)
+    assert [*profile.figures[0].panels["gamma"]] == ["here"]
+    assert not profile.done("a rig").summary
+
+
+def test_recordings_that_are_there_are_no_part_of_the_work() -> None:
+    shares: list[float] = []
+    time = np.arange(0.0, 60.0, 0.02)
+    runs = [
+        Recording({"pressure": u, "displacement": 5 * u}, 0.02, meta={"name": name})
+        for name in ("a", "b")
+        for u in [3.0 + np.sin(time)]
+    ]
+    made = experiment()
+    made.data, made.progress = runs, lambda share, text: shares.append(share)
+    made.record(until=0.8)
+    for share in (0.8, 0.9, 1.0):
+        made.tell(share, "")
+    assert shares == pytest.approx([0.0, 0.5, 1.0])
 
 
 def test_a_sentence_without_its_facts_is_left_out_and_models_that_warn_are_named() -> None:

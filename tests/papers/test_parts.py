@@ -53,7 +53,7 @@ def experiment(folder: Path, name: str = "multistate-friction") -> Experiment:
         seed=0,
         jobs=1,
         kept=Checkpoints(folder, name),
-        tell=lambda share, text: None,
+        progress=lambda share, text: None,
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from mckibben import Recording, registry
 from mckibben.errors import DataError
-from mckibben.papers.recognising import Recognised, recognise
+from mckibben.papers.recognising import Recognised, of_its_size, recognise
 from mckibben.rigs import Rig, load_rig
 from mckibben.signals.protocol import PlannedRun, Protocol, protocol, scaling
 
@@ -62,6 +62,7 @@ def test_runs_are_recognised_by_their_signals(paper: str, size: str) -> None:
     found, named = found_of(plan, paper)
     assert found.absent == ""
     assert [row[0] for row in found.rows] == [*named]
+    assert of_its_size(paper, found.runs) == (size == "paper's")
     for name, run in named.items():
         role, labels = found.runs.labels[name]
         if run.labels.get("stage") == "joint":

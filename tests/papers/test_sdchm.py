@@ -18,7 +18,9 @@ from mckibben.papers.sdchm.loops import (
     held,
     widths,
 )
+from mckibben.papers.sdchm.protocol import strength
 from mckibben.papers.sdchm.run import DAMPED, LINEAR
+from mckibben.rigs import load_rig
 
 OUTPUTS = ("displacement_1", "displacement_2", "displacement_3")
 
@@ -40,6 +42,12 @@ def test_widths_are_of_the_own_range_and_of_the_range_that_moves() -> None:
     assert found["e_w of y1 [%]"] == pytest.approx(width, rel=0.01)
     assert found["cross-motion of y2 [%]"] == pytest.approx(width * 2 / 12, rel=0.01)
     assert found["cross-motion of y3 [%]"] == 0.0
+
+
+def test_loads_are_in_proportion_to_the_muscles() -> None:
+    rig = load_rig("soft-arm")
+    smaller = rig.changed({"range.pressure.high": 1.25, "muscle.diameter": 15.0})
+    assert (strength(rig), strength(smaller)) == (1.0, 0.125)
 
 
 @pytest.mark.long

@@ -20,7 +20,7 @@ from mckibben.blocks.base import Block
 from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelWarning
 from mckibben.papers.paper import FigureText, Paper, TableText, paper
-from mckibben.papers.recognising import Labels, Recognised, Runs, recognise
+from mckibben.papers.recognising import Labels, Recognised, Runs, of_its_size, recognise
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, load_rig, record
 from mckibben.signals.protocol import Protocol, protocol, scaling
@@ -34,6 +34,7 @@ Progress = Callable[[float, str], None]
 Item = TypeVar("Item")
 
 OWN = "User recordings; descriptions of signals refer to the paper's rig."
+OTHER_SIZE = "Of another size than the paper's rig: printed figures in its units are left out."
 
 RECOGNISED = "Which run of the paper each recording is"
 SCALED = TableText(title="How the protocol is scaled for this rig", rows="command")
@@ -150,11 +151,19 @@ class Experiment:
 
     Parameters
     ----------
-    name, rig, data, quick, seed, jobs
-        As of `reproduce`; ``rig`` is None with recordings alone.
+    name : str
+        Of `mckibben.registry.names` ("papers").
+    rig : Rig, optional
+        That is recorded, and on which loops are closed.
+    data : sequence of Recording, optional
+        Recordings of the paper's runs instead, of any size; see `recognise`.
+    quick : bool
+        Whether to leave out what takes long.
+    seed, jobs
+        Of everything random; processes, default as many as there are cores.
     kept : Checkpoints
         Fits, until all is done.
-    tell : callable
+    progress : callable
         Called with the share done, and what is next.
     """
 
@@ -165,7 +174,7 @@ class Experiment:
     seed: int = 0
     jobs: int | None = None
     kept: Checkpoints = field(default_factory=lambda: Checkpoints(None))
-    tell: Progress = _no_progress
+    progress: Progress = _no_progress
 
     def __post_init__(self) -> None:
         self.paper = paper(self.name)
@@ -176,7 +185,12 @@ class Experiment:
         self.warned: dict[str, None] = {}
         self.part = (0.0, 0.0)
         self.absent: list[str] = []
+        self.of_its_size, self.begun = True, 0.0
         self._free: dict[tuple[str, int], tuple[Recording, Recording]] = {}
+
+    def tell(self, share: float, text: str) -> None:
+        """Report the share of the whole that is done, of which recordings that are there are no part."""
+        self.progress((share - self.begun) / (1 - self.begun), text)
 
     def within(self, low: float, high: float) -> Progress:
         """Return the progress callback of a part."""
@@ -207,11 +221,20 @@ class Experiment:
         until : float
             Share of the whole work that is done then.
         """
-        if self.data is not None:
-            found = recognise(self.name, self.data)
-            self.tables.append(recognised_table(found))
-            self.absent = [f"Not recorded: {found.absent}."] if found.absent else []
-            return found.runs
+        self.begun = 0.0 if self.data is None else until
+        runs = (
+            self._recorded(what, names, until) if self.data is None else self._recognised(self.data)
+        )
+        self.of_its_size = of_its_size(self.name, runs)
+        return runs
+
+    def _recognised(self, data: Sequence[Recording]) -> Runs:
+        found = recognise(self.name, data)
+        self.tables.append(recognised_table(found))
+        self.absent = [f"Not recorded: {found.absent}."] if found.absent else []
+        return found.runs
+
+    def _recorded(self, what: Protocol | None, names: Sequence[str] | None, until: float) -> Runs:
         plan = protocol(self.name, self.rig) if what is None else what
         rows = [(o.what, *o.printed, *o.here, o.factor) for o in scaling(self.name, self.rig)]
         if any(abs(row[-1] - 1) > 1e-6 for row in rows):
@@ -281,6 +304,9 @@ class Experiment:
     ) -> None:
         """Add a table of ours; printed figures of ``paper.toml`` precede their columns.
 
+        With a rig of another size than the paper's, rows and columns of printed figures are left out,
+        but for those in percent or ``relative``.
+
         Parameters
         ----------
         key : str
@@ -294,21 +320,32 @@ class Experiment:
         """
         text = self.paper.tables[key]
         lines = [(n, *cells) for n, cells in rows.items()] if isinstance(rows, Mapping) else rows
-        ours = dict(zip([text.rows, *columns], zip(*lines, strict=True), strict=False))
-        names = ours.get(text.rows, ())
-        theirs = {of: [cells.get(str(n)) for n in names] for of, cells in text.printed.items()}
-        if self.data is not None:  # which need not have all that the paper has
-            theirs = {of: cells for of, cells in theirs.items() if of in ours}
-        every: dict[str, Sequence[Cell]] = {}
-        for column in dict.fromkeys((*ours, *theirs)):
-            every |= {f"{column}, printed": theirs[column]} if column in theirs else {}
-            every |= {column: ours[column]} if column in ours else {}
+        lines = [line for line in lines if self._compares(text, line[0])]
         if not lines:
             return
-        full = {column: cells for column, cells in every.items() if {*cells} - {None}}
+        ours = dict(zip([text.rows, *columns], zip(*lines, strict=True), strict=True))
+        shown = {of: cells for of, cells in self._columns(text, ours) if {*cells} - {None}}
         words = {"title": text.title.format(**facts), "note": text.note.format(**facts)}
         filled = text.model_copy(update=words)
-        self.tables.append(Table(key, filled, (*full,), (*zip(*full.values(), strict=True),)))
+        self.tables.append(Table(key, filled, (*shown,), (*zip(*shown.values(), strict=True),)))
+
+    def _compares(self, text: TableText, name: Cell) -> bool:
+        """Return whether a row or column of some name has a meaning for a rig of this size."""
+        relative = "[%]" in str(name) or name in text.relative
+        return self.of_its_size or relative or "printed" not in str(name)
+
+    def _columns(
+        self, text: TableText, ours: Mapping[str, Sequence[Cell]]
+    ) -> Iterator[tuple[str, Sequence[Cell]]]:
+        """Yield columns, the paper's before ours of the same quantity."""
+        # recordings need not have all that the paper has
+        theirs = [of for of in text.printed if self.data is None or of in ours]
+        for column in dict.fromkeys((*ours, *theirs)):
+            heading = f"{column}, printed"
+            if column in theirs and self._compares(text, heading):
+                yield heading, [text.printed[column].get(str(name)) for name in ours[text.rows]]
+            if column in ours and (column == text.rows or self._compares(text, column)):
+                yield column, ours[column]
 
     def figure(self, key: str, panels: Mapping[str, Curves]) -> None:
         """Add a figure: panel title -> curve name -> its x and y, of which some are drawn.
@@ -318,14 +355,20 @@ class Experiment:
         if not panels:
             return
         drawn = {
-            title: {name: (thinned(x), thinned(y)) for name, (x, y) in curves.items()}
+            title: {
+                name: (thinned(x), thinned(y))
+                for name, (x, y) in curves.items()
+                if self.of_its_size or name != "printed"
+            }
             for title, curves in panels.items()
         }
         self.figures.append(Figure(key, self.paper.figures[key], drawn))
 
     def says(self, **facts: Any) -> None:
-        """Set facts for the sentences of ``paper.toml``."""
-        self.facts |= facts
+        """Set facts of sentences in ``paper.toml``; ``*_printed`` are in units of the paper's rig."""
+        for name, fact in facts.items():
+            if self.of_its_size or not name.endswith("_printed"):
+                self.facts[name] = fact
 
     def done(self, on: str) -> Reproduction:
         """Return all results; sentences without facts are left out."""
@@ -335,6 +378,7 @@ class Experiment:
             if {name.partition("[")[0] for name in fields} <= {*self.facts}:
                 sentences.append(text.format(**self.facts))
         own = [] if self.data is None else [OWN, *self.absent]
+        own += [] if self.of_its_size else [OTHER_SIZE]
         return Reproduction(
             self.name,
             self.paper,
@@ -367,26 +411,16 @@ def reproduce(
     clear: bool = True,
     progress: bool | Progress | None = None,
 ) -> Reproduction:
-    """Re-run a paper's experiment.
+    """Re-run a paper's experiment; parameters are those of `Experiment`, and these.
 
     Parameters
     ----------
-    name : str
-        Of `mckibben.registry.names` ("papers").
     rig : Rig or str, optional
-        That is recorded, and on which loops are closed; default the protocol's, with ``data`` none.
-    data : sequence of Recording, optional
-        Recordings of the paper's runs instead, of any size; see `recognise`.
-    quick : bool
-        Whether to leave out what takes long.
-    seed, jobs
-        Of everything random; processes, default as many as there are cores.
+        Default the protocol's, with ``data`` none.
     folder : path, optional
-        Where models are kept until all is done, so that a re-run that was stopped and is called again
-        goes on from there.
+        Where fits are kept until all is done, so that a stopped re-run, called again, goes on.
     clear : bool
-        Whether to forget what was kept when all is done; else the caller does, once it has written
-        what is returned, by ``Checkpoints(folder).clear()``.
+        Whether to forget these then; else the caller does, by ``Checkpoints(folder).clear()``.
     progress : bool or callable, optional
         Whether to show a bar; or a callback for the share done, and the next step.
 
@@ -396,24 +430,7 @@ def reproduce(
         If there is no such paper, or a recording that it needs is missing.
     """
     run: Callable[[Experiment], None] = registry.load("papers", name)
-    if data is not None and not data:
-        raise DataError("there is no recording", remedy=f"record its protocol: {name}")
-    if rig is None and data is None:
-        rig = protocol(name).rig
-    plant = load_rig(rig) if isinstance(rig, str) else rig
-    if plant is not None:
-        known = {
-            *plant.inputs,
-            *plant.outputs,
-            *(["contraction"] * ("displacement" in plant.outputs)),
-        }
-        for channel in paper(name).channels:
-            if channel not in known:
-                raise DataError(
-                    f"{name} needs it, and the rig {plant.name!r} has {', '.join(sorted(known))}",
-                    channel=channel,
-                    remedy=f"give a rig like {protocol(name).rig}",
-                )
+    plant = _plant(name, rig, data)
     kept = Checkpoints(folder, name, quick, seed)
     with one_blas_thread(), telling(progress, name) as tell:
         experiment = Experiment(name, plant, data, quick, seed, jobs, kept, tell or _no_progress)
@@ -422,6 +439,25 @@ def reproduce(
         kept.clear()
     on = f"{len(data)} recordings" if data is not None else f"rig {plant.name}" if plant else ""
     return experiment.done(on)
+
+
+def _plant(name: str, rig: Rig | str | None, data: Sequence[Recording] | None) -> Rig | None:
+    """Return the rig, if any; a `DataError` if it lacks a channel, or if there is no recording."""
+    if data is not None and not data:
+        raise DataError("there is no recording", remedy=f"record its protocol: {name}")
+    if rig is None and data is not None:
+        return None
+    plant = load_rig(rig or protocol(name).rig)
+    known = {*plant.inputs, *plant.outputs}
+    known |= {"contraction"} if "displacement" in known else set()
+    for channel in paper(name).channels:
+        if channel not in known:
+            raise DataError(
+                f"{name} needs it, and the rig {plant.name!r} has {', '.join(sorted(known))}",
+                channel=channel,
+                remedy=f"give a rig like {protocol(name).rig}",
+            )
+    return plant
 
 
 def rms(errors: Array) -> float:

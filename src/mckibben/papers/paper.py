@@ -65,8 +65,9 @@ class TableText(_Strict):
 
     Title and note may have fields in braces, which the experiment fills. ``of`` is the paper's table or
     figure, empty for ours; ``rows`` the heading of the first column; ``printed`` the paper's figures by
-    column and row. ``drawn`` is what its columns measure, with the unit, if printed and ours are drawn;
-    ``bound`` what the paper says that its figures are below, where it prints no more.
+    column and row; ``relative`` are headings of printed figures that hold on a rig of any size.
+    ``drawn`` is what its columns measure, with the unit, if printed and ours are drawn; ``bound`` what
+    the paper says that its figures are below, where it prints no more.
     """
 
     title: Words
@@ -74,6 +75,7 @@ class TableText(_Strict):
     rows: str = "model"
     note: str = ""
     printed: dict[str, dict[str, int | float]] = {}
+    relative: tuple[str, ...] = ()
     drawn: str = ""
     bound: float | None = None
 
@@ -92,9 +94,9 @@ class Paper(_Strict):
 
     ``given`` is what is taken from the paper or set, ``found`` what the recordings determine.
     Sentences of ``summary`` have fields in braces, which the experiment fills; one without its fields
-    is left out. ``notes`` are differences from the paper, ``quick`` what a quick run omits. Command lines
-    run in one folder, in the order of the items, once ``record`` has. Commands, kinds of runs, tables,
-    figures and printed models are by key.
+    is left out. ``notes`` are differences from the paper, ``quick`` what a quick run omits. Commands run
+    in one folder, in the order of the items, once ``record`` has. They, kinds of runs, tables, figures
+    and printed models are by key.
     """
 
     number: int

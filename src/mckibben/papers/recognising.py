@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -11,10 +11,15 @@ from mckibben.channels import by_unit, renamed
 from mckibben.errors import DataError
 from mckibben.papers.paper import paper
 from mckibben.recording import Recording
+from mckibben.rigs import load_rig
+from mckibben.rigs.physics.compiled import GRAVITY
 from mckibben.signals.features import features_of
-from mckibben.signals.protocol import Role
+from mckibben.signals.protocol import Role, protocol
 
 NOTED, UNLIKE = "as its rig noted", "like no run of the paper, not used"
+
+SIZE = 0.1
+"""Largest difference from the paper's commands and length, relative to them, that is no other size."""
 
 
 class Labels(NamedTuple):
@@ -100,3 +105,31 @@ def _labels(name: str, every: Mapping[str, Recording], noted: Collection[str]) -
         n: Labels(one.meta["role"], one.meta["labels"]) if n in noted else next(found)
         for n, one in every.items()
     }
+
+
+def of_its_size(name: str, runs: Runs) -> bool:
+    """Return whether runs reach as far as those of the paper, of muscles of its length.
+
+    Compared are the highest commands of the kinds of runs that are there, a weight being a force.
+    """
+    about, plan = paper(name), protocol(name)
+    kinds = [about.kind_of(*labels) for labels in runs.labels.values()]
+    alike = (run for run in plan.runs if about.kind_of(run.role, run.labels) in kinds)
+    weight = {run.name: GRAVITY * run.settings.get("payload", 0.0) for run in plan.runs}
+    printed = _highest((run.inputs, {"force": weight[run.name]}) for run in alike)
+    printed["length at rest"] = load_rig(plan.rig).rest_length or 0.0
+    here = _highest((one, {}) for one in runs.values())
+    lengths = [one.rest_length for one in runs.values() if one.rest_length]
+    here |= {"length at rest": max(lengths)} if lengths else {}
+    pairs = [(here[what], high) for what, high in printed.items() if what in here]
+    return all(abs(found - high) <= SIZE * high for found, high in pairs)
+
+
+def _highest(every: Iterable[tuple[Recording, Mapping[str, float]]]) -> dict[str, float]:
+    """Return the highest value of every channel, to which something may be added."""
+    highest = dict[str, float]()
+    for one, more in every:
+        for channel, (_, high) in one.ranges.items():
+            value = high + more.get(channel, 0.0)
+            highest[channel] = max(value, highest.get(channel, value))
+    return highest

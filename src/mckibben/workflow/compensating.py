@@ -39,6 +39,7 @@ from mckibben.reading import files_of, only, read_files
 from mckibben.recording import COMMAND, Recording, sample_time_of
 from mckibben.studying.results import Exported, Inverse, Tracking
 from mckibben.system.progress import Tell, telling
+from mckibben.system.threads import one_blas_thread
 from mckibben.workflow.operation import (
     Progress,
     claimed,
@@ -110,7 +111,7 @@ def _inverse(
 
     if chosen.learned:
         runs = read_files(chosen.learned, None, reading)
-        with telling(progress, "learning the inverse") as tell:
+        with one_blas_thread(), telling(progress, "learning the inverse") as tell:
             learned, rmse = trained_inverse(block, runs, chosen.seed, tell)
         return Inverse(learned, "learned", rmse=rmse)
     if chosen.predictive:

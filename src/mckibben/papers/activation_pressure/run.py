@@ -35,9 +35,6 @@ QUICK = 3
 SHAPES = (100.0, 150.0)
 """Forces of the paper's Figure 10 [N]."""
 
-STRONGEST = 300.0
-"""Force up to which the printed profile holds [N]."""
-
 Recordings = Mapping[tuple[float, float, str], Recording]
 """By force [N], frequency [Hz] and the name of their row."""
 
@@ -149,20 +146,18 @@ ORDER = [2, 0, 1, 3]
 def _profile(study: Study) -> None:
     """Add the characteristic points at every force, and the error of the static pressure."""
     experiment, slow = study.experiment, study.slow
-    known = all(-0.1 * STRONGEST <= force <= 1.1 * STRONGEST for force, *_ in slow)
-    models = {"printed": study.printed} if known else {}
+    models = {"printed": study.printed, "here": study.found}
     rows: dict[str, list[Cell]] = {}
     for force in dict.fromkeys(force for force, *_ in slow or study.sines):
         own = [one for at, one in slow.items() if at[0] == force]
-        for whose, model in (models | {"here": study.found}).items():
+        for whose, model in models.items():
             cells = np.concatenate([values[ORDER] for values in points(model, force)]).tolist()
             rows[f"{force:.3g} N, {whose}"] = [*cells, static_rmse(model, own)]
     names = [f"e_{j + 1}" for j in ORDER] + [f"y_{j + 1} [bar]" for j in ORDER]
     experiment.table("points", [*names, "static RMSE [bar]"], rows)
     if slow:
-        experiment.says(static=static_rmse(study.found, slow.values()))
-        for model in models.values():
-            experiment.says(static_printed=static_rmse(model, slow.values()))
+        theirs, ours = (static_rmse(model, slow.values()) for model in models.values())
+        experiment.says(static=ours, static_printed=theirs)
     experiment.says(slope=study.found.gamma[0], slope_printed=study.printed.gamma[0])
 
 

@@ -33,24 +33,20 @@ ALL_LAGS, LEAST_SQUARES = "BJ, B with q^-1", "PI by least squares, ours"
 GOOD = 90.0
 """Fitness that all four methods exceed in the paper [%]."""
 
-OWN_SPAN = 0.1
-"""Difference from the paper's span of pressure, relative to it, up to which its thresholds stay."""
-
 FAILED = [np.inf, -np.inf, np.inf, -np.inf]
 """RMSE and fitness on calibration, then on test, of a seed that gave no model."""
 
 
-def methods(span: float) -> dict[str, tuple[str, dict[str, Any]]]:
+def methods(share: float) -> dict[str, tuple[str, dict[str, Any]]]:
     """Return the paper's four methods as published, and other readings of two of them.
 
     Of the NARX model the paper prints neither regressors nor mapping: this one is a sigmoid network on
     two past outputs and inputs, one sample late, fitted to one-step errors, of five starts the one with
     the least free-running error. Box-Jenkins has the printed orders, Eqs. (6) to (9): B has terms in q^0
     and q^-2, or, as its text has it ("second-order polynomials"), one in q^-1 as well. Like P2UZ it
-    starts at rest, as the muscle does. PI has the printed thresholds, in proportion where the pressure
-    has another span than the paper's, and weights by the slopes of segments, Eqs. (14) and (15).
+    starts at rest, as the muscle does. PI has that share of the printed thresholds, and weights by the
+    slopes of segments, Eqs. (14) and (15).
     """
-    share = 1.0 if abs(span / (HIGH - LOW) - 1) < OWN_SPAN else span / (HIGH - LOW)
     printed = paper("field-models").models[PRINTED_PI]["thresholds"]
     thresholds = [share * r for r in printed]
     network = {"n_units": 10, "delay": 1, "refine": False, "allow_unstable": True, "n_starts": 5}
@@ -131,7 +127,8 @@ def matched(model: Block, recording: Recording) -> Series:
 def _tried(
     experiment: Experiment, train: Recording, test: Recording, seeds: range
 ) -> dict[str, MethodResult]:
-    every = methods(float(np.ptp(np.percentile(train["pressure"], (1, 99)))))
+    span = float(np.ptp(np.percentile(train["pressure"], (1, 99))))
+    every = methods(1.0 if experiment.of_its_size else span / (HIGH - LOW))
     found: dict[str, MethodResult] = {}
     for name, (model, settings) in experiment.steps(0.05, 0.3, [*every.items()]):
         models: list[tuple[Block, Series]] = []
@@ -255,7 +252,7 @@ def _summary(
     good = sum(fitness > GOOD for _, fitness in matched_.values())
     experiment.says(
         order=", ".join(f"{n} {matched_[n][0]:.2f} mm" for n in order),
-        order_printed=", ".join(f"{n} {printed[n]:.2f} mm" for n in theirs),
+        order_theirs=", ".join(theirs),
         same_order=Verdict(order == theirs),
         good=good,
         all_good=Verdict(good == len(PAPERS)),

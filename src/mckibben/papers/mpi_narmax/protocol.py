@@ -8,7 +8,7 @@ that training does not repeat.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,6 +44,37 @@ PULLED_FROM = 20.0
 """At which the force begins while the voltage is held [s]."""
 
 
+class Sine(NamedTuple):
+    """A run with a sine: its frequency [Hz], a weight [kg], and the peaks of three pulls [N]."""
+
+    name: str
+    role: Role
+    stage: str
+    frequency: float
+    mass: float = 0.0
+    hand: float = 0.0
+    status: int = 0
+
+
+SINES = (
+    Sine("status-1", "train", "status", 0.1, status=1),
+    Sine("status-2", "train", "weight", 0.2, mass=10.04, status=2),
+    Sine("status-3", "train", "weight", 0.2, mass=21.75, status=3),
+    Sine("training-pulls-100N", "train", "pulls", 0.1, hand=100.0),
+    Sine("status-4", "test", "pulls", 0.22, hand=150.0, status=VARYING),
+    *(
+        one
+        for f in (0.05, 0.1, 0.2)
+        for one in (
+            Sine(f"free-{f:g}Hz", "train", "free", f),
+            Sine(f"weight-{f:g}Hz", "test", "weight", f, mass=91 / GRAVITY),
+            Sine(f"hand-{f:g}Hz", "test", "pulls", f, hand=100.0),
+        )
+    ),
+)
+"""Statuses, the training, and the runs of Figures 1 and 2."""
+
+
 def mpi_narmax(rig: Rig | None = None) -> Protocol:
     """Return statuses 1 to 4, the training pulls, the runs of Figures 1 to 3, and random ones.
 
@@ -52,37 +83,19 @@ def mpi_narmax(rig: Rig | None = None) -> Protocol:
     """
     drive = "voltage" if rig is None else rig.inputs[0]
     wide, strong = share(rig, drive, HIGH), share(rig, "force", STRONGEST)
+    runs = list[PlannedRun]()
 
     def add(name: str, role: Role, volts: Array, newtons: Array, **labels: Any) -> None:
         inputs = Recording({drive: wide * volts, "force": strong * newtons}, SAMPLE_TIME)
         settings = {"payload": round(labels.get("mass", 0.0), 6), f"start.{drive}": wide * LOW}
         runs.append(PlannedRun(name, role, inputs, settings, labels))
 
-    def moving(
-        name: str,
-        role: Role,
-        stage: str,
-        f: float,
-        mass: float = 0.0,
-        hand: float = 0.0,
-        **status: int,
-    ) -> None:
+    for name, role, stage, f, mass, hand, status in SINES:
         duration = max(TIME, 4 / f)
         time = np.arange(round(duration / SAMPLE_TIME)) * SAMPLE_TIME
         wave, pulled = sine(time, 1 / f, HIGH, LOW), pulls(time, hand, duration=duration / 6)
         labels = {"stage": stage, "frequency": f, "mass": strong * mass, "hand": strong * hand}
-        add(name, role, wave, pulled, **labels, **status)
-
-    runs = list[PlannedRun]()
-    moving("status-1", "train", "status", 0.1, status=1)
-    moving("status-2", "train", "weight", 0.2, mass=10.04, status=2)
-    moving("status-3", "train", "weight", 0.2, mass=21.75, status=3)
-    moving("training-pulls-100N", "train", "pulls", 0.1, hand=100.0)
-    moving("status-4", "test", "pulls", 0.22, hand=150.0, status=4)
-    for f in (0.05, 0.1, 0.2):
-        moving(f"free-{f:g}Hz", "train", "free", f)
-        moving(f"weight-{f:g}Hz", "test", "weight", f, mass=91 / GRAVITY)
-        moving(f"hand-{f:g}Hz", "test", "pulls", f, hand=100.0)
+        add(name, role, wave, pulled, **labels, **({"status": status} if status else {}))
     time = np.arange(round(TIME / SAMPLE_TIME)) * SAMPLE_TIME
     pulled = np.where(time < PULLED_FROM, 0.0, triangle(time, 20.0, 150.0))
     for volt in (2.0, 4.0, 6.0, 8.0, 10.0):

@@ -162,7 +162,7 @@ def _constant_loads(study: Study, off: Mapping[str, Mapping[str, tuple[float, fl
     pairs = [(f"status {k}", f"MPI-{k}") for k in study.statuses if k != VARYING]
     ratios = [off[status][AS_PRINTED][0] / off[status][name][0] for status, name in pairs]
     theirs = [printed[status][AS_PRINTED] / printed[status][name] for status, name in pairs]
-    for key, each in (("own_load", ratios), ("own_load_printed", theirs)):
+    for key, each in (("own_load", ratios), ("own_load_theirs", theirs)):
         study.experiment.says(**{key: ", ".join(f"{ratio:.2g}" for ratio in each)})
     study.experiment.says(comparable=Verdict(max(ratios) <= max(theirs)))
 

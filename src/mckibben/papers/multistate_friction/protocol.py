@@ -7,7 +7,7 @@ at held pressures of 1 to 6 bar the length is cycled (total force). Friction is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -55,37 +55,15 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
             raise DataError(f"the rig {rig.name!r} imposes no length", remedy=remedy)
         wide = rig.start.get("length", rig.limits("length").high) / LONGEST
         strong = share(rig, "pressure", HIGHEST)
-    weak = min(strong, 1.0)
-    depths = [LONGEST - length for length in LENGTHS]
-    turns = [0.0, *SHORTEST], [0.0, *(LONGEST - shortest for shortest in SHORTEST.values())]
     runs = list[PlannedRun]()
-
-    def add(name: str, role: Role, bars: Array, lengths: Array, lead: float = 0.0) -> None:
+    weak = min(strong, 1.0)
+    for kind, role, bars, lengths, lead in (*_isometric(weak), *_isobaric(weak)):
         inputs = {"pressure": strong * bars, "length": wide * lengths}
         start = {f"start.{channel}": float(values[0]) for channel, values in inputs.items()}
         stage, held = ("static", "length") if lead else ("friction", "pressure")
         labels = {"stage": stage, held: start[f"start.{held}"]}
+        name = kind.format(**{channel: values[-1] for channel, values in inputs.items()})
         runs.append(PlannedRun(name, role, Recording(inputs, SAMPLE_TIME), start, labels, lead))
-
-    lead = SWINGS * SWING_PERIOD + VENTING
-    time = _time(lead + RISE)
-    swung = SWING * np.clip(1.0 - time / (SWINGS * SWING_PERIOD), 0.0, 1.0)
-    swinging = swung * np.sin(2 * np.pi * time / SWING_PERIOD)
-    for first in LENGTHS.values():
-        length = LONGEST - float(np.interp(weak * first, [*LENGTHS.values()], depths))
-        rising = np.interp(time, (lead - VENTING, lead, lead + RISE), (HIGHEST, first, HIGHEST))
-        lengths = np.minimum(length + swinging, LONGEST)
-        add(f"isometric-{wide * length:.4g}mm", "train", rising, lengths, lead)
-    for bar in SHORTEST:
-        depth = float(np.interp(weak * bar, *turns))
-        period = 2 * depth / SPEED
-        gone = triangle(_time(CYCLES * period), period, depth)
-        role: Role = "train" if bar == IDENTIFIED_AT else "test"
-        add(f"isobaric-{strong * bar:.3g}bar", role, np.full(gone.size, bar), LONGEST - gone)
-    depth = float(np.interp(weak * IDENTIFIED_AT, *turns))
-    gone = irregular_triangle(_time(120.0), 13, depth, seed=4)
-    held = np.full(gone.size, IDENTIFIED_AT)
-    add("isobaric-minor-loops", "test", held, LONGEST - gone)
     return Protocol(
         name="multistate-friction",
         rig="mas10-test-stand",
@@ -94,6 +72,39 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
         runs=tuple(runs),
         notes="Lengths, speed and minor loops are ours: the paper prints none.",
     )
+
+
+Planned = tuple[str, Role, Array, Array, float]
+"""Name by its last pressure and length, role, pressures and lengths of the paper's muscle, and lead."""
+
+
+def _isometric(weak: float) -> Iterator[Planned]:
+    """Yield the isometric runs of a stand whose pressure is that share of the paper's."""
+    lead = SWINGS * SWING_PERIOD + VENTING
+    time = _time(lead + RISE)
+    swung = SWING * np.clip(1.0 - time / (SWINGS * SWING_PERIOD), 0.0, 1.0)
+    swinging = swung * np.sin(2 * np.pi * time / SWING_PERIOD)
+    depths = [LONGEST - length for length in LENGTHS]
+    for first in LENGTHS.values():
+        length = LONGEST - float(np.interp(weak * first, [*LENGTHS.values()], depths))
+        rising = np.interp(time, (lead - VENTING, lead, lead + RISE), (HIGHEST, first, HIGHEST))
+        lengths = np.minimum(length + swinging, LONGEST)
+        yield "isometric-{length:.4g}mm", "train", rising, lengths, lead
+
+
+def _isobaric(weak: float) -> Iterator[Planned]:
+    """Yield the cycles at every pressure, and the minor loops."""
+    turns = [0.0, *SHORTEST], [0.0, *(LONGEST - shortest for shortest in SHORTEST.values())]
+    for bar in SHORTEST:
+        depth = float(np.interp(weak * bar, *turns))
+        period = 2 * depth / SPEED
+        gone = triangle(_time(CYCLES * period), period, depth)
+        role: Role = "train" if bar == IDENTIFIED_AT else "test"
+        yield "isobaric-{pressure:.3g}bar", role, np.full(gone.size, bar), LONGEST - gone, 0.0
+    depth = float(np.interp(weak * IDENTIFIED_AT, *turns))
+    gone = irregular_triangle(_time(120.0), 13, depth, seed=4)
+    held = np.full(gone.size, IDENTIFIED_AT)
+    yield "isobaric-minor-loops", "test", held, LONGEST - gone, 0.0
 
 
 def _time(duration: float) -> Array:

@@ -114,8 +114,7 @@ def _static_laws(experiment: Experiment, isometric: Sequence[Recording]) -> Poly
     for bar in sorted({float(f"{share * top:.2g}") for share in (1 / 6, 2 / 3, 1.0)}):
         for length in (min(held), max(held)):
             forces = [float(np.dot((bar, 1.0), one.terms(np.array(length)))) for one in both]
-            given = forces[0] if 160 <= length <= 202 else None  # its muscle's lengths
-            cells.append((f"force at {length} mm, {bar:g} bar [N]", given, forces[1]))
+            cells.append((f"force at {length} mm, {bar:g} bar [N]", *forces))
     experiment.table("static", ["printed", "here"], cells)
     return law
 

@@ -19,7 +19,7 @@ from mckibben.estimators.coupled.sdchm import learned_inverse
 from mckibben.metrics import crosstalk, loop_width
 from mckibben.papers.experiment import Cell, Curves, Experiment, Verdict
 from mckibben.papers.recognising import Runs
-from mckibben.papers.sdchm.protocol import EXTENSOR, HIGHEST, PERIOD
+from mckibben.papers.sdchm.protocol import EXTENSOR, HIGHEST, PERIOD, strength
 from mckibben.recording import REFERENCE, Recording
 from mckibben.rigs import Rig, share
 from mckibben.system.workers import Tell, all_of
@@ -46,7 +46,7 @@ DRAWN = 6
 """Controllers that figures show, the first of the tables: as many as there are colours."""
 
 BEYOND = ((0.02, 0.0), (0.1, 0.0), (0.3, 0.0), (1.0, 0.0), (0.02, 1.0), (0.02, 2.0))
-"""Beyond the paper: frequency of the reference [Hz], and load on the disc [kg]."""
+"""Beyond the paper: frequency of the reference [Hz], and load on the disc of the paper's arm [kg]."""
 
 
 class Task(NamedTuple):
@@ -75,54 +75,83 @@ def held(
 
 def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
     """Track the paper's references with every controller, and further tasks with some."""
-    outputs = by_name([*runs.values()])[1]
-    quick, seed, step = experiment.quick, experiment.seed, 0.1 if experiment.quick else 0.05
-    levels = [float(one[EXTENSOR].mean()) for one in runs.values()]
-    wanted = np.array([1.0, *(p0 for _, p0 in MOVES), TASK_LEVEL]) * share(rig, EXTENSOR, HIGHEST)
-    middle, *at, p0 = np.clip(wanted, min(levels), max(levels)).tolist()
-    reached = min(max(float(one[y].max()) for one in runs.values()) for y in outputs)
-    scale = min(1.0, REACHED * reached / (AMPLITUDE + OFFSET))
-    pid = tune_pid(rig, sample_time=step, scheduled={EXTENSOR: middle}, seed=seed)
+    middle, *levels = _levels(rig, runs)
+    tasks = _tasks(experiment, rig, runs, levels)
     inverses = compensators(experiment, runs)
-    laws: dict[str, Block | Controller] = {**inverses, PID: pid}
-    time = np.arange(round((1.5 if quick else 3) * PERIOD / step), dtype=np.float64) * step
-    moved = dict(zip(outputs[: 1 if quick else len(MOVES)], at, strict=False))
-    tasks = {f"tracking_{y[-1]}": held(outputs, y, time, p, scale) for y, p in moved.items()}
-    wave = scale * np.abs(AMPLITUDE * np.sin(2 * np.pi * F * time) + OFFSET)
-    channels = dict.fromkeys(outputs, wave) | {EXTENSOR: np.full(wave.size, p0)}
-    facts = {"amplitude": scale * AMPLITUDE, "offset": scale * OFFSET, "p0": p0}
-    beyond: dict[str, Task] = {}
-    if not quick:
-        laws["balance + PID"] = control_law("feedforward-pid", inverses[BALANCE], lambda: pid)
-        laws["disturbance observer"] = control_law("observer", inverses[BALANCE], lambda: pid)
-        for frequency, load in BEYOND:
-            longer = np.arange(round(max(40.0, 2 / frequency) / step), dtype=np.float64) * step
-            task = held(outputs, outputs[0], longer, at[0], scale, frequency)
-            key = f"{frequency:g} Hz" + (f", {load:g} kg" if load else "")
-            beyond[key] = task._replace(load=load)
-    every = tasks | {"task": Task(Recording(channels, step), outputs, facts)} | beyond
+    laws = _laws(experiment, rig, inverses, middle)
+    table_5 = [key for key in tasks if key.startswith("tracking_")]
+    beyond = [key for key in tasks if key not in experiment.paper.tables]
     ours = [name for name in laws if name not in (SDIHC, SINGLE, SDIHC_OURS)]
-    keys = [(key, name) for key in every for name in (ours if key in beyond else laws)]
-    trials = [(laws[name], rig, every[key], seed) for key, name in keys]
+    keys = [(key, name) for key in tasks for name in (ours if key in beyond else laws)]
+    trials = [(laws[name], rig, tasks[key], experiment.seed) for key, name in keys]
     found = dict(zip(keys, all_of(_tracked, trials, experiment.jobs), strict=True))
     plane: dict[str, Curves] = {}
-    for key, task in every.items():
+    for key in tasks:
         if key not in beyond:
-            panels = _shown(experiment, key, task, {name: found[key, name] for name in laws})
-            plane |= panels if key in tasks else {}
+            panels = _shown(experiment, key, tasks[key], {name: found[key, name] for name in laws})
+            plane |= panels if key in table_5 else {}
     experiment.figure("tracking", plane)
     worst = {key: max(one.rmse.values()) for key, one in found.items()}
     if beyond:
         rows = [[name, *(worst[key, name] for key in beyond)] for name in ours]
-        experiment.table("beyond", [*beyond], rows, **tasks["tracking_1"].facts)
-    most = {name: max(worst[key, name] for key in tasks) for name in laws}
+        experiment.table("beyond", beyond, rows, **tasks["tracking_1"].facts)
+    most = {name: max(worst[key, name] for key in table_5) for name in laws}
     experiment.says(tracking=", ".join(f"{name} {value:.2f} mm" for name, value in most.items()))
-    _table_5(
-        experiment, [{name: [*found[key, name].rmse.values()] for name in laws} for key in tasks]
-    )
-    experiment.says(
-        moved=", ".join(y[-1] for y in moved), step=1e6 * found["task", SDIHC_OURS].step_time[0]
-    )
+    _table_5(experiment, [{n: [*found[key, n].rmse.values()] for n in laws} for key in table_5])
+    moved, step = ", ".join(key[-1] for key in table_5), found["task", SDIHC_OURS].step_time[0]
+    experiment.says(moved=moved, step=1e6 * step)
+
+
+def _levels(rig: Rig, runs: Runs) -> list[float]:
+    """Return pressures of the extensor for PID, Table 5 and Figure 13, within those recorded [bar]."""
+    recorded = [float(one[EXTENSOR].mean()) for one in runs.values()]
+    wanted = np.array([1.0, *(p0 for _, p0 in MOVES), TASK_LEVEL]) * share(rig, EXTENSOR, HIGHEST)
+    clipped: list[float] = np.clip(wanted, min(recorded), max(recorded)).tolist()
+    return clipped
+
+
+def _tasks(
+    experiment: Experiment, rig: Rig, runs: Runs, levels: Sequence[float]
+) -> dict[str, Task]:
+    """Return the tasks of Table 5 and Figure 13 by their tables, and those beyond the paper."""
+    outputs, step, (*at, p0) = by_name([*runs.values()])[1], control_step(experiment), levels
+    reached = min(max(float(one[y].max()) for one in runs.values()) for y in outputs)
+    scale = min(1.0, REACHED * reached / (AMPLITUDE + OFFSET))
+
+    def time(duration: float) -> Array:
+        return np.arange(round(duration / step), dtype=np.float64) * step
+
+    whole = time((1.5 if experiment.quick else 3) * PERIOD)
+    moved = zip(outputs[: 1 if experiment.quick else len(MOVES)], at, strict=False)
+    tasks = {f"tracking_{y[-1]}": held(outputs, y, whole, p, scale) for y, p in moved}
+    wave = scale * np.abs(AMPLITUDE * np.sin(2 * np.pi * F * whole) + OFFSET)
+    channels = dict.fromkeys(outputs, wave) | {EXTENSOR: np.full(wave.size, p0)}
+    facts = {"amplitude": scale * AMPLITUDE, "offset": scale * OFFSET, "p0": p0}
+    tasks["task"] = Task(Recording(channels, step), outputs, facts)
+    for frequency, mass in () if experiment.quick else BEYOND:
+        load, longer = strength(rig) * mass, time(max(40.0, 2 / frequency))
+        key = f"{frequency:g} Hz" + (f", {load:.2g} kg" if load else "")
+        task = held(outputs, outputs[0], longer, at[0], scale, frequency)
+        tasks[key] = task._replace(load=load)
+    return tasks
+
+
+def control_step(experiment: Experiment) -> float:
+    """Return the time between two samples of a controller [s]."""
+    return 0.1 if experiment.quick else 0.05
+
+
+def _laws(
+    experiment: Experiment, rig: Rig, inverses: Mapping[str, Block], middle: float
+) -> dict[str, Block | Controller]:
+    """Return the compensators, PID, and ours with feedback unless the run is quick."""
+    step, scheduled = control_step(experiment), {EXTENSOR: middle}
+    pid = tune_pid(rig, sample_time=step, scheduled=scheduled, seed=experiment.seed)
+    laws: dict[str, Block | Controller] = {**inverses, PID: pid}
+    if not experiment.quick:
+        laws["balance + PID"] = control_law("feedforward-pid", inverses[BALANCE], lambda: pid)
+        laws["disturbance observer"] = control_law("observer", inverses[BALANCE], lambda: pid)
+    return laws
 
 
 def _table_5(experiment: Experiment, tracked: Sequence[Mapping[str, Sequence[float]]]) -> None:

@@ -21,13 +21,15 @@ from mckibben.channels import by_name
 from mckibben.papers.recognising import Labels
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, share
+from mckibben.rigs.setups.arm import Arm
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
 from mckibben.signals.features import Features, grouped
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
 
-PERIOD, HIGHEST = 50.0, 2.5
-"""Of every sine [s], and the pressure that all muscles withstand [bar], Table 1."""
+PERIOD, HIGHEST, DIAMETER = 50.0, 2.5, 30.0
+"""Of every sine [s]; the pressure that all muscles withstand [bar], and the diameter of those that
+contract [mm], Table 1."""
 
 EXTENSOR = "pressure_extensor"
 
@@ -108,6 +110,12 @@ def _scaled(run: PlannedRun, of_muscles: float, of_extensor: float) -> PlannedRu
     p0 = of_extensor * run.labels["p0"]
     labels, start = {**run.labels, "p0": p0}, {f"start.{EXTENSOR}": p0}
     return replace(run, inputs=Recording(waves, run.inputs.step), settings=start, labels=labels)
+
+
+def strength(rig: Rig) -> float:
+    """Return the force of an arm's muscles by that of the paper's: pressure by cross-section."""
+    wide = rig.muscle.diameter / DIAMETER if isinstance(rig, Arm) else 1.0
+    return share(rig, "pressure_1", HIGHEST) * wide**2
 
 
 def quick(rig: Rig | None = None) -> tuple[Protocol, list[str]]:

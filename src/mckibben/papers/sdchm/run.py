@@ -32,17 +32,21 @@ PAPERS: dict[str, Any] = {"threshold_rule": "paper", "initial": "virgin"}
 LETTERS = dict(zip(product(PATTERNS, "123"), "abcdefghijkl", strict=True))
 """The paper's settings of a muscle's hysteresis; its groups, by muscles driven and output."""
 
+SETS: dict[str, dict[str, str]] = {
+    "constant": {"stage": "joint", "extensor": "constant"},
+    "moving": {"stage": "joint", "extensor": "moving"},
+    "along": {"stage": "network"},
+}
+"""Runs that test, by the table of their errors."""
+
 Panels = dict[str, dict[str, tuple[Array, Array]]]
 
 
 def run(experiment: Experiment) -> None:
     """Record the patterns, identify the coupled models, predict, and track with their inverses."""
     runs = experiment.record(*(quick(experiment.rig) if experiment.quick else ()))
-    _motions(experiment, runs)
-    _fits(experiment, runs)
-    _parts(experiment, runs)
-    _sets(experiment, runs)
-    _groups(experiment, runs)
+    for part in (_motions, _orders, _fits, _parts, _sets, _groups):
+        part(experiment, runs)
     if experiment.rig is not None:
         experiment.tell(0.7, "closed loops")
         loops.run_loops(experiment, experiment.rig, runs)
@@ -94,12 +98,12 @@ def _motions(experiment: Experiment, runs: Runs) -> None:
         experiment.says(narrowest=min(widths), widest=max(widths))
 
 
-def _fits(experiment: Experiment, runs: Runs) -> None:
-    """Fit all models; validation patterns stop the search for antecedents of ours."""
-    short, hysteresis = experiment.quick, runs.names("train", stage="hysteresis")
-    recording, k = runs[hysteresis[0]], runs.of(hysteresis[0], "driven")
+def _orders(experiment: Experiment, runs: Runs) -> None:
+    """Add the errors of one muscle's hysteresis by the number of operators: Table 2."""
+    name, *_ = runs.names("train", stage="hysteresis")
+    recording, k = runs[name], runs.of(name, "driven")
     orders: dict[str, list[Cell]] = {}
-    for n in (10,) if short else SIZES:
+    for n in (10,) if experiment.quick else SIZES:
         for settings in (PAPERS, {"threshold_rule": "envelope", "initial": "first_sample"}):
             y, name = f"displacement_{k}", f"GPI {n}, {settings['threshold_rule']}"
             own = settings | {"input": f"pressure_{k}", "output": y, "n_operators": n}
@@ -109,11 +113,15 @@ def _fits(experiment: Experiment, runs: Runs) -> None:
         orders[str(n)].append(fitted.n_free)
     columns = ["Err [%]", "Err, thresholds over the envelopes [%]", "parameters"]
     experiment.table("orders", columns, orders, muscle=k)
+
+
+def learners(short: bool) -> dict[str, tuple[str, dict[str, Any]]]:
+    """Return all coupled models with their estimators and settings, for a quick run or a full one."""
     search: dict[str, Any] = {"search_samples": loops.QUICK_SAMPLES} if short else {}
     swarm: dict[str, Any] = search | loops.QUICK_SWARM if short else {}
     starts: dict[str, Any] = {"n_starts": 4, "n_refined": 1} if short else {}
     ours = search | ({"memory_settings": starts, "n_rounds": 1} if short else {})
-    chosen: dict[str, tuple[str, dict[str, Any]]] = {
+    return {
         LINEAR: ("tsfnn", {"n_sets": 1, "constants": True, "method": "ls"}),
         RAW: ("tsfnn", {"method": "pso", "ridge": 1e-9} | swarm),
         DAMPED: ("tsfnn", search),
@@ -123,15 +131,20 @@ def _fits(experiment: Experiment, runs: Runs) -> None:
         MEMORY: ("coupled-memory", {}),
         BALANCE: ("balance", {}),
     }
-    joint = runs.select("train", stage="joint")
+
+
+def _fits(experiment: Experiment, runs: Runs) -> None:
+    """Fit all models; validation patterns stop the search for antecedents of ours."""
+    chosen, joint = learners(experiment.quick), runs.select("train", stage="joint")
     chosen |= {name + TOO: chosen[name] for name in (OURS, BALANCE) if joint}
-    patterns = [runs[name] for name in (*hysteresis, *runs.names("train", stage="network"))]
+    both = ("hysteresis", "network")
+    patterns = [one for stage in both for one in runs.select("train", stage=stage)]
     sets = [runs.select(role, stage="network") for role in ("validation", "test")]
     rows: dict[str, list[Cell]] = {}
     by_seed: list[list[Cell]] = []
     for name, (model, changes) in experiment.steps(0.32, 0.7, [*chosen.items()]):
         train = patterns + (joint if name.endswith(TOO) else [])
-        several = name in (RAW, PUBLISHED) and all(sets) and not short
+        several = name in (RAW, PUBLISHED) and all(sets) and not experiment.quick
         tried: dict[float, Fitted] = {}
         for seed in range(experiment.seed, experiment.seed + (SEEDS if several else 1)):
             label, settings = f"{name}, seed {seed}", changes | {"seed": seed}
@@ -180,9 +193,7 @@ def _sets(experiment: Experiment, runs: Runs) -> None:
     best = min(
         (OURS, BALANCE), key=lambda n: rms(_off(experiment, n, held or runs.select("train")))
     )
-    for kind in ("constant", "moving", "along"):
-        joint = {"stage": "joint", "extensor": kind}
-        labels = {"stage": "network"} if kind == "along" else joint
+    for kind, labels in SETS.items():
         test, validation = (runs.select(role, **labels) for role in ("test", "validation"))
         if not test:
             continue
@@ -246,7 +257,7 @@ def _predicted(experiment: Experiment, groups: dict[str, list[Cell]]) -> None:
     printed = experiment.paper.tables["groups"].printed[f"Err [%], {PUBLISHED}"].values()
     experiment.says(
         predicted=[min(errs), max(errs)],
-        predicted_printed=[min(printed), max(printed)],
+        predicted_theirs=[min(printed), max(printed)],
         as_small=Verdict(max(errs) <= max(printed)),
         closer=closer,
         n_groups=len(groups),

@@ -185,12 +185,15 @@ class Experiment:
         self.warned: dict[str, None] = {}
         self.part = (0.0, 0.0)
         self.absent: list[str] = []
-        self.of_its_size, self.begun = True, 0.0
+        self.of_its_size = True
+        self.reached, self.bounds = 0.0, (0.0, 1.0)
         self._free: dict[tuple[str, int], tuple[Recording, Recording]] = {}
 
     def tell(self, share: float, text: str) -> None:
-        """Report the share of the whole that is done, of which recordings that are there are no part."""
-        self.progress((share - self.begun) / (1 - self.begun), text)
+        """Report a share of the whole, unless more was done; what is not to be done is no part of it."""
+        low, high = self.bounds
+        self.reached = min(max(share, self.reached, low), high)
+        self.progress((self.reached - low) / (high - low), text)
 
     def within(self, low: float, high: float) -> Progress:
         """Return the progress callback of a part."""
@@ -209,6 +212,7 @@ class Experiment:
         names: Sequence[str] | None = None,
         *,
         until: float = 0.3,
+        loops: float = 1.0,
     ) -> Runs:
         """Return the runs of the paper's protocol on the rig, or the user's recordings of it.
 
@@ -218,10 +222,10 @@ class Experiment:
             Default the one registered under the paper's name, for the rig.
         names : sequence of str, optional
             Of the runs that are needed; default all.
-        until : float
-            Share of the whole work that is done then.
+        until, loops : float
+            Shares of the whole that are done then, and when closed loops on a rig begin.
         """
-        self.begun = 0.0 if self.data is None else until
+        self.bounds = 0.0 if self.data is None else until, loops if self.rig is None else 1.0
         runs = (
             self._recorded(what, names, until) if self.data is None else self._recognised(self.data)
         )

@@ -60,7 +60,7 @@ class Study:
 
 def run(experiment: Experiment) -> None:
     """Identify models with and without the force, and compare them on motion that is not repeated."""
-    recorded = experiment.record(until=0.1)
+    recorded = experiment.record(until=0.1, loops=0.9)
     slowest = max(one.sample_time or 0.0 for one in recorded.values())
     step = max(0.05 if experiment.quick else 0.02, slowest)
     runs = Runs({name: resample(one, step) for name, one in recorded.items()}, recorded.labels)

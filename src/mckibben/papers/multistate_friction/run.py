@@ -75,7 +75,7 @@ class Hysteresis(NamedTuple):
 
 def run(experiment: Experiment) -> None:
     """Record isometric and isobaric runs, and identify force laws and friction."""
-    runs = experiment.record(until=0.4)
+    runs = experiment.record(until=0.4, loops=0.75)
     isometric = runs.select(stage="static")
     experiment.tell(0.42, "static laws")
     found = _hysteresis(runs, _static_laws(experiment, isometric))

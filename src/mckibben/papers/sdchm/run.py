@@ -44,7 +44,7 @@ Panels = dict[str, dict[str, tuple[Array, Array]]]
 
 def run(experiment: Experiment) -> None:
     """Record the patterns, identify the coupled models, predict, and track with their inverses."""
-    runs = experiment.record(*(quick(experiment.rig) if experiment.quick else ()))
+    runs = experiment.record(*(quick(experiment.rig) if experiment.quick else ()), loops=0.7)
     for part in (_motions, _orders, _fits, _parts, _sets, _groups):
         part(experiment, runs)
     if experiment.rig is not None:

@@ -164,6 +164,7 @@ PLUGINS: dict[str, dict[str, str]] = {
     },
     "setups": {
         "arm": "mckibben.rigs.setups.arm:Arm",
+        "joint": "mckibben.rigs.setups.joint:Joint",
         "moving-end": "mckibben.rigs.setups.moving_end:MovingEnd",
         "test-stand": "mckibben.rigs.setups.test_stand:TestStand",
     },

@@ -32,7 +32,7 @@ SIGNS = (1.0, -1.0)
 METRE = 1e3
 """In mm."""
 
-TOLERANCE = 1e-12
+TOLERANCE = 1e-13
 """A Newton move below this ends the search [rad]: torques balance within 1e-6 N m at an inertia of
 0.1 kg m².
 """

@@ -1,10 +1,10 @@
 """Mechanics: coordinates with mass, stiffness and friction, and time integration.
 
 The coordinates are few (the end of a muscle; a disc's mean shortening and two tilts; the angle of a
-joint), the muscles act on them through fixed lever arms. Every step solves the balance of forces at its end by Newton's
-method, with the accelerations of Hilber, Hughes and Taylor (1977): second order, and quiet where
-friction sticks. Air is marched before, in substeps. One coordinate may instead be driven, as by the
-screw of a test stand.
+joint), the muscles act on them through fixed lever arms. Every step solves the balance of forces at
+its end by Newton's method, with the accelerations of Hilber, Hughes and Taylor (1977): second order,
+and quiet where friction sticks. Air is marched before, in substeps. One coordinate may instead be
+driven, as by the screw of a test stand.
 """
 
 from __future__ import annotations
@@ -54,7 +54,10 @@ _EACH = (MOST_COORDINATES,)
 
 MECHANISM = np.dtype(
     [
-        ("n", "i8"),  # coordinates: shortening [mm] first, then tilts [rad] if any; or an angle [rad]
+        (
+            "n",
+            "i8",
+        ),  # coordinates: shortening [mm] first, then tilts [rad] if any; or an angle [rad]
         ("mass", "f8", _EACH),  # t, or t mm²
         ("stiffness", "f8", _EACH),  # N/mm, or N mm/rad
         ("stiffening", "f8", _EACH),  # stiffness that a bar in one muscle adds

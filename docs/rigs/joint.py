@@ -61,14 +61,14 @@ mckibben track study/inverse.json --rig {name} --reference desired.csv --set pre
 
 ![Loops, stiffness, slack tendons, and following](../pictures/antagonistic_joint.png)
 
-*Top: the angle over half the difference of the pressures at three co-contractions; a load of 5 N m let go.
-Bottom: tendon forces of muscle 1 driven alone; a desired angle, with and without compensation.*
+*Top: the angle over half the difference of the pressures at three co-contractions; a load of 5 N m let
+go. Bottom: tendon forces while muscle 1 is driven alone; a desired angle, with and without a model.*
 
 ## The rig
 
-The protocol has {runs} runs: loops of the difference at several co-contractions (means of both pressures),
-each muscle alone, the co-contraction alone, steps, loads let go, masses, and random pressures. On another
-joint its levels are in proportion to that one's ranges.
+The protocol has {runs} runs: loops of the difference at several co-contractions (means of both
+pressures), each muscle alone, the co-contraction alone, steps, loads let go, masses, and random
+pressures. On another joint its levels are in proportion to that one's ranges.
 
 | co-contraction | turned by 5 N m | stiffness |
 |---|---|---|
@@ -76,8 +76,8 @@ joint its levels are in proportion to that one's ranges.
 
 ## Models
 
-Free-run RMSE of the angle on the test [mrad], fitted to the {fitted} training runs. The first test run has a
-co-contraction, others a mass or a pull, that no training run has. Seeds are of the sensors' noise.
+Free-run RMSE of the angle on the test [mrad], fitted to the {fitted} training runs. The first test run
+has a co-contraction, others a mass or a pull, that no training run has. Seeds are of the sensors' noise.
 
 | model | {tests} | all, seeds {seeds} |
 |---|{dashes}---|
@@ -85,14 +85,14 @@ co-contraction, others a mass or a pull, that no training run has. Seeds are of 
 
 ## Following an angle
 
-RMSE [mrad] of desired angles at random up to {fastest:g} Hz, from {low:g} to {high:g} rad; one motion a seed.
-`preload` is the pressure from which the compensator of `balance` departs as little as it can: the
-co-contraction is the second wish, beside the angle. The static map is the rising branch of a slow loop at {map:g} bar.
-*{uncompensated}* is that of `mckibben track`: each muscle's own rise, linear.
+RMSE [mrad] of desired angles at random up to {fastest:g} Hz, from {low:g} to {high:g} rad; one motion a
+seed. `preload` is the pressure from which the compensator of `balance` departs as little as it can: the
+co-contraction is the second wish, beside the angle. The static map is the rising branch of a slow loop
+at {map:g} bar. *{uncompensated}* is that of `mckibben track`: each muscle's own rise, linear.
 
-The torque that a sensor measures has the inertia of the mass in it. Given back at once by the compensator, it
-makes the loop oscillate (last rows); given the weight at the desired angle, as a column `torque` of the
-reference, the compensator needs no sensor.
+The torque that a sensor measures has the inertia of the mass in it. Given back at once by the
+compensator, it makes the loop oscillate (last rows); given the weight at the desired angle, as a column
+`torque` of the reference, the compensator needs no sensor.
 
 | load | control | mean pressure | {each} |
 |---|---|---|{seed_dashes}
@@ -177,6 +177,7 @@ def followed(found: Identified, load: str, seed: int) -> dict[str, Tracked]:
 
 
 def mean_pressure(loop: Tracked) -> float:
+    """Return the co-contraction that a loop had [bar]."""
     run = loop.recording.slice(round(20 / 0.01), len(loop.recording))
     return float(np.mean([run["pressure_1"], run["pressure_2"]]))
 
@@ -222,6 +223,7 @@ def draw(found: Identified, loops: dict[str, Tracked]) -> Figure:
 
 
 def rows(cells: Sequence[Sequence[str]]) -> str:
+    """Return the rows of a table."""
     return "\n".join(f"| {' | '.join(row)} |" for row in cells)
 
 

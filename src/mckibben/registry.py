@@ -153,6 +153,7 @@ PLUGINS: dict[str, dict[str, str]] = {
     },
     "protocols": {
         "activation-pressure": "mckibben.papers.activation_pressure.protocol:activation_pressure",
+        "antagonistic-joint": "mckibben.rigs.protocols.joint:antagonistic_joint",
         "field-models": "mckibben.papers.field_models.protocol:field_models",
         "mpi-narmax": "mckibben.papers.mpi_narmax.protocol:mpi_narmax",
         "multistate-friction": "mckibben.papers.multistate_friction.protocol:multistate_friction",
@@ -164,6 +165,7 @@ PLUGINS: dict[str, dict[str, str]] = {
     },
     "setups": {
         "arm": "mckibben.rigs.setups.arm:Arm",
+        "joint": "mckibben.rigs.setups.joint:Joint",
         "moving-end": "mckibben.rigs.setups.moving_end:MovingEnd",
         "test-stand": "mckibben.rigs.setups.test_stand:TestStand",
     },

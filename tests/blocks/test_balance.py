@@ -13,13 +13,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from mckibben import ModelWarning
+from mckibben import ModelError, ModelWarning
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.laws import wander
+from mckibben.blocks.setting import with_fields
 from tests.blocks.balances import (
     ALONE,
+    CROWDED,
     FURTHEST,
     HIGHEST,
     SEEDS,
@@ -112,6 +114,21 @@ def test_a_bundle_that_is_slack_at_its_middle_is_driven() -> None:
     pressures = np.repeat(1.0 + np.sin(np.arange(100) / 9.0)[:, np.newaxis] ** 2, 2, axis=1) + 1.0
     inputs = np.column_stack([pressures, np.zeros(100)])
     np.testing.assert_allclose(undone(block.inverse(), inputs), pressures, atol=1e-9)
+
+
+def test_a_preload_is_how_hard_muscles_pull_against_each_other() -> None:
+    inputs = motion(CROWDED, (0.0, 10.0), 0)
+    stiffer = [with_fields(CROWDED, {"preload": bar}) for bar in (2.0, 3.0, 4.0)]
+    pressures = [run(block, inputs) for block in stiffer]
+    assert np.all(np.diff([given.mean() for given in pressures]) > 0.5)
+    for block in stiffer:
+        np.testing.assert_allclose(undone(block, inputs), inputs[:, :2], atol=1e-7)
+    for block in (
+        ALONE,
+        replace(CROWDED, drive=((1.0, 0.5, 0.1), (1.0, 0.5, -0.1), (1.0, 0.2, 0.4))),
+    ):
+        with pytest.raises(ModelError, match="preload"):
+            with_fields(block, {"preload": 1.0})
 
 
 @given(DRIVEN, SEEDS)

@@ -12,13 +12,18 @@ import pytest
 
 from mckibben import GPI, DataError, Recording, study
 from mckibben.blocks.fields import Channel
+from mckibben.control import UNCOMPENSATED
 from mckibben.diagnosis.check import Validation
 from mckibben.files import read, write
 from mckibben.rigs import load_rig
 from mckibben.signals import triangle
 from mckibben.studying.study import closed_loops, named, recorded_rig
+from tests.blocks.balances import CROWDED
 
 TIME = np.arange(0, 24, 0.02)
+
+OF_MUSCLES = ("elasticity", "areas", "friction", "relaxation", "damping", "lines", "walls", "given")
+"""Fields of a balance with a part for every muscle."""
 
 
 def recorded(u: np.ndarray) -> Recording:
@@ -58,6 +63,28 @@ def test_no_loop_tells_a_regulator_pressures_as_volts(
     row = SimpleNamespace(model="gpi", inverse=model.inverse())
     board: Any = SimpleNamespace(rows=[row], outputs=("displacement",))
     assert bool(closed_loops(board, "gpi", load_rig("rail"), [train], 0)) is closed
+
+
+def test_a_loop_is_closed_with_more_pressures_than_motions() -> None:
+    """No PID is tuned there: a pressure has no motion of its own."""
+    joint = replace(
+        CROWDED,
+        springs=((0.0, 5.0),),
+        loads=((1.0,),),
+        scale=1.0,
+        limits=(0.05, 0.2),
+        hull=((-0.8, 0.8),) * 2,
+        driven=(Channel("angle", "rad"),),
+        scheduled=(Channel("torque", "N*m"),),
+        directions=((1.0,), (-1.0,)),
+        pressure_range=(0.0, 6.0),
+        **{name: getattr(CROWDED, name)[:2] for name in OF_MUSCLES},
+    )
+    row = SimpleNamespace(model="balance", inverse=joint)
+    board: Any = SimpleNamespace(rows=[row], outputs=("angle",))
+    test = Recording({"angle": 0.2 * np.sin(TIME), "torque": np.zeros(TIME.size)}, 0.02)
+    loops = closed_loops(board, "balance", load_rig("antagonistic-joint"), [test], 0)
+    assert {*loops} == {UNCOMPENSATED, "balance inverse"}
 
 
 @pytest.mark.parametrize("loads", [(0.0, 100.0), (None,)])

@@ -215,6 +215,11 @@ class Block(Hinted, DrawsItself, Parametrised):
         ends: tuple[float, float] | None = getattr(self, "input_range", None)
         return (-np.inf, np.inf) if ends is None else ends
 
+    @property
+    def free_fields(self) -> Mapping[str, str | None]:
+        """Those of `settable` that act on this block."""
+        return self.settable
+
     @cached_property
     def known_inputs(self) -> Array:
         """Lowest and highest identified value of every input, shape (n_inputs, 2).

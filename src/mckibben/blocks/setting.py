@@ -23,7 +23,7 @@ def settable(model: Block) -> dict[str, Any]:
     >>> settable(ActivationPressure.example())
     {'frequency': 1.0, 'rate_time_constant': 0.0}
     """
-    return {name: getattr(part, name) for part in _parts(model) for name in part.settable}
+    return {name: getattr(part, name) for part in _parts(model) for name in part.free_fields}
 
 
 def with_fields(model: Block, values: Mapping[str, Any]) -> Block:
@@ -46,12 +46,12 @@ def with_fields(model: Block, values: Mapping[str, Any]) -> Block:
             )
 
     def change(part: Any) -> Any:
-        new = {name: values[name] for name in getattr(part, "settable", ()) if name in values}
+        new = {name: values[name] for name in getattr(part, "free_fields", ()) if name in values}
         return replace(part, **new) if new else part
 
     changed: Block = with_parts(model, change)
     for part in _parts(changed):
-        for name, range_field in part.settable.items():
+        for name, range_field in part.free_fields.items():
             ends = range_field and getattr(part, range_field)
             value = getattr(part, name)
             if name in values and ends and not _within(value, *ends):

@@ -36,8 +36,10 @@ class System(NamedTuple):
     mechanism: Records
 
     def as_made(self) -> State:
-        """Return the state before switching on."""
-        return State(np.zeros(self.muscles.size, MUSCLE_STATE), np.zeros(1, MOTION))
+        """Return the state before switching on: as mounted, stretched or slack."""
+        muscles = np.zeros(self.muscles.size, MUSCLE_STATE)
+        muscles["x"] = np.minimum(self.muscles["slack"], 0.0)
+        return State(muscles, np.zeros(1, MOTION))
 
     def run(
         self, state: State, demands: Demands, sample_time: float, longest_step: float, held: bool

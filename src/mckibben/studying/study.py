@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -308,9 +309,10 @@ def closed_loops(
 ) -> dict[str, Tracked]:
     """Return tracking results of a measured motion: uncompensated, with every inverse, PID, and both.
 
-    PID is combined with the inverse of the chosen model. Of the tests, the one that moves most in its
-    stillest output is followed. Nothing is chosen by it. An inverse that fails is left out; its model is
-    in the leaderboard. There are none where inverses give pressures, and the rig takes volts.
+    PID is combined with the inverse of the chosen model, where every pressure has a motion of its own.
+    Of the tests, the one that moves most in its stillest output is followed. Nothing is chosen by it. An
+    inverse that fails is left out; its model is in the leaderboard. There are none where inverses give
+    pressures, and the rig takes volts.
 
     Raises
     ------
@@ -326,7 +328,9 @@ def closed_loops(
     step = sample_time_of(reference, "be tracked")
     scheduled = {name: float(reference[name][0]) for name in held}
     asked = inverses[chosen].inputs
-    pid = tune_pid(rig, sample_time=step, scheduled=scheduled, references=asked, seed=seed)
+    tuned = cache(
+        partial(tune_pid, rig, sample_time=step, scheduled=scheduled, references=asked, seed=seed)
+    )
     laws = [(f"{model} inverse", "feedforward", model) for model in inverses]
     laws += [("PID", "pid", chosen), (f"{chosen} inverse + PID", "feedforward-pid", chosen)]
     found: dict[str, Tracked] = {}
@@ -335,7 +339,7 @@ def closed_loops(
         found[UNCOMPENSATED] = without
     for name, law, model in laws:
         with suppress(MckibbenError):
-            controller = control_law(law, inverses[model], lambda: pid)
+            controller = control_law(law, inverses[model], tuned)
             found[name] = track(controller, rig, reference, approach=5.0, seed=seed)
     return found
 

@@ -19,6 +19,7 @@ DURATION = 3.0
 N_STORED = 40
 
 CHANGED: dict[str, dict[str, Any]] = {
+    "antagonistic-joint": {"payload": 1.0, "muscle_2.c10": 0.2},
     "mas10-test-stand": {"muscle.c10": 0.2},
     "mas20-hanging": {"payload": 10.0},
     "mckibben-530": {"muscle.c10": 0.2},

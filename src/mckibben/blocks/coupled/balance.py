@@ -217,6 +217,7 @@ class Balance(Invertible):
     inverse_start_kernel: ClassVar[Start] = balance_inverse_start
     inverse_path_dependent: ClassVar[bool] = True
     complex_step: ClassVar[bool] = False
+    settable: ClassVar[Mapping[str, str | None]] = {"preload": "pressure_range"}
     increasing = ("limits",)
     parameters: ClassVar[tuple[str, ...]] = (
         *("springs", "elasticity", "areas", "friction", "relaxation", "loads"),
@@ -470,6 +471,11 @@ class Balance(Invertible):
     def places(self) -> Layout:
         """Where the numbers are among coefficients and states."""
         return layout(self.sizes)
+
+    @property
+    def free_fields(self) -> Mapping[str, str | None]:
+        """Fields to set: the preload where muscles are more than coordinates, and not driven as one."""
+        return self.settable if self.directions and not self.drive else {}
 
     @property
     def moves(self) -> Array:

@@ -1,10 +1,10 @@
 """Mechanics: coordinates with mass, stiffness and friction, and time integration.
 
-The coordinates are few (the end of a muscle; a disc's mean shortening and two tilts), the muscles
-act on them through fixed lever arms. Every step solves the balance of forces at its end by Newton's
-method, with the accelerations of Hilber, Hughes and Taylor (1977): second order, and quiet where
-friction sticks. Air is marched before, in substeps. One coordinate may instead be driven, as by the
-screw of a test stand.
+The coordinates are few (the end of a muscle; a disc's mean shortening and two tilts; the angle of a
+joint), the muscles act on them through fixed lever arms. Every step solves the balance of forces at
+its end by Newton's method, with the accelerations of Hilber, Hughes and Taylor (1977): second order,
+and quiet where friction sticks. Air is marched before, in substeps. One coordinate may instead be
+driven, as by the screw of a test stand.
 """
 
 from __future__ import annotations
@@ -37,7 +37,10 @@ GAMMA = 0.5 - ALPHA
 BETA = 0.25 * (1.0 - ALPHA) ** 2
 
 TOLERANCE = 1e-8
-"""A Newton move below this ends the search [mm or rad]."""
+"""A Newton move below this ends the search [mm or rad].
+
+It holds a mass m [t] at rest within a force of m TOLERANCE / (BETA step²).
+"""
 
 MOST_ATTEMPTS = 80
 """Newton moves, and halvings of moves that went too far, in one step."""
@@ -51,17 +54,23 @@ _EACH = (MOST_COORDINATES,)
 
 MECHANISM = np.dtype(
     [
-        ("n", "i8"),  # coordinates: shortening [mm] first, then tilts [rad] if any
+        (
+            "n",
+            "i8",
+        ),  # coordinates: shortening [mm] first, then tilts [rad] if any; or an angle [rad]
         ("mass", "f8", _EACH),  # t, or t mm²
         ("stiffness", "f8", _EACH),  # N/mm, or N mm/rad
         ("stiffening", "f8", _EACH),  # stiffness that a bar in one muscle adds
         ("stiffened_by", "i8"),  # that muscle
         ("damping", "f8", _EACH),  # N s/mm, or N mm s/rad
         ("weight", "f8", _EACH),  # N against it
+        ("swing", "f8", _EACH),  # weight times lever of a pendulum [N mm]
+        ("hanging", "f8", _EACH),  # where it hangs straight down [rad]
         ("guide", "f8", _EACH),  # presliding stiffness of the guide's friction [N/mm]
         ("guide_limit", "f8", _EACH),  # N
         ("driven", "i8"),
         ("speed_limit", "f8"),  # of the drive [mm/s]
+        ("tolerance", "f8"),  # of a Newton move [mm or rad]
     ],
     align=True,
 )
@@ -95,7 +104,7 @@ def beside(mechanism: Any, states: Any) -> float:
 @compiled
 def shortening(muscle: Any, n: int, place: Any) -> float:
     """Return the shortening of a muscle [mm] at given coordinates."""
-    x = 0.0
+    x = muscle.slack
     for g in range(n):
         x += muscle.levers[g] * place[g]
     return x
@@ -120,9 +129,12 @@ def resist(
         damping = mechanism.damping[g] / step
         motion.balance[g] = stiffness * motion.tried[g] + rub + damping * moved
         motion.balance[g] += mechanism.weight[g] + loads[g]
+        tilt = motion.tried[g] - mechanism.hanging[g]
+        motion.balance[g] += mechanism.swing[g] * math.sin(tilt)
         for k in range(n):
             motion.slopes[g, k] = 0.0
-        motion.slopes[g, g] = stiffness + rub_slope + damping
+        swing_slope = mechanism.swing[g] * math.cos(tilt)
+        motion.slopes[g, g] = stiffness + rub_slope + damping + swing_slope
     for j in range(muscles.size):
         x = shortening(muscles[j], n, motion.tried)
         pull, slope, _ = taut_or_slack(muscles[j], states[j], x, step)
@@ -204,7 +216,7 @@ def move(muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, s
         largest = 0.0
         for g in range(n):
             largest = max(largest, abs(motion.change[g]))
-        if largest <= TOLERANCE:
+        if largest <= mechanism.tolerance:
             break
         for g in range(n):
             motion.tried[g] += motion.change[g]

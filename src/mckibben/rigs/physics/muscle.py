@@ -62,6 +62,7 @@ MUSCLE = np.dtype(
         ("creep_time", "f8", (MOST_BRANCHES,)),  # s
         ("push", "f8"),  # N
         ("levers", "f8", (MOST_COORDINATES,)),  # shortening by each coordinate
+        ("slack", "f8"),  # shortening where all coordinates are 0 [mm]
     ],
     align=True,
 )

@@ -21,7 +21,7 @@ from pydantic import model_validator
 from mckibben.arrays import Array
 from mckibben.rigs.parameters import EachPositive, Muscle, Section, parameter
 from mckibben.rigs.physics.compiled import GRAVITY
-from mckibben.rigs.physics.motion import MECHANISM
+from mckibben.rigs.physics.motion import MECHANISM, TOLERANCE
 from mckibben.rigs.rig import Rig
 from mckibben.rigs.system import Demands, System, Traces
 
@@ -114,6 +114,7 @@ class Arm(Rig):
         length = self.muscle.length
         # A tilt t moves the disc aside by length t/2 and lifts it by length t²/6.
         mechanism["n"] = 3
+        mechanism["tolerance"] = TOLERANCE
         mechanism["mass"] = [1e-3 * mass, *[1e-3 * mass * length**2 / 4] * 2]
         lifting = mass * GRAVITY * length / 3
         mechanism["stiffness"] = [0.0, *[self.bending_stiffness + lifting] * 2]

@@ -10,7 +10,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.rigs.parameters import Muscle, parameter
 from mckibben.rigs.physics.compiled import GRAVITY
-from mckibben.rigs.physics.motion import MECHANISM, NO_MUSCLE
+from mckibben.rigs.physics.motion import MECHANISM, NO_MUSCLE, TOLERANCE
 from mckibben.rigs.rig import Rig
 from mckibben.rigs.system import Demands, System, Traces
 
@@ -51,6 +51,7 @@ class MovingEnd(Rig):
         muscles["levers"][0, 0] = 1.0
         made = np.zeros(1, MECHANISM)
         made["n"] = 1
+        made["tolerance"] = TOLERANCE
         made["mass"][0, 0] = (self.moved_mass + self.payload) * 1e-3
         hanging = self.payload + (self.moved_mass if self.vertical else 0.0)
         made["weight"][0, 0] = hanging * GRAVITY + self.return_force

@@ -1,0 +1,1 @@
+"""Protocols of rigs that are of no paper; those of papers are in the papers' folders."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import string
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
@@ -67,12 +67,21 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Axes:
+    """A panel: x and y of its curves by name, the key of its labels, and shaded intervals of x."""
+
+    curves: Curves
+    key: str = ""
+    shaded: Sequence[tuple[float, float]] = ()
+
+
+@dataclass(frozen=True)
 class Figure:
-    """A figure of a re-run: its texts, and panels of curves by their titles."""
+    """A figure of a re-run: its texts, filled in, and panels by their titles."""
 
     key: str
     text: FigureText
-    panels: Mapping[str, Curves]
+    panels: Mapping[str, Axes]
 
 
 @dataclass(frozen=True, repr=False)
@@ -310,18 +319,21 @@ class Experiment:
         filled = text.model_copy(update=words)
         self.tables.append(Table(key, filled, (*full,), (*zip(*full.values(), strict=True),)))
 
-    def figure(self, key: str, panels: Mapping[str, Curves]) -> None:
+    def figure(self, key: str, panels: Mapping[str, Curves | Axes], **facts: Any) -> None:
         """Add a figure: panel title -> curve name -> its x and y, of which some are drawn.
 
-        Without any panel there is no figure.
+        Without any panel there is no figure; ``facts`` fill the fields of its axis labels.
         """
         if not panels:
             return
-        drawn = {
-            title: {name: (thinned(x), thinned(y)) for name, (x, y) in curves.items()}
-            for title, curves in panels.items()
-        }
-        self.figures.append(Figure(key, self.paper.figures[key], drawn))
+        drawn: dict[str, Axes] = {}
+        for title, given in panels.items():
+            axes = given if isinstance(given, Axes) else Axes(given)
+            few = {name: (thinned(x), thinned(y)) for name, (x, y) in axes.curves.items()}
+            drawn[title] = replace(axes, curves=few)
+        text = self.paper.figures[key].filled(facts)
+        others = {name: labels.filled(facts) for name, labels in text.axes.items()}
+        self.figures.append(Figure(key, text.model_copy(update={"axes": others}), drawn))
 
     def says(self, **facts: Any) -> None:
         """Set facts for the sentences of ``paper.toml``."""

@@ -354,7 +354,7 @@ class Recording(Hinted, DrawsItself):
     @property
     def origin(self) -> str:
         """Label of its samples: "measured", unless a virtual rig's."""
-        return "simulated" if "(virtual)" in str(self.meta.get("rig", "")) else "measured"
+        return "virtual rig" if "(virtual)" in str(self.meta.get("rig", "")) else "measured"
 
     @property
     def name(self) -> str:

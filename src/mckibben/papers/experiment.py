@@ -8,7 +8,7 @@ from __future__ import annotations
 import string
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
@@ -68,12 +68,21 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Axes:
+    """A panel: x and y of its curves by name, the key of its labels, and shaded intervals of x."""
+
+    curves: Curves
+    key: str = ""
+    shaded: Sequence[tuple[float, float]] = ()
+
+
+@dataclass(frozen=True)
 class Figure:
-    """A figure of a re-run: its texts, and panels of curves by their titles."""
+    """A figure of a re-run: its texts, filled in, and panels by their titles."""
 
     key: str
     text: FigureText
-    panels: Mapping[str, Curves]
+    panels: Mapping[str, Axes]
 
 
 @dataclass(frozen=True, repr=False)
@@ -351,22 +360,25 @@ class Experiment:
             if column in ours and (column == text.rows or self._compares(text, column)):
                 yield column, ours[column]
 
-    def figure(self, key: str, panels: Mapping[str, Curves]) -> None:
+    def figure(self, key: str, panels: Mapping[str, Curves | Axes], **facts: Any) -> None:
         """Add a figure: panel title -> curve name -> its x and y, of which some are drawn.
 
-        Without any panel there is no figure.
+        Without any panel there is no figure; ``facts`` fill the fields of its axis labels.
         """
         if not panels:
             return
-        drawn = {
-            title: {
+        drawn: dict[str, Axes] = {}
+        for title, given in panels.items():
+            axes = given if isinstance(given, Axes) else Axes(given)
+            few = {
                 name: (thinned(x), thinned(y))
-                for name, (x, y) in curves.items()
+                for name, (x, y) in axes.curves.items()
                 if self.of_its_size or name != "printed"
             }
-            for title, curves in panels.items()
-        }
-        self.figures.append(Figure(key, self.paper.figures[key], drawn))
+            drawn[title] = replace(axes, curves=few)
+        text = self.paper.figures[key].filled(facts)
+        others = {name: labels.filled(facts) for name, labels in text.axes.items()}
+        self.figures.append(Figure(key, text.model_copy(update={"axes": others}), drawn))
 
     def says(self, **facts: Any) -> None:
         """Set facts of sentences in ``paper.toml``; ``*_printed`` are in units of the paper's rig."""

@@ -10,7 +10,7 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -66,8 +66,9 @@ class TableText(_Strict):
     Title and note may have fields in braces, which the experiment fills. ``of`` is the paper's table or
     figure, empty for ours; ``rows`` the heading of the first column; ``printed`` the paper's figures by
     column and row; ``relative`` are headings of printed figures that hold on a rig of any size.
-    ``drawn`` is what its columns measure, with the unit, if printed and ours are drawn; ``bound`` what
-    the paper says that its figures are below, where it prints no more.
+    ``drawn`` is what its columns measure, with the unit, if printed and ours are drawn, and ``unit`` that
+    of headings that have none; ``bound`` what the paper says that its figures are below, where it prints
+    no more.
     """
 
     title: Words
@@ -77,16 +78,32 @@ class TableText(_Strict):
     printed: dict[str, dict[str, int | float]] = {}
     relative: tuple[str, ...] = ()
     drawn: str = ""
+    unit: str = ""
     bound: float | None = None
 
 
-class FigureText(_Strict):
-    """Title of a re-run's figure, the paper's figure that it redraws, and axis labels."""
+class AxesText(_Strict):
+    """Labels of axes, each with its unit, ``[-]`` for none; they may have fields in braces."""
+
+    x: Words
+    y: Words
+
+    def filled(self, facts: Mapping[str, Any]) -> Self:
+        """Return the labels with their fields filled in."""
+        return self.model_copy(update={k: getattr(self, k).format(**facts) for k in ("x", "y")})
+
+
+class FigureText(AxesText):
+    """Title of a re-run's figure, the paper's figure that it redraws, and axis labels.
+
+    ``axes`` are the labels of panels that show something else, by key; ``shaded`` is what intervals
+    are shaded for.
+    """
 
     title: Words
     of: str = ""
-    x: Words
-    y: Words
+    axes: dict[str, AxesText] = {}
+    shaded: str = ""
 
 
 class Paper(_Strict):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -12,9 +12,12 @@ from mckibben.arrays import Array
 from mckibben.channels import channel_symbol
 from mckibben.recording import Recording
 
-Style = Literal["line", "fine", "broad", "beads", "specks", "dots", "rings", "ticks", "stems"]
+Style = Literal[
+    "line", "fine", "broad", "beads", "specks", "dots", "rings", "ticks", "stems", "above", "below"
+]
 """How points are drawn: a line, a thin one, a pale wide one to lie under others, a line with a bead
-at every point, small dots without a line, or separate marks."""
+at every point, small dots without a line, or separate marks; of a curve that leaves its panel, arrow
+heads that point to where it is."""
 
 POINTS = 4000
 """Most points of a curve: two for each of 2000 bins, more than a screen or a column has pixels."""
@@ -25,6 +28,9 @@ FEW = 300
 JUMP = 0.05
 """Median step of the input over its range from which a path is drawn as dots: a line would cross the
 loop at every step."""
+
+MARGIN = 0.05
+"""Space above and below the curves of a panel that some leave, relative to its height."""
 
 N_COLOURS = 10
 """Number of distinguishable colours, the most models or recordings in a panel."""
@@ -123,6 +129,8 @@ class Panel:
         Words for y = 0, 1, ... from the top down, instead of numbers.
     least : float
         Least height of the y axis, so that rounding does not fill it.
+    limits : (float, float) or None
+        Of the y axis, where not all curves are to be inside.
     """
 
     x_label: Label | str
@@ -134,10 +142,13 @@ class Panel:
     zero: bool = False
     categories: tuple[str, ...] = ()
     least: float = 0.0
+    limits: tuple[float, float] | None = None
 
     @property
     def y_range(self) -> tuple[float, float] | None:
         """Limits of the y axis, if not from the curves."""
+        if self.limits is not None:
+            return self.limits
         every = [one.y[np.isfinite(one.y)] for one in self.curves]
         values = np.concatenate([*every, np.zeros(int(self.zero))])
         if not values.size or np.ptp(values) >= self.least:
@@ -185,6 +196,67 @@ def along(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array, Array
 
     places, x, y = decimate_minmax(np.arange(x.size, dtype=float), x, y, max_points=points)
     return places, x, y
+
+
+def jumps(x: Array) -> bool:
+    """Return whether a line along values would cross its figure at every step.
+
+    >>> jumps(np.array([0.0, 1.0, 0.1, 0.9])), jumps(np.array([0.0, 0.3, 0.6, 1.0]))
+    (True, False)
+    """
+    steps = np.diff(x)
+    turns = not (np.all(steps >= 0) or np.all(steps <= 0))
+    return turns and bool(np.median(np.abs(steps)) > JUMP * np.ptp(x))
+
+
+def within(panel: Panel, least: float = 0.0) -> Panel:
+    """Return a panel that shows its first curve, and all that stay near it.
+
+    A curve that goes farther from the first than this is high is cut off, with an arrow head that
+    points to where it is, so that no outlier hides the rest.
+
+    Parameters
+    ----------
+    panel : Panel
+    least : float
+        What counts as near at least, if the first curve is low.
+    """
+    known = [curve.y[np.isfinite(curve.y)] for curve in panel.curves]
+    low, high = float(known[0].min()), float(known[0].max())
+    reach = max(high - low, least)
+    ends = [(float(y.min()), float(y.max())) if y.size else (low, high) for y in known]
+    near = [low - reach <= lowest and highest <= high + reach for lowest, highest in ends]
+    if all(near):
+        return panel
+    inside = [pair for pair, stays in zip(ends, near, strict=True) if stays]
+    low, high = min(pair[0] for pair in inside), max(pair[1] for pair in inside)
+    height = max(high - low, reach)
+    limits = low - MARGIN * height, high + MARGIN * height
+    # a curve cut off a height away still leaves the panel, and is a number for every library
+    far = low - height, high + height
+    curves = [
+        curve if stays else replace(curve, y=np.clip(curve.y, *far))
+        for curve, stays in zip(panel.curves, near, strict=True)
+    ]
+    leaving = [curve for curve, stays in zip(curves, near, strict=True) if not stays]
+    heads = [
+        head
+        for place, curve in enumerate(leaving)
+        for head in _heads(curve, limits, MARGIN * height / 2, (place + 0.5) / len(leaving))
+    ]
+    return replace(panel, curves=(*curves, *heads), limits=limits)
+
+
+def _heads(curve: Curve, limits: tuple[float, float], inside: float, share: float) -> list[Curve]:
+    """Return arrow heads at the limits that a curve passes, at a share of the way along x beyond."""
+    heads: list[Curve] = []
+    styles: tuple[Style, Style] = "above", "below"
+    out_of = curve.y > limits[1], curve.y < limits[0]
+    for style, out, y in zip(styles, out_of, (limits[1] - inside, limits[0] + inside), strict=True):
+        if out.any():
+            x = np.quantile(curve.x[out], share, method="nearest")
+            heads.append(Curve(np.array([x]), np.array([y]), "", curve.colour, style, curve.model))
+    return heads
 
 
 def axis_label(channel: str, unit: str) -> str:

@@ -30,6 +30,12 @@ BAR: Json = CLOSED | {
 _WIDTHS = {"line": 1.5, "fine": 0.8, "broad": 5.0, "beads": 1.0}
 """Of lines [px], by style."""
 
+_SYMBOLS = {"dots": "circle", "rings": "circle-open", "ticks": "line-ns-open"} | {
+    "above": "triangle-up",
+    "below": "triangle-down",
+}
+"""Separate marks, by style."""
+
 _GAP = 0.09
 """Share of the height between stacked panels."""
 
@@ -188,7 +194,7 @@ def _trace(curve: Curve, x: str, y: str) -> Json:
             "line": {"color": colour, "width": 2},
             "marker": {"color": colour, "size": [0, 8, 0] * n, "opacity": 1, "line": {"width": 0}},
         }
-    symbol = {"dots": "circle", "rings": "circle-open", "ticks": "line-ns-open"}[curve.style]
+    symbol = _SYMBOLS[curve.style]
     marker = {"color": colour, "size": 10, "symbol": symbol, "line": {"color": colour, "width": 2}}
     trace |= {"mode": "markers", "marker": marker}
     if curve.interval is not None:

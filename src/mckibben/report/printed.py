@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -71,6 +72,10 @@ DASHES, MARKERS = ("-", "--", "-.", ":"), ("", "o", "^")
 DOTS = "os^DvP*X<>"
 """Markers of points without a line, by series."""
 
+BEAD, STYLED_BEAD, LARGEST_BEAD, FEW_BEADS = 1.6, 2.4, 5.0, 40
+"""Size of a bead on a line, of one with a form of its own, of the first series' where these are few, and
+how many are few: there beads become smaller from series to series, so that equal ones show [pt]."""
+
 N_MARKERS = 8
 """Markers along a line."""
 
@@ -102,8 +107,14 @@ STYLE: Mapping[Any, Any] = MappingProxyType(
 )
 """Letters of 7 to 8 pt, which vector formats hold as text."""
 
+MOST_TICKS, APART = 7, 0.6
+"""Ticks along x that are tried first where numbers touch, and the least gap between [letter heights]."""
+
 _WIDTHS = {"line": 0.9, "fine": 0.4, "broad": 2.6, "beads": 0.5}
 """Of lines [pt], by style."""
+
+_POINTERS = {"ticks": "|", "above": "^", "below": "v"}
+"""Markers that are the same for every series, by style."""
 
 _POINTS = 72
 """In an inch."""
@@ -205,10 +216,13 @@ def draw_on(
     axes = every[:n]
     for axis in every[n:]:
         axis.set_axis_off()
+    styles = styled(drawing)
     for place, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=True)):
-        draw_panel(
-            axis, panel, bottom=not drawing.stacked or place == n - 1, styled=styled(drawing)
-        )
+        below = drawing.panels[place + abreast : place + abreast + 1]
+        beside = drawing.panels[place - 1 : place] if place % abreast else ()
+        last = all(one.x_label != panel.x_label for one in below)
+        first = all(one.y_label != panel.y_label for one in beside)
+        draw_panel(axis, panel, bottom=last, left=first, styled=styles)
     if drawing.note:
         size = _size("legend.fontsize")
         note = wrapped(verbatim(drawing.note), _POINTS * width - 2 * size, size)
@@ -220,6 +234,7 @@ def draw_on(
         fitting = min(height, max((scale * PAGE_HEIGHT - others) / rows, LEAST_HEIGHT))
         for panel, axis in zip(drawing.panels, axes, strict=True):
             wrap_labels(axis, panel, _POINTS * max(fitting, LABEL_HEIGHT))
+            thin_ticks(axis)
         if repetition:
             figure.set_size_inches(width, others + rows * fitting)
         else:
@@ -247,7 +262,7 @@ def draw_into(axes: Sequence[Axes], drawing: Drawing) -> None:
     """Draw every panel into given axes, each with its legend above."""
     last = len(axes) - 1
     for place, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=True)):
-        draw_panel(axis, panel, not drawing.stacked or place == last, styled(drawing))
+        draw_panel(axis, panel, not drawing.stacked or place == last, styled=styled(drawing))
         wrap_labels(axis, panel, _inside(axis)[1])
         axis_legend(axis)
 
@@ -327,8 +342,10 @@ def _inside(axis: Axes) -> tuple[float, float]:
 
 def _axes_height(drawing: Drawing, width: float) -> float:
     """Return the height of axes [in] in panels of a width."""
-    if drawing.panels[0].categories:
-        return 0.3 + 0.2 * len(drawing.panels[0].categories)
+    if words := drawing.panels[0].categories:
+        size, widest = _size("ytick.labelsize"), _POINTS * width * _CATEGORIES
+        lines = max(wrapped(verbatim(one), widest, size).count("\n") for one in words)
+        return 0.3 + (0.2 + 1.2 * lines * size / _POINTS) * len(words)
     if drawing.stacked or drawing.abreast == 1:
         return 1.2
     return min(0.62 * width, 2.2)
@@ -340,8 +357,10 @@ def styled(drawing: Drawing) -> bool:
     return len({one.colour for one in curves if one.colour.startswith("series")}) > PLAIN
 
 
-def draw_panel(axis: Axes, panel: Panel, bottom: bool, styled: bool = False) -> None:
-    """Draw a panel into axes, with the label of x if it is the lowest of a stack."""
+def draw_panel(
+    axis: Axes, panel: Panel, bottom: bool, left: bool = True, styled: bool = False
+) -> None:
+    """Draw a panel into axes, with the labels of x and y that no neighbour below or beside has."""
     if panel.zero:
         axis.axhline(0, color="#aaaaaa", linewidth=0.6, zorder=0)
     for curve in panel.curves:
@@ -363,7 +382,7 @@ def draw_panel(axis: Axes, panel: Panel, bottom: bool, styled: bool = False) -> 
         axis.set_ylim(panel.y_range)
     if bottom:
         axis.set_xlabel("x")  # holds the place until `wrap_labels`
-    axis.set_ylabel("y" if str(panel.y_label) else "")
+    axis.set_ylabel("y" if left and str(panel.y_label) else "")
     if panel.title:
         axis.set_title("title", loc="left")
     if panel.categories:
@@ -386,6 +405,18 @@ def wrap_labels(axis: Axes, panel: Panel, height: float) -> None:
         words = wrapped(verbatim(panel.title), width, _size("axes.titlesize"))
         legend = axis.get_legend()
         axis.set_title(words, loc="left") if legend is None else legend.set_title(words)
+
+
+def thin_ticks(axis: Axes) -> None:
+    """Take fewer ticks along x as long as their numbers touch."""
+    for n in range(MOST_TICKS, 1, -1):
+        low, high = sorted(axis.get_xlim())
+        shown = [one for one in axis.get_xticklabels() if low <= one.get_position()[0] <= high]
+        boxes = [one.get_window_extent() for one in shown if one.get_text()]
+        gap = APART * _size("xtick.labelsize") * _figure(axis).dpi / _POINTS
+        if all(next_.x0 - one.x1 > gap for one, next_ in pairwise(boxes)):
+            return
+        axis.locator_params(axis="x", nbins=n)
 
 
 def _worded(label: Label | str, width: float, size: float) -> str:
@@ -459,6 +490,9 @@ def _curve(axis: Axes, curve: Curve, styled: bool) -> None:
     label = f" {verbatim(curve.name)}" if curve.name.startswith("_") else verbatim(curve.name)
     look: dict[str, Any] = {"color": colour, "label": label or None}
     series = int(curve.colour.removeprefix("series-")) - 1 if "series" in curve.colour else None
+    bead = BEAD
+    if curve.x.size <= FEW_BEADS and series is not None:
+        bead = max(bead, LARGEST_BEAD - series)
     if not styled:
         series = None
     if curve.style in _WIDTHS:
@@ -471,17 +505,17 @@ def _curve(axis: Axes, curve: Curve, styled: bool) -> None:
             step = max(curve.x.size // N_MARKERS, 1)
             look |= {"markersize": 3, "markevery": (series * step // N_COLOURS, step)}
         if curve.style == "beads":
-            bead = "o" if series is None else DOTS[series]
-            look |= {"marker": bead, "markersize": 1.6 if series is None else 2.4, "markevery": 1}
+            look |= {"marker": "o" if series is None else DOTS[series], "markevery": 1}
+            look["markersize"] = bead if series is None else max(bead, STYLED_BEAD)
         axis.plot(curve.x, curve.y, **look)
         return
     look |= {"linestyle": "none", "marker": DOTS[series or 0], "markersize": 4}
     if curve.style == "specks":
-        look["markersize"] = 1.6 if series is None else 2.4
+        look["markersize"] = BEAD if series is None else STYLED_BEAD
     elif curve.style == "rings":
         look["markerfacecolor"] = "none"
-    elif curve.style == "ticks":
-        look["marker"] = "|"
+    elif curve.style in _POINTERS:
+        look |= {"marker": _POINTERS[curve.style], "markersize": 5, "clip_on": False}
     elif curve.style == "stems":
         axis.vlines(curve.x, np.minimum(curve.y, 0), np.maximum(curve.y, 0), color=colour)
     if curve.interval is not None:

@@ -4,27 +4,42 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.report import builder, interactive
 from mckibben.report.builder import Code, Item, Page, Section, Text
-from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Mark, Panel, Style
+from mckibben.report.drawing import (
+    N_COLOURS,
+    Curve,
+    Drawing,
+    Mark,
+    Panel,
+    Style,
+    axis_label,
+    jumps,
+    left_out,
+    series_colour,
+    within,
+)
 
 if TYPE_CHECKING:
     from mckibben.papers.experiment import Figure, Reproduction, Table
     from mckibben.papers.paper import Item as Indexed
 
-RECORDED = ("", "simulated", "measured", "sensor", "extracted", "reference", "of every loop")
-"""Names of curves that are drawn in ink, as what a muscle did."""
-
-LONGEST = 40
-"""Letters of all names of curves for which a third of the page is wide enough."""
+RECORDED = ("", "virtual rig", "measured", "extracted", "reference")
+"""Names of curves that are drawn in ink, as what a muscle did or should do: one of them in a figure."""
 
 DOTS = 40
-"""Most points of a curve that is drawn as dots; more are a line."""
+"""Most points of a curve that are drawn each."""
+
+SHARE, LEAST = 0.5, 0.1
+"""Of the highest recorded curve on such an axis: what a panel may show above and below its own, and
+its height at least, so that noise does not fill it."""
 
 
 def heading(one: Table | Figure, *, quick: bool = False) -> str:
@@ -43,9 +58,10 @@ def reproduction_page(found: Reproduction) -> str:
         chart(f"comparison-{k}", comparison(table), heading(table), "tall" * (len(table.rows) > 12))
         for k, table in enumerate(pictured)
     ]
+    drawn = [drawing(one) for one in found.figures]
     figures = [
-        chart(f"figure-{k}", drawing(one), heading(one), "square", min(len(one.panels), 3))
-        for k, one in enumerate(found.figures)
+        chart(f"figure-{k}", one, heading(figure), "square", min(len(one.panels), one.abreast))
+        for k, (one, figure) in enumerate(zip(drawn, found.figures, strict=True))
     ]
     command = f"mckibben reproduce {found.name}{' --quick' if found.quick else ''}"
     code = Code("", f"{command} --seed {found.seed} -o {found.name}")
@@ -89,7 +105,8 @@ def chart(
     name: str, drawn: Drawing, label: str, shape: str = "", columns: int = 1
 ) -> builder.Figure:
     """Return a drawing as a figure of a page, with its heading as caption."""
-    return builder.Figure(name, [interactive.plots(drawn)], label, label, shape, columns)
+    caption = ". ".join(filter(None, (label, drawn.note)))
+    return builder.Figure(name, [interactive.plots(drawn)], label, caption, shape, columns)
 
 
 def comparison(table: Table) -> Drawing:
@@ -98,26 +115,20 @@ def comparison(table: Table) -> Drawing:
     Drawn are those in the unit of ``table.text.drawn``, and all others if none names a unit of its own.
     """
     curves: list[Curve] = []
-    found = n_printed = 0
+    series = (f"series-{k + 1}" for k in range(N_COLOURS))
+    inks = iter(("measured", "input"))
     for column in _drawn(table):
         cells = [row[table.columns.index(column)] for row in table.rows]
         places = [place for place, cell in enumerate(cells) if isinstance(cell, int | float)]
         printed = column.endswith("printed")
-        n_printed += printed
-        found += not printed
-        ours = f"series-{(found - 1) % N_COLOURS + 1}"
-        curves.append(
-            Curve(
-                np.array([cells[place] for place in places], dtype=float),
-                np.array(places, dtype=float),
-                column,
-                ("measured" if n_printed == 1 else "input") if printed else ours,
-                "rings" if printed else "dots",
-            )
-        )
+        colour = (next(inks, "") if printed else "") or next(series)
+        x = np.array([cells[place] for place in places], dtype=float)
+        style: Style = "rings" if printed else "dots"
+        curves.append(Curve(x, np.array(places, dtype=float), column, colour, style))
     bound = () if table.text.bound is None else (Mark(table.text.bound, "printed: below"),)
     names = tuple(str(row[0]) for row in table.rows)
-    return Drawing((Panel(table.text.drawn, "", tuple(curves), marks=bound, categories=names),))
+    label = axis_label(table.text.drawn, table.text.unit)
+    return Drawing((Panel(label, "", tuple(curves), marks=bound, categories=names),))
 
 
 def _drawn(table: Table) -> list[str]:
@@ -129,25 +140,59 @@ def _drawn(table: Table) -> list[str]:
 
 
 def drawing(figure: Figure) -> Drawing:
-    """Return a paper's figure as a drawing: measurements in ink, models in colours on top.
+    """Return a paper's figure as a drawing: the recorded curve in ink below models, each in a colour.
 
     A curve is named in the first panel that has one of its name.
     """
-    panels = []
-    names = dict.fromkeys(name for given in figure.panels.values() for name in given)
-    models = [name for name in names if name not in RECORDED]
-    seen: set[str] = set()
-    for title, given in figure.panels.items():
-        curves = []
-        for name, (x, y) in given.items():
-            ink = name not in models
-            colour = "measured" if ink else f"series-{models.index(name) % N_COLOURS + 1}"
-            style: Style = "line" if len(x) > DOTS else "dots"
-            curves.append(Curve(x, y, "" if name in seen else name, colour, style))
-        seen |= {*given}
-        panels.append(Panel(figure.text.x, figure.text.y, tuple(curves), title))
-    wide = sum(map(len, names)) > LONGEST
-    return Drawing(tuple(panels), abreast=2 if wide or len(panels) in (2, 4) else 3)
+    names = dict.fromkeys(name for axes in figure.panels.values() for name in axes.curves)
+    ink = next((name for name in names if name in RECORDED), "")
+    others = [name for name in names if name != ink]
+    colours = {name: series_colour(place) for place, name in enumerate(others[:N_COLOURS])}
+    colours = {ink: "measured"} | colours
+    panels, unnamed, shading = list[Panel](), {*colours}, figure.text.shaded
+    for title, axes in figure.panels.items():
+        labels = figure.text.axes.get(axes.key, figure.text)
+        drawn = {name: axes.curves[name] for name in colours if name in axes.curves}
+        under = ink if len(drawn) > 1 else None
+        curves = tuple(
+            Curve(x, y, name * (name in unnamed), colours[name], _style(x, name == under))
+            for name, (x, y) in drawn.items()
+        )
+        marks = tuple(Mark(x, shading * (not k), end) for k, (x, end) in enumerate(axes.shaded))
+        unnamed, shading = unnamed - {*drawn}, shading * (not marks)
+        panels.append(Panel(labels.x, labels.y, curves, title, marks=marks))
+    panels = _within(panels)
+    every = [curve for panel in panels for curve in panel.curves]
+    beyond = {curve.colour for curve in every if curve.style in ("above", "below")}
+    left = [name for name, colour in colours.items() if colour in beyond]
+    leaving = f"Arrow heads: beyond the axis, {'; '.join(left)}." if left else ""
+    note = " ".join(filter(None, (leaving, left_out(others[N_COLOURS:]))))
+    return Drawing(tuple(panels), abreast=2 if len(panels) in (2, 4) else 3, note=note)
+
+
+def _within(panels: Sequence[Panel]) -> list[Panel]:
+    """Return panels whose axes go by their recorded curve, and by the highest on such an axis."""
+    heights = [float(np.ptp(panel.curves[0].y)) if _recorded(panel) else 0.0 for panel in panels]
+    shown = []
+    for panel in panels:
+        alike = (other.y_label == panel.y_label for other in panels)
+        most = max(height for height, same in zip(heights, alike, strict=True) if same)
+        least = replace(panel, least=LEAST * most)
+        shown.append(within(least, SHARE * most) if _recorded(panel) else panel)
+    return shown
+
+
+def _recorded(panel: Panel) -> bool:
+    """Return whether the first curve of a panel is the recorded one."""
+    return bool(panel.curves) and panel.curves[0].colour == "measured"
+
+
+def _style(x: Array, under: bool) -> Style:
+    """Return how a curve is drawn: points, or a line, which is wide where models lie on it."""
+    few = x.size <= DOTS
+    if jumps(x):
+        return "dots" if few else "specks"
+    return "beads" if few else "broad" if under else "line"
 
 
 # -- Markdown ------------------------------------------------------------------------------------------

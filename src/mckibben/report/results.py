@@ -513,7 +513,7 @@ def rig(found: Rig) -> list[Item]:
     limits = {name: found.limits(name) for name in found.inputs}
     rows = [[name, f"{numeral(one.low)} to {numeral(one.high)}"] for name, one in limits.items()]
     rows += [[name, "output"] for name in found.outputs if name not in limits]
-    said = f"Virtual: a simulation, a sample every {numeral(found.sample_time)} s."
+    said = f"A virtual rig, with a sample every {numeral(found.sample_time)} s."
     return [Text([*filter(None, (said, found.source))]), Table(["Channel", "Limits"], rows)]
 
 

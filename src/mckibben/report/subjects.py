@@ -11,7 +11,6 @@ from mckibben.arrays import Array
 from mckibben.recording import Recording
 from mckibben.report.drawing import (
     FEW,
-    JUMP,
     N_AGES,
     N_COLOURS,
     POINTS,
@@ -24,6 +23,7 @@ from mckibben.report.drawing import (
     Style,
     along,
     channel_label,
+    jumps,
     left_out,
     over_time,
     series_colour,
@@ -105,7 +105,7 @@ def against(
         Of channels, as in the models' equations.
     """
     u, y = recording[pair[0]], recording[pair[1]]
-    left, dots = kind == "residuals", _jumps(u)
+    left, dots = kind == "residuals", jumps(u)
     drawn: list[tuple[str, str, Array, Style, str | None]] = []
     if not left:
         under = _measured_style(recording, under=True)
@@ -159,7 +159,7 @@ def directions(u: Array, y: Array) -> tuple[Arrow, ...]:
     from mckibben.signals import branches
 
     arrows: list[Arrow] = []
-    if _jumps(u):
+    if jumps(u):
         return ()
     found = [(abs(u[stop - 1] - u[start]), start, stop, way) for start, stop, way in branches(u)]
     for wanted in (1, -1):
@@ -204,11 +204,7 @@ def _measured_style(recording: Recording, under: bool = False) -> Style:
 
 
 def _path_style(u: Array, style: Style) -> Style:
-    return "specks" if _jumps(u) else style
-
-
-def _jumps(u: Array) -> bool:
-    return bool(np.median(np.abs(np.diff(u))) > JUMP * np.ptp(u))
+    return "specks" if jumps(u) else style
 
 
 def _first(recordings: Sequence[Recording]) -> tuple[Sequence[Recording], str]:

@@ -16,7 +16,7 @@ from mckibben.estimators.force.activation import (
     by_force,
     outermost,
 )
-from mckibben.papers.experiment import Cell, Curves, Experiment, Verdict, rms
+from mckibben.papers.experiment import Axes, Cell, Curves, Experiment, Verdict, rms
 from mckibben.papers.recognising import Runs
 from mckibben.recording import Recording
 from mckibben.signals.protocol import protocol
@@ -39,6 +39,12 @@ Recordings = Mapping[tuple[float, float, str], Recording]
 """By force [N], frequency [Hz] and the name of their row."""
 
 BAR_PER_MPA = 10.0
+
+SHOWN = {"sines": 1.0, "waves": 3.0}
+"""Periods of a run that figures show, its last."""
+
+DRAWN, GAP = 100, (np.nan, np.nan)
+"""Points of a cubic that is drawn; between two curves of one name."""
 
 
 @dataclass(frozen=True)
@@ -179,8 +185,7 @@ def _rates(study: Study) -> None:
     frequencies = np.unique([frequency for _, frequency, _ in study.sines])
     forces = np.unique([force for force, *_ in (*study.slow, *study.sines)])
     middle, columns = float(np.mean(frequencies)), []
-    panels: dict[str, dict[str, tuple[Array, Array]]]
-    panels = {"gamma by frequency [Hz]": {}, "phi by force [N]": {}}
+    curves: dict[str, dict[str, tuple[Array, Array]]] = {"gamma": {}, "phi": {}}
     models = {"printed": study.printed, "here": study.found, "here, by swarm": study.swarmed}
     for whose, model in models.items():
         scale = float(np.polyval(model.gamma, middle))
@@ -188,28 +193,25 @@ def _rates(study: Study) -> None:
         phi = scale * np.polyval(model.phi, forces)
         off = [_percent(model, *one) for one in study.sines.items()]
         columns.append([model.gamma[0] / scale, *gamma.tolist(), *phi.tolist(), rms(np.array(off))])
-        panels["gamma by frequency [Hz]"][whose] = frequencies, gamma
-        panels["phi by force [N]"][whose] = forces, phi
+        curves["gamma"][whose], curves["phi"][whose] = (frequencies, gamma), (forces, phi)
     names = ["slope of gamma [1/Hz]", *(f"gamma at {f:g} Hz" for f in frequencies)]
     names += [*(f"phi at {f:.3g} N [bar s]" for f in forces), "RMSE over all sines [% of range]"]
     rows = dict(zip(names, zip(*columns, strict=True), strict=True))
     study.experiment.table("rates", [*models], rows, middle=middle)
     study.experiment.says(off=dict(zip(models, rows[names[-1]], strict=True)))
-    study.experiment.figure("rates", panels)
+    study.experiment.figure("rates", {name: Axes(own, name) for name, own in curves.items()})
 
 
 def _extremes(study: Study) -> None:
     """Add the extrema of the loops, and the static pressure before and after adjustment to them."""
     experiment, sines = study.experiment, [*study.sines.values()]
     data = training_data(sines, "contraction", "pressure", None, ("force",))
-    local, whole = list[Array](), list[Array]()
+    whole, through = list[Array](), list[Array]()
     rows: dict[str, list[float]] = {}
     static_curves: dict[str, dict[str, tuple[Array, Array]]] = {"before": {}, "after": {}}
-    betas: list[Array] = []
     groups = by_force(data.runs)
     for force, places in groups.items():
         own = [data.runs[i] for i in places]
-        local += [outermost([one]) for one in own]
         ends = outermost(own)
         whole.append(ends)
         e, y = (np.concatenate(parts) for parts in zip(*((r.u, r.y) for r in own), strict=True))
@@ -223,19 +225,38 @@ def _extremes(study: Study) -> None:
         rows[named] = [_distance(c, along, end, spans) for c in cubics.values() for end in ends]
         for when, cubic in cubics.items():
             static_curves[when][named] = along, np.asarray(np.polyval(cubic, along))
-        betas.append(cubics["after"][::-1])
+        part = along[:: along.size // DRAWN]
+        through.append(np.vstack([np.stack([part, np.polyval(cubics["after"], part)], 1), GAP]))
     columns = [f"{end}, {when}" for when in ("before", "after") for end in ("minimum", "maximum")]
     if len(rows) > 4:  # a cubic of the force goes through the extremes at four forces exactly
         experiment.table("distance", columns, rows)
         low, high = (sum(cells[k + 2] < cells[k] for cells in rows.values()) for k in (0, 1))
         nearer = Verdict(low + high == 2 * len(rows))
         experiment.says(nearer_low=low, nearer_high=high, n_forces=len(rows), nearer=nearer)
-    scatter = {"of every loop": np.vstack(local).T, "of every force": np.vstack(whole).T}
-    experiment.figure("extrema", {"": {name: (x, y) for name, (x, y) in scatter.items()}})
+    local: dict[str, list[Array]] = {}
+    for (_, frequency, _), run in zip(study.sines, data.runs, strict=True):
+        local.setdefault(f"{frequency:.2g} Hz", []).append(outermost([run]))
+    scatter = {name: np.vstack(ends) for name, ends in local.items()}
+    final = {"static pressure": np.vstack(through), "of every force": np.vstack(whole)}
+    panels = {"local extrema": scatter, "global extrema": final}
+    experiment.figure(
+        "extrema", {t: {n: (*xy.T,) for n, xy in c.items()} for t, c in panels.items()}
+    )
     experiment.figure("static", static_curves)
-    forces, by_power = np.array([*groups]), np.transpose(betas)
-    panels = {f"beta_{k}": {"here": (forces, values)} for k, values in enumerate(by_power)}
-    experiment.figure("beta", panels)
+    _coefficients(study, np.array([*groups]))
+
+
+def _coefficients(study: Study, forces: Array) -> None:
+    """Add the coefficients of the static pressure by force, as printed and here: Figure 9(b)."""
+    between = np.linspace(forces.min(), forces.max(), DRAWN)
+    models = {"printed": (study.printed, between)} if study.experiment.of_its_size else {}
+    models["here"] = study.found, forces
+    panels: dict[str, dict[str, tuple[Array, Array]]] = {f"beta_{k}": {} for k in range(4)}
+    for whose, (model, at) in models.items():
+        betas = [np.polyfit(*points(model, force), 3)[::-1] for force in at]
+        for own, values in zip(panels.values(), np.transpose(betas), strict=True):
+            own[whose] = at, values
+    study.experiment.figure("beta", panels)
 
 
 def _distance(cubic: Array, along: Array, end: Array, spans: tuple[float, float]) -> float:
@@ -251,7 +272,10 @@ def _loops(study: Study) -> None:
         for condition in _sample([*recordings]):
             one = recordings[condition]
             every = {one.origin: one["pressure"]} | modelled(study, one, condition[1])
-            panels[condition[2]] = {n: (one["contraction"], p) for n, p in every.items()}
+            part = _last(one, condition[1], SHOWN[key])
+            panels[condition[2]] = {
+                n: (one["contraction"][part], p[part]) for n, p in every.items()
+            }
         study.experiment.figure(key, panels)
     shapes: dict[str, Curves] = {}
     forces = [force for force, *_ in study.sines]
@@ -260,8 +284,14 @@ def _loops(study: Study) -> None:
         if force in near:
             rest, e = static(study.found, one), one["contraction"]
             every = {"extracted": one["pressure"], THEIRS: modelled(study, one, frequency)[THEIRS]}
-            shapes[row] = {n: (e, p - rest) for n, p in every.items()}
+            part = _last(one, frequency, SHOWN["sines"])
+            shapes[row] = {n: (e[part], (p - rest)[part]) for n, p in every.items()}
     study.experiment.figure("shapes", shapes)
+
+
+def _last(one: Recording, frequency: float, periods: float) -> slice:
+    """Return the last periods of a recording."""
+    return slice(max(len(one) - round(periods / frequency / one.step) - 1, 0), None)
 
 
 def _sample(conditions: Sequence[tuple[float, float, str]]) -> list[tuple[float, float, str]]:

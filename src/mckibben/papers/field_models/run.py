@@ -282,7 +282,7 @@ def _figures(
     tried: Mapping[str, MethodResult],
     shown: Mapping[str, Row],
 ) -> None:
-    """Add signals, loops and responses; models far out of the measured range are left out."""
+    """Add signals, loops and responses."""
     theirs = {name: both[1] for name in PAPERS if (both := tried[name].models)}
     ours: dict[str, Block] = {name: row.block for name, row in shown.items() if row.block}
     if (both := tried[LEAST_SQUARES].models) is not None:
@@ -295,6 +295,5 @@ def _figures(
         panels: dict[str, Curves] = {}
         for whose, models in (("the paper's methods", theirs), ("ours", ours)):
             every = {name: model.simulate(one)["displacement"] for name, model in models.items()}
-            near = {n: x for n, x in every.items() if np.abs(x - y.mean()).max() < 2 * np.ptp(y)}
-            panels[whose] = {name: (one.time, x) for name, x in ({one.origin: y} | near).items()}
+            panels[whose] = {name: (one.time, x) for name, x in ({one.origin: y} | every).items()}
         experiment.figure(title, panels)

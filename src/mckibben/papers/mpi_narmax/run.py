@@ -14,7 +14,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import BlockController, EstimatedLoad, track, tune_pid
 from mckibben.metrics import mae, rmse
-from mckibben.papers.experiment import Cell, Curves, Experiment, Verdict
+from mckibben.papers.experiment import Axes, Cell, Curves, Experiment, Verdict
 from mckibben.papers.mpi_narmax import protocol
 from mckibben.papers.mpi_narmax.protocol import VARYING, driven
 from mckibben.papers.recognising import Runs
@@ -24,6 +24,9 @@ from mckibben.signals import cycles, resample, sine
 
 AS_PRINTED, ALL_RATES, PLAIN = "MPI-NARMAX", "MPI-NARMAX, all rates", "MPI-NARMAX, ours"
 MORE, OURS, PRESSURE = "MPI-NARMAX, more records", "balance", "balance, on recorded pressure"
+LOADED = 0.05
+"""Share of the greatest force from which on a load is on."""
+
 HEADLINE = (AS_PRINTED, ALL_RATES, PLAIN, OURS)
 
 
@@ -209,20 +212,42 @@ def _loops(study: Study) -> None:
                 panels.setdefault(f"{rate:g} Hz", {})[kind] = u[part], y[part]
                 if stage == "free":
                     panels["no load"][f"{rate:g} Hz"] = u[part], y[part]
-    experiment.figure("loads", {n: c for n, c in sorted(panels.items()) if len(c) > 1} or panels)
+    unit = f"[{runs[statuses[1]].units[study.drive]}]"
+    several = {n: c for n, c in sorted(panels.items()) if len(c) > 1}
+    experiment.figure("loads", several or panels, unit=unit)
     pulls = [*runs.names("train", stage="pulls")[:1], statuses[VARYING]]
     shown, held = ("MPI-1", AS_PRINTED, ALL_RATES), runs.names(stage="held")
-    experiment.figure("time", study.curves((statuses[1], *pulls), "time", shown))
+    experiment.figure("time", _time_plots(study, (statuses[1], *pulls), shown), unit=unit)
     loops = [*statuses.values(), *pulls[:-1]]
-    experiment.figure("statuses", study.curves(loops, study.drive, shown))
+    experiment.figure("statuses", study.curves(loops, study.drive, shown), unit=unit)
     experiment.figure("pulls", study.curves(pulls, "force", shown[1:]))
     off = study.counted(statuses[1], model="MPI-1") - study.counted(statuses[1])
     share, edges = np.histogram(off, 61, weights=np.full(off.size, 100 / off.size))
-    experiment.figure("histogram", {"": {"MPI-1": (0.5 * (edges[1:] + edges[:-1]), share)}})
+    outline = np.repeat(edges, 2), np.pad(np.repeat(share, 2), 1)
+    experiment.figure("histogram", {"": {"MPI-1": outline}})
     if held:
         muscle = {name: (study.counted(name, "force"), study.counted(name)) for name in held}
-        each = study.curves(held, "force", (*shown[1:], OURS))
-        experiment.figure("held", {"": muscle} | each)
+        each: dict[str, Curves] = {"muscle": muscle}
+        each |= study.curves(held, "force", (*shown[1:], OURS))
+        experiment.figure("held", each)
+
+
+def _time_plots(study: Study, runs: Sequence[str], models: Sequence[str]) -> dict[str, Axes]:
+    """Return panels of input, force and displacement over time; shaded while a load is on."""
+    on: dict[str, list[tuple[float, float]]] = {}
+    strongest = max(float(study.counted(run, "force").max()) for run in runs)
+    for run in runs:
+        time, loaded = study.counted(run, "time"), study.counted(run, "force") > LOADED * strongest
+        ends = np.flatnonzero(np.diff(np.pad(loaded.astype(int), 1))).reshape(-1, 2)
+        on[run] = [(float(time[a]), float(time[b - 1])) for a, b in ends]
+    panels: dict[str, Axes] = {}
+    for channel, key in ((study.drive, "input"), ("force", "force")):
+        for run in runs:
+            both = study.counted(run, "time"), study.counted(run, channel)
+            panels[f"{run}: {key}"] = Axes({study.runs[run].origin: both}, key, on[run])
+    for run, curves in study.curves(runs, "time", models).items():
+        panels[f"{run}: displacement"] = Axes(curves, "", on[run])
+    return panels
 
 
 def _force(study: Study) -> None:
@@ -260,11 +285,13 @@ def _track(study: Study, rig: Rig) -> None:
     }
     if "force" in models:
         laws["inverse, estimated force"] = EstimatedLoad(BlockController(inverse), models["force"])
-    rows, drawn = {}, {"reference": (pulls.time, wave)}
+    rows, off = {}, {}
+    drawn = {"reference": (pulls.time, wave)}
     for name, law in laws.items():
         found = track(law, rig, reference, approach=10.0, settle=5.0, seed=seed)
         rows[name] = found.rmse["displacement"], found.largest["displacement"]
-        drawn[name] = found.recording.time, found.recording["displacement"]
+        moved = found.recording["displacement"][-wave.size :]
+        drawn[name], off[name] = (pulls.time, moved), (pulls.time, moved - wave)
     facts = {"middle": middle, "amplitude": amplitude}
     experiment.table("tracked", ["RMSE [mm]", "largest [mm]"], rows, **facts)
-    experiment.figure("tracked", {"": drawn})
+    experiment.figure("tracked", {"displacement": drawn, "error": Axes(off, "error")})

@@ -202,6 +202,7 @@ def _figures(experiment: Experiment, isometric: Sequence[Recording], found: Hyst
     searched = {name: found.fitted[CLOSED[name]].search for name in (PAPERS, EIGHTEEN)}
     costs = {name: np.minimum.accumulate(search) for name, search in searched.items()}
     steps = {name: np.cumsum(np.full(cost.size, EVERY)) for name, cost in costs.items()}
+    stairs = {n: (np.repeat(steps[n], 2)[1:], np.repeat(cost, 2)[:-1]) for n, cost in costs.items()}
     experiment.says(near={n: steps[n][np.argmax(c < NEAR * c.min())] for n, c in costs.items()})
     total: dict[str, Curves] = {}
     for title, one in ((title, found.runs[title]) for title in found.unused):
@@ -215,8 +216,10 @@ def _figures(experiment: Experiment, isometric: Sequence[Recording], found: Hyst
     experiment.figure("law", laws)
     of_loop = {n: (length, force) for n, force in ({"extracted": extracted} | modelled).items()}
     experiment.figure("loop", {"": of_loop})
-    experiment.figure("search", {"": {name: (steps[name], cost) for name, cost in costs.items()}})
-    experiment.figure("left", {"": {n: (length, f - extracted) for n, f in modelled.items()}})
+    experiment.figure("search", {name: {"": stair} for name, stair in stairs.items()})
+    last = cycles(-length)[-1]
+    left = {n: (length[last], (force - extracted)[last]) for n, force in modelled.items()}
+    experiment.figure("left", {"": left})
     experiment.figure("unused", total)
 
 

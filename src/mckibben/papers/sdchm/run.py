@@ -11,7 +11,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.channels import by_name
 from mckibben.metrics import err, loop_width, rmse
-from mckibben.papers.experiment import Cell, Experiment, Fitted, Verdict, rms
+from mckibben.papers.experiment import Axes, Cell, Experiment, Fitted, Verdict, rms
 from mckibben.papers.recognising import Runs
 from mckibben.papers.sdchm import loops
 from mckibben.papers.sdchm.loops import BALANCE, OURS, PUBLISHED
@@ -164,13 +164,15 @@ def _parts(experiment: Experiment, runs: Runs) -> None:
     """Add the parts of the paper's model: hysteresis, Figure 9, and coupling gains, Table 3."""
     published: Any = experiment.models[PUBLISHED]
     hysteresis, coupling, _ = published.parts
-    panels: Panels = {}
+    panels: dict[str, Axes] = {}
+    errors: dict[str, Axes] = {}
     for name in runs.names("train", stage="hysteresis"):
         recording, k = runs[name], runs.of(name, "driven")
         u, y = recording[f"pressure_{k}"], recording[f"displacement_{k}"]
         found = np.asarray(hysteresis.parts[int(k) - 1].simulate(u))
-        panels[f"GPI {k}"] = {recording.origin: (u, y), "GPI": (u, found), "error": (u, found - y)}
-    experiment.figure("hysteresis", panels)
+        panels[f"GPI {k}"] = Axes({recording.origin: (u, y), "GPI": (u, found)})
+        errors[f"GPI {k}: error"] = Axes({"error": (u, found - y)}, "error")
+    experiment.figure("hysteresis", panels | errors)
     every = np.ndenumerate(coupling.matrix)
     gains = {f"G{i + 1}{j + 1}": [float(gain)] for (i, j), gain in every if i != j}
     radii = {"printed": experiment.paper.printed("sdchm-coupling").radius, "here": coupling.radius}

@@ -3,32 +3,23 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import cache, partial
-from itertools import combinations
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pytest
-from matplotlib import rc_context
-from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
-from matplotlib.legend import Legend
-from matplotlib.text import Text
 
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.laws import examples
 from mckibben.recording import Recording
-from mckibben.report import printed
 from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Label, Panel
 from mckibben.report.figures import FIGURES, draw, write_figure
+from tests.report.legible import MILLIMETRES, assert_legible, made
 from tests.report.studies_by_hand import measured, plain_study
 
 LONG = "2026-03-14_muscle-of-220-mm_load-{}N_triangle-decaying_0.05Hz_repetition-{}.csv"
-SERIES = {colour for name, colour in printed.COLOURS.items() if name.startswith("series")}
-MILLIMETRES = {1: 88.0, 2: 180.0}
 
 
 def runs(n: int) -> list[Recording]:
@@ -97,54 +88,11 @@ def drawing(case: str) -> Drawing:
     return CASES[case]()
 
 
-@contextmanager
-def made(drawing: Drawing, columns: Literal[1, 2] | None = None) -> Iterator[Figure]:
-    with rc_context(dict(printed.STYLE)):
-        figure = printed.drawn(drawing, columns)
-        figure.draw_without_rendering()
-        yield figure
-
-
-def legends(figure: Figure) -> list[Any]:
-    return figure.findobj(Legend)
-
-
-def lightness(colour: Any) -> float:
-    """Return CIE L* of a colour, which grey prints show."""
-    linear = np.array([c / 12.92 if c <= 0.04 else ((c + 0.055) / 1.055) ** 2.4 for c in colour])
-    luminance = float(linear @ [0.2126, 0.7152, 0.0722])
-    return 116 * luminance ** (1 / 3) - 16
-
-
-def distinct(legend: Any) -> bool:
-    """Return whether no two entries of a legend look alike, also in grey."""
-    lines = [one for one in legend.legend_handles if hasattr(one, "get_color")]
-    grey = sorted(lightness(to_rgb(one.get_color())) for one in lines)
-    series = [one for one in lines if one.get_color() in SERIES]
-    looks = {(one.get_linestyle(), str(one.get_marker())) for one in series}
-    few = len(series) <= printed.PLAIN
-    return bool(np.all(np.diff(grey) > 5)) and (few or len(looks) == len(series))
-
-
 @pytest.mark.parametrize("columns", [1, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.parametrize("case", CASES)
 def test_a_figure_fits_its_columns_and_is_legible(case: str, columns: Literal[1, 2]) -> None:
     with made(drawing(case), columns) as figure:
-        width, height = figure.get_size_inches()
-        assert 25.4 * width == pytest.approx(MILLIMETRES[columns])
-        whole = figure.get_tightbbox()
-        assert min(whole.x0, whole.y0) >= -0.01
-        assert max(whole.x1 - width, whole.y1 - height) <= 0.01
-        parts: list[Any] = [*legends(figure)]
-        for axis in figure.axes:
-            parts += [axis.patch, axis.xaxis.label, axis.yaxis.label, axis._left_title]  # type: ignore[attr-defined]
-        boxes = [part.get_window_extent().padded(-0.5) for part in parts]
-        for one, other in combinations([box for box in boxes if box.width > 0], 2):
-            assert not one.overlaps(other)
-        sizes: list[Any] = [one.get_fontsize() for one in figure.findobj(Text) if one.get_text()]
-        assert min(sizes) >= 7
-        assert max(sizes) <= 9
-        assert all(map(distinct, legends(figure)))
+        assert_legible(figure, columns)
 
 
 @pytest.mark.parametrize("columns", MILLIMETRES)

@@ -43,7 +43,7 @@ RESOLUTION = 600
 COLOURS: Mapping[str, str] = MappingProxyType(
     {
         "measured": "#222222",
-        "input": "#777777",
+        "input": "#7c7c7c",
         "series-1": "#0071b0",
         "series-2": "#e7a209",
         "series-3": "#701c46",
@@ -377,7 +377,7 @@ def draw_panel(
         if mark.until is not None:
             axis.axvspan(mark.x, mark.until, color="#e5eef5", linewidth=0, zorder=0, **look)
             look = {}
-        axis.axvline(mark.x, color="#777777", linewidth=0.6, linestyle=":", zorder=0, **look)
+        axis.axvline(mark.x, color=COLOURS["input"], linewidth=0.6, linestyle=":", zorder=0, **look)
     if panel.y_range is not None:
         axis.set_ylim(panel.y_range)
     if bottom:

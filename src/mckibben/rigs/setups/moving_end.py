@@ -51,7 +51,7 @@ class MovingEnd(Rig):
         muscles["levers"][0, 0] = 1.0
         made = np.zeros(1, MECHANISM)
         made["n"] = 1
-        made["mass"][0, 0] = (self.moved_mass + self.payload) * 1e-3
+        made["mass"][0, 0, 0] = (self.moved_mass + self.payload) * 1e-3
         hanging = self.payload + (self.moved_mass if self.vertical else 0.0)
         made["weight"][0, 0] = hanging * GRAVITY + self.return_force
         made["guide"][0, 0] = self.guide_stiffness

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from mckibben.blocks.base import Block
 from mckibben.control import Controller, track
@@ -88,7 +89,7 @@ class Panel(NamedTuple):
     """Curves over one axis: by name, the values there."""
 
     x_label: str
-    x: Sequence[float]
+    x: Sequence[float] | Sequence[str]
     curves: Mapping[str, Sequence[float]]
     logarithmic: bool = False
 
@@ -101,7 +102,13 @@ def picture(name: str, panels: Sequence[Panel], y_label: str) -> None:
             for (curve, y), mark in zip(panel.curves.items(), "os^Dv<>", strict=False):
                 axis.plot(panel.x, y, marker=mark, ms=3, lw=1, label=curve)
             axis.set(xlabel=panel.x_label, ylabel=y_label, yscale="log")
-            axis.set_xscale("log" if panel.logarithmic else "linear")
+            scaled = [axis.yaxis]
+            if panel.logarithmic:
+                axis.set_xscale("log")
+                scaled += [axis.xaxis]
+            for each in scaled:
+                each.set_major_formatter("{x:g}")
+                each.set_minor_formatter(NullFormatter())
             axis.grid(alpha=0.3)
         handles, labels = axis.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=3)

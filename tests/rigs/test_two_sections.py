@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
@@ -29,7 +31,7 @@ def arm(**changes: object) -> TwoSections:
     return rig
 
 
-def both(settings: dict[str, object]) -> dict[str, object]:
+def both(settings: Mapping[str, object]) -> dict[str, object]:
     """Return settings of a section, for both."""
     return {f"{name}.{key}": x for name in ("proximal", "distal") for key, x in settings.items()}
 
@@ -73,7 +75,9 @@ def test_weight_below_and_the_pose_above_load_the_other_section() -> None:
         change[payload] = float(np.ptp(moved(rig, other)[:, :3] - moved(rig, still)[:, :3]))
     assert 0.5 < change[0.0] < change[1.0] < change[2.0]
     rig = arm()
-    change[1.0] = float(np.ptp(moved(rig, driven(rig))[:, 3:] - moved(rig, driven(rig, "4568"))[:, 3:]))
+    change[1.0] = float(
+        np.ptp(moved(rig, driven(rig))[:, 3:] - moved(rig, driven(rig, "4568"))[:, 3:])
+    )
     assert change[1.0] > 0.5
 
 

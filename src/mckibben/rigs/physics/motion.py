@@ -2,9 +2,9 @@
 
 The coordinates are few (the end of a muscle; mean shortening and two tilts of a disc, or of two), the
 muscles act on them through fixed lever arms. Every step solves the balance of forces at its end by
-Newton's method, with the accelerations of Hilber, Hughes and Taylor (1977): second order, and quiet where
-friction sticks. Air is marched before, in substeps. One coordinate may instead be driven, as by the
-screw of a test stand.
+Newton's method, with the accelerations of Hilber, Hughes and Taylor (1977): second order, and quiet
+where friction sticks. Air is marched before, in substeps. One coordinate may instead be driven, as by
+the screw of a test stand.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ class Bundle(Section):
     def contractile(self) -> Records:
         """Return its contractile muscles, with levers on its own coordinates, shape (muscles,)."""
         angles, radius = np.radians(self.angle), np.array(self.radius)
-        made = np.concatenate([self._spread(k).record() for k in np.arange(radius.size)])
+        made = np.concatenate([self._spread(k).record() for k, _ in enumerate(self.radius)])
         made["levers"][:, 0] = 1.0
         made["levers"][:, 1] = radius * np.cos(angles)
         made["levers"][:, 2] = radius * np.sin(angles)
@@ -159,7 +159,7 @@ def _weigh(mechanism: Records, masses: Sequence[float], lengths: Sequence[float]
         lifting[:i, i] = lifting[i, :i] = carried * length / 2
         lifting[i, i] = carried * length / 3
         aside = np.zeros(n)
-        aside[: i + 1] = [lengths[k] / 2 + sum(lengths[k + 1 : i + 1]) for k in np.arange(i + 1)]
+        aside[: i + 1] = [lengths[k] / 2 + sum(lengths[k + 1 : i + 1]) for k in range(i + 1)]
         moving += 1e-3 * masses[i] * np.outer(aside, aside)
         rising[: i + 1, : i + 1] += 1e-3 * masses[i]
     along, about = np.diag([1.0, 0.0, 0.0]), np.diag([0.0, 1.0, 1.0])

@@ -28,6 +28,9 @@ equations, tables and figures of the paper, followed by printed values next to t
 `mckibben reproduce NAME` repeats the experiments; `--data FOLDER` uses recordings of your own muscle.
 `mckibben.papers.paper.printed(NAME)` returns models with the printed parameters.
 
+What the first leaves open: [higher frequencies and loads](rates-and-loads.md), and
+[several sections](two-sections.md).
+
 | number | paper | question | with your muscle |
 |---|---|---|---|"""
 

@@ -158,6 +158,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "mpi-narmax": "mckibben.papers.mpi_narmax.protocol:mpi_narmax",
         "multistate-friction": "mckibben.papers.multistate_friction.protocol:multistate_friction",
         "sdchm": "mckibben.papers.sdchm.protocol:sdchm",
+        "two-sections": "mckibben.rigs.setups.two_sections:two_sections",
     },
     "readers": {
         "resample": "mckibben.signals:resample",
@@ -168,6 +169,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "joint": "mckibben.rigs.setups.joint:Joint",
         "moving-end": "mckibben.rigs.setups.moving_end:MovingEnd",
         "test-stand": "mckibben.rigs.setups.test_stand:TestStand",
+        "two-sections": "mckibben.rigs.setups.two_sections:TwoSections",
     },
     "signals": {
         "binary-steps": "mckibben.signals.steps:binary_steps",

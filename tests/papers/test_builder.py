@@ -99,7 +99,7 @@ def test_printed_figures_in_units_are_of_rigs_of_the_papers_size() -> None:
     x = np.linspace(0.0, 1.0, 9)
     profile.figure("rates", {"gamma": {"printed": (x, x), "here": (x, x)}})
     assert profile.tables[0].rows == (("0 N, here", 0.2),)
-    assert [*profile.figures[0].panels["gamma"]] == ["here"]
+    assert [*profile.figures[0].panels["gamma"].curves] == ["here"]
     assert not profile.done("a rig").summary
 
 

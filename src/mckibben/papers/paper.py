@@ -66,9 +66,9 @@ class TableText(_Strict):
     Title and note may have fields in braces, which the experiment fills. ``of`` is the paper's table or
     figure, empty for ours; ``rows`` the heading of the first column; ``printed`` the paper's figures by
     column and row; ``relative`` are headings of printed figures that hold on a rig of any size.
-    ``drawn`` is what its columns measure, with the unit, if printed and ours are drawn, and ``unit`` that
-    of headings that have none; ``bound`` what the paper says that its figures are below, where it prints
-    no more.
+    ``drawn`` is what its columns measure, with the unit, if printed and ours are drawn, and ``unit`` the
+    unit of headings without one; ``bound`` what the paper says that its figures are below, where it
+    prints no more.
     """
 
     title: Words

@@ -7,7 +7,7 @@ how it differs from the published rig of its name, from which it can be rebuilt.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -189,9 +189,9 @@ class Rig(DrawsItself, Section, ABC):
                 raise DataError(
                     f"muscles do not age in {group!r}", remedy=f"give one of {', '.join(AGEING)}"
                 )
-            for name, part in self:
-                for path in AGEING[group] if isinstance(part, Muscle) else ():
-                    value = attrgetter(path)(part)
+            for name, muscle in _muscles_in(self):
+                for path in AGEING[group]:
+                    value = attrgetter(path)(muscle)
                     scaled = (
                         [factor * v for v in value] if isinstance(value, tuple) else factor * value
                     )
@@ -403,6 +403,15 @@ class _Running:
     def __init__(self, state: State, rng: np.random.Generator) -> None:
         self.state, self.rng = state, rng
         self.saturated: dict[str, int] = {}
+
+
+def _muscles_in(section: Section, path: str = "") -> Iterator[tuple[str, Muscle]]:
+    """Yield the muscles of a section of a rig's file and of those inside, by their paths."""
+    for name, part in section:
+        if isinstance(part, Muscle):
+            yield path + name, part
+        elif isinstance(part, Section):
+            yield from _muscles_in(part, f"{path}{name}.")
 
 
 def _volumes(traces: Traces) -> dict[str, Array]:

@@ -25,6 +25,7 @@ CHANGED: dict[str, dict[str, Any]] = {
     "mckibben-530": {"muscle.c10": 0.2},
     "rail": {"payload": 3.0},
     "soft-arm": {"payload": 0.5, "contact": 0.2},
+    "two-section-arm": {"payload": 0.5, "proximal.contact": 0.2, "distal.muscle.c10": 0.3},
 }
 """Parameters that are changed, of each."""
 

@@ -1,9 +1,9 @@
 """Mechanics: coordinates with mass, stiffness and friction, and time integration.
 
-The coordinates are few (the end of a muscle; a disc's mean shortening and two tilts; the angle of a
-joint), the muscles act on them through fixed lever arms. Every step solves the balance of forces at
-its end by Newton's method, with the accelerations of Hilber, Hughes and Taylor (1977): second order,
-and quiet where friction sticks. Air is marched before, in substeps. One coordinate may instead be
+The coordinates are few (the end of a muscle; mean shortening and two tilts of a disc, or of two; the
+angle of a joint), the muscles act on them through fixed lever arms. Every step solves the balance of
+forces at its end by Newton's method, with the accelerations of Hilber, Hughes and Taylor (1977): second
+order, and quiet where friction sticks. Air is marched before, in substeps. One coordinate may instead be
 driven, as by the screw of a test stand.
 """
 
@@ -50,18 +50,15 @@ NO_MUSCLE = -1
 MM2_PER_NEWTON_PER_BAR = 10.0
 """A force that grows by 1 N a bar comes from a room that grows by 10 mm³ a mm."""
 
-_EACH = (MOST_COORDINATES,)
+_EACH, _EVERY_TWO = (MOST_COORDINATES,), (MOST_COORDINATES, MOST_COORDINATES)
 
 MECHANISM = np.dtype(
     [
-        (
-            "n",
-            "i8",
-        ),  # coordinates: shortening [mm] first, then tilts [rad] if any; or an angle [rad]
-        ("mass", "f8", _EACH),  # t, or t mm²
-        ("stiffness", "f8", _EACH),  # N/mm, or N mm/rad
+        ("n", "i8"),  # coordinates: shortening [mm], then tilts [rad] if any; or an angle [rad]
+        ("mass", "f8", _EVERY_TWO),  # t, t mm or t mm²; symmetric
+        ("stiffness", "f8", _EVERY_TWO),  # N/mm, or N mm/rad; symmetric
         ("stiffening", "f8", _EACH),  # stiffness that a bar in one muscle adds
-        ("stiffened_by", "i8"),  # that muscle
+        ("stiffened_by", "i8", _EACH),  # that muscle
         ("damping", "f8", _EACH),  # N s/mm, or N mm s/rad
         ("weight", "f8", _EACH),  # N against it
         ("swing", "f8", _EACH),  # weight times lever of a pendulum [N mm]
@@ -82,11 +79,12 @@ MOTION = np.dtype(
         ("speed", "f8", _EACH),
         ("acceleration", "f8", _EACH),
         ("balance", "f8", _EACH),  # sum of forces against motion [N]
+        ("before", "f8", _EACH),  # that of the step before
         ("guide", "f8", _EACH),  # force of the guide's friction [N]
         # What the solution of a step needs:
         ("tried", "f8", _EACH),
         ("change", "f8", _EACH),
-        ("slopes", "f8", (MOST_COORDINATES, MOST_COORDINATES)),
+        ("slopes", "f8", _EVERY_TWO),
     ],
     align=True,
 )
@@ -94,11 +92,11 @@ MOTION = np.dtype(
 
 
 @compiled
-def beside(mechanism: Any, states: Any) -> float:
-    """Return the pressure of the muscle that couples to the others [bar]; 0 without one."""
-    if mechanism.stiffened_by < 0:
+def filled(states: Any, muscle: int) -> float:
+    """Return the pressure of a muscle that acts on what is beside it [bar]; 0 without one."""
+    if muscle < 0:
         return 0.0
-    return max(states[mechanism.stiffened_by].pressure, 0.0)
+    return max(states[muscle].pressure, 0.0)
 
 
 @compiled
@@ -115,7 +113,7 @@ def resist(
     muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, step: float
 ) -> None:
     """Compute the resistance of each coordinate at a trial position, and its slopes."""
-    n, tied = mechanism.n, beside(mechanism, states)
+    n = mechanism.n
     for g in range(n):
         moved = motion.tried[g] - motion.place[g]
         rub, rub_slope = slip(
@@ -125,16 +123,19 @@ def resist(
             mechanism.guide_limit[g],
             moved,
         )
-        stiffness = mechanism.stiffness[g] + mechanism.stiffening[g] * tied
+        for k in range(n):
+            motion.slopes[g, k] = mechanism.stiffness[g, k]
+        motion.slopes[g, g] += mechanism.stiffening[g] * filled(states, mechanism.stiffened_by[g])
+        motion.balance[g] = 0.0
+        for k in range(n):
+            motion.balance[g] += motion.slopes[g, k] * motion.tried[k]
         damping = mechanism.damping[g] / step
-        motion.balance[g] = stiffness * motion.tried[g] + rub + damping * moved
+        motion.balance[g] = motion.balance[g] + rub + damping * moved
         motion.balance[g] += mechanism.weight[g] + loads[g]
         tilt = motion.tried[g] - mechanism.hanging[g]
         motion.balance[g] += mechanism.swing[g] * math.sin(tilt)
-        for k in range(n):
-            motion.slopes[g, k] = 0.0
         swing_slope = mechanism.swing[g] * math.cos(tilt)
-        motion.slopes[g, g] = stiffness + rub_slope + damping + swing_slope
+        motion.slopes[g, g] = motion.slopes[g, g] + rub_slope + damping + swing_slope
     for j in range(muscles.size):
         x = shortening(muscles[j], n, motion.tried)
         pull, slope, _ = taut_or_slack(muscles[j], states[j], x, step)
@@ -177,11 +178,20 @@ def newmark(motion: Any, g: int, step: float) -> float:
 
 
 @compiled
+def inertia(mechanism: Any, motion: Any, g: int, step: float) -> float:
+    """Return the inertia against a coordinate's motion at a trial position [N, or N mm]."""
+    force = 0.0
+    for k in range(mechanism.n):
+        force += mechanism.mass[g, k] * newmark(motion, k, step)
+    return force
+
+
+@compiled
 def move(muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, step: float) -> None:
     """Integrate the coordinates over one step, for pressures at its end."""
     n = mechanism.n
-    before = (motion.balance[0], motion.balance[1], motion.balance[2])
     for g in range(n):
+        motion.before[g] = motion.balance[g]
         coast = step * motion.speed[g] + 0.5 * step * step * motion.acceleration[g]
         motion.tried[g] = motion.place[g] + coast
         motion.change[g] = coast
@@ -194,9 +204,9 @@ def move(muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, s
             resist(muscles, mechanism, states, motion, loads, step)
             size = 0.0
             for g in range(n):
-                inertia = mechanism.mass[g] * newmark(motion, g, step)
-                off = inertia + (1.0 + ALPHA) * motion.balance[g] - ALPHA * before[g]
-                size += off * off / (inert * mechanism.mass[g])
+                off = inertia(mechanism, motion, g, step) + (1.0 + ALPHA) * motion.balance[g]
+                off -= ALPHA * motion.before[g]
+                size += off * off / (inert * mechanism.mass[g, g])
         if size > worst or size == np.inf:
             # Too far: halfway back, where Newton's straight line is still near the truth.
             shrunk *= 0.5
@@ -207,11 +217,11 @@ def move(muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, s
             continue
         worst, shrunk = size, 1.0
         for g in range(n):
-            inertia = mechanism.mass[g] * newmark(motion, g, step)
-            motion.change[g] = ALPHA * before[g] - (1.0 + ALPHA) * motion.balance[g] - inertia
+            motion.change[g] = ALPHA * motion.before[g] - (1.0 + ALPHA) * motion.balance[g]
+            motion.change[g] -= inertia(mechanism, motion, g, step)
             for k in range(n):
                 motion.slopes[g, k] *= 1.0 + ALPHA
-            motion.slopes[g, g] += inert * mechanism.mass[g]
+                motion.slopes[g, k] += inert * mechanism.mass[g, k]
         solve(n, motion.slopes, motion.change)
         largest = 0.0
         for g in range(n):
@@ -255,6 +265,18 @@ def arrive(muscles: Any, mechanism: Any, states: Any, motion: Any, step: float) 
             motion.tried[g] - motion.place[g],
         )
         motion.place[g] = motion.tried[g]
+
+
+@compiled
+def squeeze(mechanism: Any, motion: Any, muscle: int) -> tuple[float, float]:
+    """Return the room that a muscle lost by bending [mm³], and its change [mm³/s]."""
+    squeezed, squeezing = 0.0, 0.0
+    for g in range(mechanism.n):
+        if mechanism.stiffened_by[g] == muscle:
+            per_place = MM2_PER_NEWTON_PER_BAR * mechanism.stiffening[g]
+            squeezed += 0.5 * per_place * motion.place[g] * motion.place[g]
+            squeezing += per_place * motion.place[g] * motion.speed[g]
+    return squeezed, squeezing
 
 
 @compiled
@@ -314,27 +336,21 @@ def advance(
     loads = np.empty(MOST_COORDINATES)
     for i in range(steps):
         start, end = i / steps, (i + 1) / steps
-        squeezed, squeezing = 0.0, 0.0
-        for g in range(mechanism.n):
-            per_place = MM2_PER_NEWTON_PER_BAR * mechanism.stiffening[g]
-            squeezed += 0.5 * per_place * motion.place[g] * motion.place[g]
-            squeezing += per_place * motion.place[g] * motion.speed[g]
         for j in range(muscles.size):
             rise = after[j] - before[j]
-            bent = 1.0 if j == mechanism.stiffened_by else 0.0
+            squeezed, squeezing = squeeze(mechanism, motion, j)
             breathe(
                 muscles[j],
                 air,
                 states[j],
                 before[j] + start * rise,
                 before[j] + end * rise,
-                bent * squeezed,
-                bent * squeezing,
+                squeezed,
+                squeezing,
                 step,
             )
-        tied = beside(mechanism, states)
         for j in range(muscles.size):
-            prepare(muscles[j], states[j], tied, step)
+            prepare(muscles[j], states[j], filled(states, muscles[j].beside), step)
         if mechanism.driven:
             target = target_before + end * (target_after - target_before)
             drive(muscles, mechanism, states, motion, target, step)

@@ -24,8 +24,8 @@ MOST_ELEMENTS = 8
 MOST_BRANCHES = 4
 """Creep branches that a muscle may have."""
 
-MOST_COORDINATES = 3
-"""Coordinates that a muscle may act on."""
+MOST_COORDINATES = 6
+"""Coordinates that muscles may act on: three a section of an arm."""
 
 SLACK_TOLERANCE = 1e-9
 """Of the length of a slack muscle [mm]."""
@@ -55,7 +55,8 @@ MUSCLE = np.dtype(
         ("contracting", "f8", (MOST_ELEMENTS,)),  # N/bar
         ("extending", "f8", (MOST_ELEMENTS,)),
         ("preload", "f8"),  # bar
-        ("neighbour", "f8"),  # share of the neighbour's pressure
+        ("beside", "i8"),  # number of the muscle that it is tied to
+        ("neighbour", "f8"),  # share of that one's pressure
         ("viscosity", "f8"),  # N s/mm
         ("n_branches", "i8"),
         ("creep", "f8", (MOST_BRANCHES,)),  # N/mm

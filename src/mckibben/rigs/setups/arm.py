@@ -4,7 +4,7 @@ The arm bends with constant curvature. Its coordinates are the shortening of its
 tilts of the disc about two axes [rad]; a muscle at radius d and angle b shortens by
 middle + d (cos(b) tilt_x + sin(b) tilt_y). Axial pull stands against the extensor and the other
 muscles, tilt against the backbone, whose stiffness grows with the extensor's pressure. Muscles are
-tied to the extensor, which presses on their braids.
+tied to the extensor, which presses on their braids. Arms of several sections are bundles in series.
 
 Set-up of: Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
 Pneumatic Artificial Muscle-Driven Soft Manipulator, Section 2.1.
@@ -12,14 +12,15 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator, Section 2.1.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
 
 from mckibben.arrays import Array
-from mckibben.rigs.parameters import EachPositive, Muscle, Section, parameter
+from mckibben.rigs.parameters import EachPositive, Muscle, Records, Section, parameter
 from mckibben.rigs.physics.compiled import GRAVITY
 from mckibben.rigs.physics.motion import MECHANISM, TOLERANCE
 from mckibben.rigs.rig import Rig
@@ -34,10 +35,13 @@ class Spread(Section):
     friction: tuple[EachPositive, ...] = parameter("factor on the friction of each")
 
 
-class Arm(Rig):
-    """Three or more contractile muscles in parallel round one extensor."""
+EACH = 3
+"""Coordinates of a section: shortening of its middle, and tilts of its lower disc about two axes."""
 
-    setup: Literal["arm"] = "arm"
+
+class Bundle(Section):
+    """Two or more contractile muscles in parallel round one extensor, between two discs."""
+
     muscle: Muscle
     extensor: Muscle
     spread: Spread
@@ -54,9 +58,6 @@ class Arm(Rig):
         "share of the extensor's pressure on muscle braids", ge=0, le=1, default=0.0
     )
     disc_mass: float = parameter("mass of the lower disc", "kg", gt=0, le=50)
-    payload: float = parameter("mass hung on the disc", "kg", ge=0, le=50, default=0.0)
-
-    measurable: ClassVar[tuple[str, ...]] = ("pressure", "displacement")
 
     @model_validator(mode="after")
     def _one_number_a_muscle(self) -> Self:
@@ -71,73 +72,182 @@ class Arm(Rig):
             raise ValueError("an arm has contractile muscles round an extensor, by their kind")
         return self
 
+    def contractile(self) -> Records:
+        """Return its contractile muscles, with levers on its own coordinates, shape (muscles,)."""
+        angles, radius = np.radians(self.angle), np.array(self.radius)
+        made = np.concatenate([self._spread(k).record() for k, _ in enumerate(self.radius)])
+        made["levers"][:, 0] = 1.0
+        made["levers"][:, 1] = radius * np.cos(angles)
+        made["levers"][:, 2] = radius * np.sin(angles)
+        made["neighbour"] = self.contact
+        return made
+
+    def _spread(self, k: int) -> Muscle:
+        """Return a muscle as it was made by hand."""
+        friction, factor = self.muscle.friction, self.spread.friction[k]
+        limits = {
+            name: tuple(limit * factor for limit in getattr(friction, name))
+            for name in ("contracting", "extending")
+        }
+        bladder = self.spread.bladder[k]
+        changes = {
+            "diameter": self.muscle.diameter * self.spread.diameter[k],
+            "c10": self.muscle.c10 * bladder,
+            "c01": self.muscle.c01 * bladder,
+            "friction": friction.model_copy(update=limits),
+        }
+        return self.muscle.model_copy(update=changes)
+
+
+def in_series(bundles: Sequence[Bundle], payload: float) -> tuple[Records, Records]:
+    """Return muscles and mechanism of bundles that hang from one another.
+
+    Coordinates are three a bundle: shortening of its middle, and tilts of its lower disc from its
+    upper one.
+
+    Parameters
+    ----------
+    bundles : sequence of Bundle
+        From above.
+    payload : float
+        Mass hung on the last disc [kg].
+
+    Returns
+    -------
+    muscles, mechanism
+        Contractile muscles, bundle by bundle, then the extensors.
+    """
+    n = len(bundles)
+    every = [bundle.contractile() for bundle in bundles]
+    extensors = np.concatenate([bundle.extensor.record() for bundle in bundles])
+    extensors["levers"][:, 0] = 1.0
+    first = sum(muscles.size for muscles in every)
+    for i, muscles in enumerate(every):
+        muscles["beside"] = first + i
+        for some in (muscles, extensors[i : i + 1]):
+            some["levers"] = np.roll(some["levers"], EACH * i, axis=1)
+    made = np.zeros(1, MECHANISM)
+    made["n"] = EACH * n
+    made["tolerance"] = TOLERANCE
+    masses = [bundle.disc_mass for bundle in bundles]
+    masses[-1] += payload
+    _weigh(made, masses, [bundle.muscle.length for bundle in bundles])
+    for i, bundle in enumerate(bundles):
+        tilts = np.arange(EACH * i + 1, EACH * (i + 1))
+        made["stiffness"][0, tilts, tilts] += bundle.bending_stiffness
+        made["stiffening"][0, tilts] = bundle.bending_stiffening
+        made["stiffened_by"][0, tilts] = first + i
+        made["damping"][0, tilts] = bundle.bending_damping
+        made["guide"][0, EACH * i] = 1.0
+        made["guide"][0, tilts] = bundle.bending_presliding
+        made["guide_limit"][0, tilts] = bundle.bending_friction
+    return np.concatenate([*every, extensors]), made
+
+
+def _weigh(mechanism: Records, masses: Sequence[float], lengths: Sequence[float]) -> None:
+    """Set weight and inertia of discs [kg] below sections of some lengths [mm].
+
+    To second order, a section whose upper disc is tilted by T, and its lower one by t from there, lifts
+    what it carries by length (T²/2 + T t/2 + t²/6), and moves it aside by length (T + t/2). So a tilt
+    turns gravity for all that hangs below, and what hangs aside bends what is above.
+    """
+    n = len(masses)
+    lifting, moving, rising = np.zeros((3, n, n))
+    for i, length in enumerate(lengths):
+        carried = sum(masses[i:]) * GRAVITY
+        mechanism["weight"][0, EACH * i] = carried
+        lifting[:i, :i] += carried * length
+        lifting[:i, i] = lifting[i, :i] = carried * length / 2
+        lifting[i, i] = carried * length / 3
+        aside = np.zeros(n)
+        aside[: i + 1] = [lengths[k] / 2 + sum(lengths[k + 1 : i + 1]) for k in range(i + 1)]
+        moving += 1e-3 * masses[i] * np.outer(aside, aside)
+        rising[: i + 1, : i + 1] += 1e-3 * masses[i]
+    along, about = np.diag([1.0, 0.0, 0.0]), np.diag([0.0, 1.0, 1.0])
+    size = EACH * n
+    mechanism["mass"][0, :size, :size] = np.kron(rising, along) + np.kron(moving, about)
+    mechanism["stiffness"][0, :size, :size] = np.kron(lifting, about)
+
+
+class Hanging(Rig):
+    """Sections that hang from one another, with a load on the last."""
+
+    payload: float = parameter("mass hung on the last disc", "kg", ge=0, le=50, default=0.0)
+
+    measurable: ClassVar[tuple[str, ...]] = ("pressure", "displacement")
+
+    @property
+    @abstractmethod
+    def sections(self) -> tuple[Bundle, ...]:
+        """From above."""
+
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Pressures of the contractile muscles, then of the extensor."""
-        return (*(f"pressure_{k + 1}" for k in np.arange(len(self.radius))), "pressure_extensor")
+        """Pressures of the contractile muscles, section by section, then of the extensors."""
+        return (*self._numbered("pressure"), *self.extensors)
+
+    @property
+    def extensors(self) -> tuple[str, ...]:
+        """Pressures of the extensors, numbered if there are several."""
+        n = len(self.sections)
+        name = "pressure_extensor"
+        return (name,) if n == 1 else tuple(f"{name}_{i + 1}" for i in np.arange(n))
 
     @property
     def outputs(self) -> tuple[str, ...]:
         """Pressures as measured, and the shortening of each contractile muscle."""
-        moves = (f"displacement_{k + 1}" for k in np.arange(len(self.radius)))
-        names = {"pressure": self.inputs, "displacement": tuple(moves)}
+        names = {"pressure": self.inputs, "displacement": self._numbered("displacement")}
         return tuple(name for kind in self.sensor for name in names[kind])
 
     def build(self) -> System:
-        angles = np.radians(self.angle)
-        made = [
-            self.muscle.model_copy(
-                update={
-                    "diameter": self.muscle.diameter * self.spread.diameter[k],
-                    "c10": self.muscle.c10 * self.spread.bladder[k],
-                    "c01": self.muscle.c01 * self.spread.bladder[k],
-                    "friction": self.muscle.friction.model_copy(
-                        update={
-                            name: tuple(
-                                limit * self.spread.friction[k]
-                                for limit in getattr(self.muscle.friction, name)
-                            )
-                            for name in ("contracting", "extending")
-                        }
-                    ),
-                }
-            ).record()
-            for k in np.arange(len(self.radius))
-        ]
-        muscles = np.concatenate([*made, self.extensor.record()])
-        muscles["levers"][:, 0] = 1.0
-        muscles["levers"][:-1, 1] = np.array(self.radius) * np.cos(angles)
-        muscles["levers"][:-1, 2] = np.array(self.radius) * np.sin(angles)
-        muscles["neighbour"][:-1] = self.contact
-        mechanism = np.zeros(1, MECHANISM)
-        mass = self.disc_mass + self.payload
-        length = self.muscle.length
-        # A tilt t moves the disc aside by length t/2 and lifts it by length t²/6.
-        mechanism["n"] = 3
-        mechanism["tolerance"] = TOLERANCE
-        mechanism["mass"] = [1e-3 * mass, *[1e-3 * mass * length**2 / 4] * 2]
-        lifting = mass * GRAVITY * length / 3
-        mechanism["stiffness"] = [0.0, *[self.bending_stiffness + lifting] * 2]
-        mechanism["stiffening"] = [0.0, *[self.bending_stiffening] * 2]
-        mechanism["stiffened_by"] = len(self.radius)
-        mechanism["damping"] = [0.0, *[self.bending_damping] * 2]
-        mechanism["weight"] = [mass * GRAVITY, 0.0, 0.0]
-        mechanism["guide"] = [1.0, *[self.bending_presliding] * 2]
-        mechanism["guide_limit"] = [0.0, *[self.bending_friction] * 2]
+        muscles, mechanism = in_series(self.sections, self.payload)
         return System(muscles, self.air.record(), mechanism)
 
     def demands(self, inputs: Array) -> Demands:
-        return Demands(inputs, np.zeros((len(inputs), 3)), np.zeros(len(inputs)))
+        loads = np.zeros((len(inputs), EACH * len(self.sections)))
+        return Demands(inputs, loads, np.zeros(len(inputs)))
 
     def readings(self, traces: Traces, inputs: Array, zero: Array) -> Mapping[str, Array]:
         """Return pressures, and the shortening along each contractile muscle."""
         del inputs
-        levers = self._built().muscles["levers"][:-1]
-        shortened = (traces.place - zero[: traces.place.shape[1]]) @ levers.T
-        found = {name: traces.pressure[:, i] for i, name in enumerate(self.inputs)}
-        return found | {
-            f"displacement_{k + 1}": shortened[:, k] for k in np.arange(len(self.radius))
-        }
+        place = traces.place - zero[: traces.place.shape[1]]
+        channels = dict(zip(self.inputs, traces.pressure.T, strict=True))
+        moved = self.shortened(place).T
+        return channels | dict(zip(self._numbered("displacement"), moved, strict=True))
+
+    def shortened(self, pose: Array) -> Array:
+        """Return the shortening of every contractile muscle at poses.
+
+        Parameters
+        ----------
+        pose : array, shape (n, 3 sections)
+            Shortening of the middle [mm] and both tilts [rad] of every section, of its lower disc from
+            its upper one.
+
+        Returns
+        -------
+        array, shape (n, muscles)
+            [mm].
+        """
+        levers = self._built().muscles["levers"][: -len(self.sections), : pose.shape[1]]
+        return np.asarray(pose @ levers.T)
 
     def known(self) -> Mapping[str, Any]:
-        return {"rest_length": self.muscle.length, "payload_kg": self.payload}
+        lengths = {section.muscle.length for section in self.sections}
+        one = {"rest_length": lengths.pop()} if len(lengths) == 1 else {}
+        return {**one, "payload_kg": self.payload}
+
+    def _numbered(self, name: str) -> tuple[str, ...]:
+        """Return the channels of a quantity, one for every contractile muscle."""
+        n = sum(len(section.radius) for section in self.sections)
+        return tuple(f"{name}_{k + 1}" for k in np.arange(n))
+
+
+class Arm(Bundle, Hanging):
+    """One section."""
+
+    setup: Literal["arm"] = "arm"
+
+    @property
+    def sections(self) -> tuple[Bundle, ...]:
+        return (self,)

@@ -95,7 +95,7 @@ class Joint(Rig):
         made["n"] = 1
         made["tolerance"] = TOLERANCE
         inertia = METRE**2 * self.arm_inertia + self.payload * self.reach**2  # kg mm²
-        made["mass"][0, 0] = 1e-3 * inertia
+        made["mass"][0, 0, 0] = 1e-3 * inertia
         moment = self.arm_mass * self.arm_centre + self.payload * self.reach
         made["swing"][0, 0] = GRAVITY * moment if self.vertical else 0.0
         made["hanging"][0, 0] = math.radians(self.hanging)

@@ -52,7 +52,7 @@ class MovingEnd(Rig):
         made = np.zeros(1, MECHANISM)
         made["n"] = 1
         made["tolerance"] = TOLERANCE
-        made["mass"][0, 0] = (self.moved_mass + self.payload) * 1e-3
+        made["mass"][0, 0, 0] = (self.moved_mass + self.payload) * 1e-3
         hanging = self.payload + (self.moved_mass if self.vertical else 0.0)
         made["weight"][0, 0] = hanging * GRAVITY + self.return_force
         made["guide"][0, 0] = self.guide_stiffness

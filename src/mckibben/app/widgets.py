@@ -9,17 +9,19 @@ from __future__ import annotations
 import inspect
 import re
 import traceback
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import cache, partial, wraps
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from nicegui import binding, context, events, run, ui
 
 from mckibben.app.steps import LARGEST
 from mckibben.app.terms import message_of
+from mckibben.arrays import Array
 from mckibben.errors import MckibbenError, unforeseen
 from mckibben.numerals import typeset, typeset_within
 from mckibben.report import interactive
@@ -220,10 +222,12 @@ def error_box(error: Exception | str) -> None:
         ui.label(message_of(error))
 
 
-def upload(text: str, action: Callable[[events.UploadEventArguments], Any], endings: str) -> Any:
+def upload(
+    text: str, action: Callable[[events.UploadEventArguments], Any], endings: str = ""
+) -> Any:
     """Make a place to drop files, which are streamed to the disk, or to choose them."""
-    endings_said = endings.replace(",", ", ")
-    refused = f"A file is not {endings_said}, or has more than {LARGEST // 2**20} MiB"
+    large = f"A file has more than {LARGEST // 2**20} MiB"
+    refused = f"A file is not {endings.replace(',', ', ')}, or {large[2:]}" if endings else large
     found = ui.upload(
         label=f"{text}, or click to choose",
         multiple=True,
@@ -232,7 +236,8 @@ def upload(text: str, action: Callable[[events.UploadEventArguments], Any], endi
         on_upload=guarded(action),
         on_rejected=partial(error_toast, refused),
     )
-    return found.props(f'flat accept="{endings}"').classes("upload")
+    accepted = f' accept="{endings}"' if endings else ""
+    return found.props(f"flat{accepted}").classes("upload")
 
 
 async def download(path: Path) -> None:
@@ -283,6 +288,29 @@ def _place_title(layout: Json, key: str, height: int) -> None:
         at |= {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "font": {"size": SIZE}}
         layout["annotations"] = [*layout.get("annotations", ()), at]
         layout[key]["title"] = {"text": ""}
+
+
+POINTS = 160
+"""Points of a small picture: the least and the largest of each part, so that no peak is lost."""
+
+
+def overlay(traces: Mapping[str, Array]) -> None:
+    """Draw signals over each other in a small picture, each over its own range, with a legend."""
+    lines = []
+    for place, samples in enumerate(traces.values(), start=1):
+        finite = samples[np.isfinite(samples)]
+        parts = np.array_split(finite, min(POINTS // 2, len(finite)))
+        rows = [sorted((part.argmin(), part.argmax())) for part in parts]
+        ends = np.concatenate([part[each] for part, each in zip(parts, rows, strict=True)])
+        heights = 30 - 28 * (ends - ends.min()) / (np.ptp(ends) or 1.0)
+        across = np.linspace(0, 100, len(ends))
+        points = " ".join(f"{x:.4g},{y:.4g}" for x, y in zip(across, heights, strict=True))
+        lines.append(f'<polyline points="{points}" style="stroke: var(--series-{place})"/>')
+    picture = f'<svg viewBox="0 0 100 32" preserveAspectRatio="none">{"".join(lines)}</svg>'
+    with ui.element("div").classes("overlay"):
+        ui.html(picture, sanitize=False)  # numbers alone
+        for place, name in enumerate(filter(None, traces), start=1):
+            ui.label(name).style(f"color: var(--series-{place})")
 
 
 SCROLL = """{const row = getHtmlElement(%d), list = row?.closest(".list");

@@ -12,7 +12,7 @@ from nicegui import events, ui
 
 from mckibben import example
 from mckibben.app import together, widgets
-from mckibben.app.pages import importing
+from mckibben.app.pages import importing, parts
 from mckibben.app.state import State, view
 from mckibben.app.steps import UNTOUCHED, Entry, Reading, Step
 from mckibben.app.terms import message_of
@@ -298,21 +298,19 @@ def _sides(state: State, known: list[str]) -> None:
     _further(state)
     rest = [name for name in known if name not in (*state.inputs, *state.outputs)]
 
-    def choose(side: str, event: Any) -> None:
-        if side == "load" or event.value:
-            setattr(state, side, event.value or "")
-            state.changed()
-
-    def field(side: str, options: Any, value: Any) -> None:
-        several, label = side != "load", side.capitalize()
-        made: Any = ui.select(options, value=value, multiple=several, label=label)
-        made.on_value_change(partial(choose, side)).set_visibility(several or bool(rest))
-        mark(made.props("dense outlined"), side)
+    def choose(side: str, names: Any) -> None:
+        if names or side == "load":
+            setattr(state, side, names)
+        state.changed()
 
     for side in ("inputs", "outputs"):
-        field(side, known, [name for name in getattr(state, side) if name in known])
-    loads = {"": "By name, or none", **{name: name for name in rest}}
-    field("load", loads, state.load if state.load in rest else "")
+        chosen = [name for name in getattr(state, side) if name in known]
+        mark(parts.several(side.capitalize(), known, chosen, partial(choose, side)), side)
+    if rest:
+        loads = {"": "By name, or none", **{name: name for name in rest}}
+        load: Any = ui.select(loads, value=state.load if state.load in rest else "", label="Load")
+        load.on_value_change(lambda event: choose("load", event.value or ""))
+        mark(load.props("dense outlined"), "load")
 
 
 # -- one recording ----------------------------------------------------------------------------------

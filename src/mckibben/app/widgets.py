@@ -261,14 +261,15 @@ def plot_of(figure: Json, *, height: int = 320, dragged: str = "zoom") -> Any:
     for key in [key for key in layout if key.startswith(("xaxis", "yaxis"))]:
         layout[key] = axis | layout[key]
         _place_title(layout, key, height)
+    lifted = any(one.get("y") == 1 for one in layout.get("annotations", ()))  # a title at the top
     layout |= {
         "height": height,
         "dragmode": dragged,
-        "margin": {"l": 56, "r": 16, "t": 32 if "title" in layout else 16, "b": 40},
+        "margin": {"l": 56, "r": 16, "t": 32 if "title" in layout or lifted else 16, "b": 40},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
         "font": {"color": "--ink", "family": "system-ui, sans-serif", "size": SIZE},
-        "legend": {"orientation": "h", "x": 0, "y": 1, "yanchor": "bottom"},
+        "legend": {"orientation": "h", "x": 0, "y": 1 + lifted * 20 / height, "yanchor": "bottom"},
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": "--muted", "activecolor": "--accent"},
         "uirevision": "same",
     }

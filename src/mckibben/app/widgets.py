@@ -14,7 +14,7 @@ from contextlib import contextmanager, nullcontext
 from functools import cache, partial, wraps
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from nicegui import binding, context, events, run, ui
@@ -25,10 +25,11 @@ from mckibben.arrays import Array
 from mckibben.errors import MckibbenError, unforeseen
 from mckibben.numerals import typeset, typeset_within
 from mckibben.report import interactive
-from mckibben.report.builder import Figure, Item, Table, Text
+from mckibben.report.builder import Equations, Figure, Item, Table, Text
 from mckibben.report.builder import cell as as_text
 from mckibben.report.drawing import Drawing
 from mckibben.report.glossary import definition
+from mckibben.report.mathematics import mathml
 
 Json = dict[str, Any]
 
@@ -368,11 +369,42 @@ def items(found: Sequence[Item]) -> None:
                 lines = zip(item.rows, titles, strict=True)
                 table(
                     item.headings,
-                    [[partial(_titled, as_text(x), title), *rest] for (x, *rest), title in lines],
+                    [
+                        [partial(_titled, as_text(x), title), *map(_with_mathematics, rest)]
+                        for (x, *rest), title in lines
+                    ],
                 )
+        elif isinstance(item, Equations):
+            _equations(item.written)
         elif isinstance(item, Figure):
             for figure in item.plots[0]:
                 plot_of(figure)
+
+
+def _mathematics(latex: str, display: Literal["block", "inline"] = "block") -> None:
+    ui.html(mathml(latex, display), sanitize=False)  # elements of MathML alone
+
+
+def _with_mathematics(cell: Any) -> Any:
+    """Return a cell, or what sets its symbol."""
+    if isinstance(cell, dict):
+        return partial(_mathematics, cell["latex"], "inline")
+    return cell
+
+
+def _equations(written: Any) -> None:
+    """Show the equations of a model, and of its parts, with numbers folded."""
+    for line in written.equations:
+        _mathematics(line)
+    if written.numbers:
+        with details("Numbers"):
+            for line in written.numbers:
+                _mathematics(line)
+    if written.remark:
+        ui.label(written.remark).classes("muted")
+    for part in written.parts:
+        ui.label(part.title).classes("muted")
+        _equations(part)
 
 
 def _titled(text: str, title: str) -> None:

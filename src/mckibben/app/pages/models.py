@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -23,7 +22,7 @@ from mckibben.estimators.catalogue import full_name
 from mckibben.numerals import number, typeset, typeset_within
 from mckibben.recording import Recording
 from mckibben.report import interactive, results, subjects
-from mckibben.report.builder import Figure, Table
+from mckibben.report.builder import Figure
 from mckibben.report.columns import Column, columns_of
 from mckibben.report.words import CAREFUL, CHOICES
 
@@ -333,11 +332,7 @@ def _beside(state: State) -> list[str]:
 
 def _parameters(found: ModelDescription) -> None:
     with mark(ui.element("div").classes("stack"), "parameters"):
-        for item in results.description(found):
-            if isinstance(item, Table):  # symbols belong to equations, which the report has
-                head, *rows = ([a, *rest] for a, _, *rest in (item.headings, *item.rows))
-                item = replace(item, headings=head, rows=rows)
-            widgets.items([item])
+        widgets.items(results.description(found))
 
 
 CHECK = (

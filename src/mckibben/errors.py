@@ -80,7 +80,7 @@ class MckibbenError(Exception):
     @property
     def remedy(self) -> str:
         """What to do about it: any one set of options, or what is to be done otherwise."""
-        use = " or ".join(map(_argument_words, self.options))
+        use = " or ".join(map(argument_words, self.options))
         return ", or ".join(filter(None, (use and f"use {use}", self.otherwise)))
 
     def __str__(self) -> str:
@@ -147,10 +147,10 @@ def rendered(
     return f"{place}{problem}" + (f"{stop} Remedy: {remedy}." if remedy else "")
 
 
-def _argument_words(options: Mapping[str, Any]) -> str:
+def argument_words(options: Mapping[str, Any]) -> str:
     """Return arguments in backquotes.
 
-    >>> _argument_words({"units": {"time": "ms"}, "gaps": "split", "raw": True, "rate": None})
+    >>> argument_words({"units": {"time": "ms"}, "gaps": "split", "raw": True, "rate": None})
     '`units[time]=ms` with `gaps=split` with `raw` without `rate`'
     """
     words = []

@@ -14,6 +14,7 @@ from typing import (
     Annotated,
     Any,
     Literal,
+    Self,
     TypeVar,
     Union,
     cast,
@@ -350,6 +351,22 @@ class ReadOptions:
     def lines(self) -> Mapping[str, tuple[float, float]]:
         """Gain and offset of every calibrated channel."""
         return cast("Mapping[str, tuple[float, float]]", self.calibration)
+
+    def changed(self, options: Mapping[str, Any]) -> Self:
+        """Return these with more options, or with others in place of what it has; None is none."""
+        more = merged({name: getattr(self, name) for name in options}, options)
+        for name, value in more.items():
+            if isinstance(value, Mapping):
+                more[name] = {key: each for key, each in value.items() if each is not None}
+        return replace(self, **more)
+
+
+def merged(before: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options with others, also within mappings."""
+    both: dict[str, Any] = {**before}
+    for name, value in more.items():
+        both[name] = merged(both.get(name) or {}, value) if isinstance(value, Mapping) else value
+    return both
 
 
 @dataclass(frozen=True)

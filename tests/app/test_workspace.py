@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,10 +85,10 @@ class TestRecordings:
         rows = body.split(b"\n")
         upload = received(workspace, "a.csv", head + b"\n".join(rows[:100] + rows[110:]))
         reading = Reading(header=3, skip=2, encoding="cp1252", gaps="split")
-        reading = reading.model_copy(update={"calibration": {"displacement": (-1.0, 0.0)}})
-        reading = reading.model_copy(update={"units": {"displacement": "mm"}})
+        reading = replace(reading, calibration={"displacement": (-1.0, 0.0)})
+        reading = replace(reading, units={"displacement": "mm"})
         with pytest.raises(DataError) as refused:
-            workspace.add(upload, reading=reading.model_copy(update={"gaps": "error"}))
+            workspace.add(upload, reading=replace(reading, gaps="error"))
         assert refused.value.row == 106  # of the file as it is
         names = workspace.add(upload, reading=reading)
         assert [len(workspace.recording(one)) for one in names] == [100, 90]
@@ -114,6 +115,22 @@ class TestRecordings:
         assert list(workspace.used()) == [name]
         assert workspace.channels() == ["pressure", "displacement"]
 
+    def test_pieces_and_channels_of_one_run_are_joined(self, workspace: Workspace) -> None:
+        header, *rows = [line.split(",") for line in table().decode().split()]
+
+        def written(name: str, lines: list[list[str]], columns: tuple[int, ...]) -> str:
+            each = [",".join(cells[k] for k in columns) for cells in (header, *lines)]
+            return received(workspace, name, "\n".join([*each, ""]).encode())
+
+        pieces = [written("a.csv", rows[:100], (0, 1, 2)), written("b.csv", rows[100:], (0, 1, 2))]
+        for piece in pieces:
+            workspace.add(piece)
+        joint = workspace.join(pieces)
+        assert list(workspace.used()) == [joint]
+        loggers = [written("c.csv", rows, (0, 1)), written("d.csv", rows, (0, 2))]
+        other = workspace.recording(workspace.join(loggers))
+        assert all(np.array_equal(other[n], workspace.recording(joint)[n]) for n in other)
+
 
 class TestFiles:
     @pytest.mark.parametrize(
@@ -129,8 +146,10 @@ class TestFiles:
         assert received(workspace, given, b"x") == kept
         assert received(workspace, given, b"x") != kept  # nothing is written over
 
-    @pytest.mark.parametrize(("name", "size"), [("a.exe", 1), ("a.csv", 0), ("a.csv", LARGEST + 1)])
-    def test_no_other_files_are_taken(self, workspace: Workspace, name: str, size: int) -> None:
+    @pytest.mark.parametrize(("name", "size"), [("a.csv", 0), ("a.csv", LARGEST + 1)])
+    def test_empty_and_large_files_are_refused(
+        self, workspace: Workspace, name: str, size: int
+    ) -> None:
         with pytest.raises(DataError), workspace.receiving(name, size):
             pass
         assert not list((workspace.folder / "uploads").iterdir())

@@ -12,7 +12,7 @@ import pytest
 
 import mckibben
 from mckibben.errors import DataError, DataWarning
-from mckibben.files.request import merged
+from mckibben.options import merged
 from mckibben.recording import Recording
 from tests.files.odd import UNITS, Odd, odd
 

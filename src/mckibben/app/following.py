@@ -7,6 +7,7 @@ A motion is points of time and value for every reference channel. Results are in
 from __future__ import annotations
 
 import math
+import re
 import zlib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mckibben import registry
+from mckibben.app.formulas import values
 from mckibben.app.jobs import Tell
 from mckibben.app.modelling import Json, stored_items
 from mckibben.app.workspace import Workspace
@@ -273,8 +275,27 @@ def shape(found: Json) -> None:
         first, other = own["first"], own["other"]
         if own["kind"] == "hold" and None not in (seconds, first):
             own["points"] = [(0.0, first), (seconds, first)]
+        elif own["kind"] == "formula" and seconds and own.get("text"):
+            times = np.linspace(0.0, seconds, max(round(seconds / found["step"]), 1) + 1)
+            own["points"] = [*zip(times.tolist(), values(own["text"], times).tolist(), strict=True)]
+        elif own["kind"] == "drawn" and own.get("text"):
+            own["points"] = drawn(own["text"])
         elif own["kind"] in MOTIONS and None not in (seconds, cycles, first, other):
             own["points"] = motion(own["kind"], seconds, first, other, int(cycles))
+
+
+def drawn(text: str) -> Points:
+    """Return points from a text, such as ``0 5; 2 10; 4 5``: times [s] and values.
+
+    >>> drawn("0 5; 2 10")
+    [(0.0, 5.0), (2.0, 10.0)]
+    """
+    try:
+        pairs = [tuple(map(float, re.split(r"[\s,:]+", one.strip()))) for one in text.split(";")]
+        return [(time, value) for time, value in pairs]
+    except ValueError:
+        problem = f"{text!r:.60} is no list of points"
+        raise DataError(problem, remedy="write times and values, such as 0 5; 2 10; 4 5") from None
 
 
 def motion(kind: str, seconds: float, first: float, other: float, cycles: int) -> Points:

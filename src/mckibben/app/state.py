@@ -103,6 +103,11 @@ class State:
         """What is modelled."""
         return sides_of(self.workspace, self.inputs, self.outputs, self.load)
 
+    def read_again(self) -> None:
+        """Choose inputs, outputs and load anew, as channels are read in another way now."""
+        self.inputs, self.outputs, self.load = [], [], ""
+        self.changed()
+
     def changed(self) -> None:
         """Build every `view` again, in all windows; call it after the folder or a choice has changed."""
         if self.ready.is_set():

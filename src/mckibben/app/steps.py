@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, Literal
@@ -28,29 +29,20 @@ class Plain(BaseModel):
     model_config = ConfigDict(extra="ignore")
 
 
-class Reading(Plain):
+@dataclass(frozen=True)
+class Reading(ReadOptions):
     """How a file is read: options of `mckibben.read`; of ``channels``, no others are used."""
 
-    columns: dict[str, str] = {}
-    units: dict[str, str] = {}
-    calibration: dict[str, tuple[float, float]] = {}
-    constants: dict[str, tuple[float, str]] = {}
-    rate: float | None = None
-    rest_length: float | None = None
-    gaps: Literal["error", "split", "interpolate"] = "error"
-    raw: bool = False
-    channels: list[str] | None = None
-    header: int = 0
-    skip: int = 0
-    encoding: str | None = None
+    channels: Sequence[str] | None = None
 
-    def options(self) -> dict[str, Any]:
-        """Return the options that are given."""
-        return self.model_dump(exclude_defaults=True)
+    def given(self) -> dict[str, Any]:
+        """Return the options that are not as they are by default."""
+        every = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {name: value for name, value in every.items() if value != getattr(UNTOUCHED, name)}
 
-    def read_options(self) -> ReadOptions:
-        """Return the options without the channels."""
-        return ReadOptions(**self.model_dump(exclude_defaults=True, exclude={"channels"}))
+
+UNTOUCHED = Reading()
+"""A file read without options."""
 
 
 FUNCTIONS = {
@@ -112,12 +104,12 @@ class Entry(Plain):
     role: Role
     upload: str = ""
     part: int = 0
-    reading: Reading = Reading()
+    reading: Reading = UNTOUCHED
     steps: list[Step] = []
 
     def code(self) -> str:
         """Return the Python that reads it and repeats its steps, in the folder."""
-        words = [f"{name}={value!r}" for name, value in self.reading.options().items()]
+        words = [f"{name}={value!r}" for name, value in self.reading.given().items()]
         given = ", ".join([repr(f"uploads/{self.upload}"), "informative=False", *words])
         found = f"mckibben.read({given})[{self.part}]"
         for step in self.steps:
@@ -134,7 +126,7 @@ def applied(recording: Recording, steps: Sequence[Step]) -> Recording:
 
 def understand(path: Path, reading: Reading) -> tuple[list[Recording], list[Seen]]:
     """Return the recordings of a file, and its columns; errors are those of `mckibben.read`."""
-    found, columns = look(path, reading.read_options(), reading.channels, LARGEST)
+    found, columns = look(path, reading, reading.channels, LARGEST)
     if (chosen := reading.channels) is not None:
         found = [one.select([name for name in one.channels if name in chosen]) for one in found]
     return found, columns

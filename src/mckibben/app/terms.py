@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from mckibben.errors import MckibbenError, in_terms_of, rendered
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from mckibben.errors import MckibbenError, argument_words, in_terms_of, rendered
 
 GAPS = {
     "error": "Refuse",
@@ -11,19 +15,26 @@ GAPS = {
 }
 """Labels of the ways to treat gaps."""
 
+LABELS = {
+    "constants": "Constant quantities",
+    "header": "Header in line",
+    "join": "Join the pieces in the file",
+    "plant": "Tried on",
+    "rate": "Samples per second",
+    "raw": "Codes and counters as measured",
+    "skip": "Lines after it left out",
+}
+"""Labels of fields that are not their name in words."""
+
 CONTROLS = {
     "controller": "the field Controllers",
     "allow_shared": "“Allow the same data in training and test”",
     "calibration": "gain and offset",
     "columns": "the field Channel",
-    "constants": "a held channel",
     "input": "the field Inputs",
     "inputs": "the field Inputs",
     "output": "the field Outputs",
     "outputs": "the field Outputs",
-    "rate": "the field Samples per second",
-    "plant": "the field Tried on",
-    "raw": "“Codes and counters as measured”",
     "resample": "“Resample”",
     "reference": "the motion",
     "test": "a test recording",
@@ -32,8 +43,11 @@ CONTROLS = {
 }
 """Parameters of operations, and the controls that set them."""
 
-FIELDS = ("approach", "encoding", "gaps", "load", "preview", "rest_length", "sample_time", "slew")
-"""Parameters whose control is a field of the same name."""
+FIELDS = (
+    *("approach", "encoding", "gaps", "load", "preview", "rest_length", "sample_time", "sheet"),
+    *("slew", *LABELS),
+)
+"""Parameters whose control is a field with its label."""
 
 PLACES = {
     "check": "the tab Check under Models",
@@ -66,10 +80,20 @@ def control(name: str, key: str | None = None, value: str | None = None) -> str:
     if name == "gaps" and value in GAPS:
         return f"“{GAPS[value]}”"
     words = name.replace("_", " ")
-    default = f"the field {words.capitalize()}" if name in FIELDS else words
+    default = f"the field {LABELS.get(name, words.capitalize())}" if name in FIELDS else words
     of_key = f" of {key}" if key and not _is_placeholder(key) else ""
     example = f" ({value})" if value and not _is_placeholder(value) else ""
     return f"{CONTROLS.get(name, default)}{of_key}{example}"
+
+
+def choice(options: Mapping[str, Any]) -> str:
+    """Return options as the label of a button.
+
+    >>> choice({"units": {"force": "N"}}), choice({"gaps": "split"})
+    ('Unit of force (N)', 'Split there')
+    """
+    words = in_terms_of(argument_words(options), control, place)
+    return message_of(re.sub("the field |[“”]", "", words))
 
 
 def _is_placeholder(word: str) -> bool:

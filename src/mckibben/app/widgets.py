@@ -9,24 +9,27 @@ from __future__ import annotations
 import inspect
 import re
 import traceback
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import cache, partial, wraps
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+import numpy as np
 from nicegui import binding, context, events, run, ui
 
 from mckibben.app.steps import LARGEST
 from mckibben.app.terms import message_of
+from mckibben.arrays import Array
 from mckibben.errors import MckibbenError, unforeseen
 from mckibben.numerals import typeset, typeset_within
 from mckibben.report import interactive
-from mckibben.report.builder import Figure, Item, Table, Text
+from mckibben.report.builder import Equations, Figure, Item, Table, Text
 from mckibben.report.builder import cell as as_text
 from mckibben.report.drawing import Drawing
 from mckibben.report.glossary import definition
+from mckibben.report.mathematics import mathml
 
 Json = dict[str, Any]
 
@@ -220,10 +223,12 @@ def error_box(error: Exception | str) -> None:
         ui.label(message_of(error))
 
 
-def upload(text: str, action: Callable[[events.UploadEventArguments], Any], endings: str) -> Any:
+def upload(
+    text: str, action: Callable[[events.UploadEventArguments], Any], endings: str = ""
+) -> Any:
     """Make a place to drop files, which are streamed to the disk, or to choose them."""
-    endings_said = endings.replace(",", ", ")
-    refused = f"A file is not {endings_said}, or has more than {LARGEST // 2**20} MiB"
+    large = f"A file has more than {LARGEST // 2**20} MiB"
+    refused = f"A file is not {endings.replace(',', ', ')}, or {large[2:]}" if endings else large
     found = ui.upload(
         label=f"{text}, or click to choose",
         multiple=True,
@@ -232,7 +237,8 @@ def upload(text: str, action: Callable[[events.UploadEventArguments], Any], endi
         on_upload=guarded(action),
         on_rejected=partial(error_toast, refused),
     )
-    return found.props(f'flat accept="{endings}"').classes("upload")
+    accepted = f' accept="{endings}"' if endings else ""
+    return found.props(f"flat{accepted}").classes("upload")
 
 
 async def download(path: Path) -> None:
@@ -256,14 +262,15 @@ def plot_of(figure: Json, *, height: int = 320, dragged: str = "zoom") -> Any:
     for key in [key for key in layout if key.startswith(("xaxis", "yaxis"))]:
         layout[key] = axis | layout[key]
         _place_title(layout, key, height)
+    lifted = any(one.get("y") == 1 for one in layout.get("annotations", ()))  # a title at the top
     layout |= {
         "height": height,
         "dragmode": dragged,
-        "margin": {"l": 56, "r": 16, "t": 32 if "title" in layout else 16, "b": 40},
+        "margin": {"l": 56, "r": 16, "t": 32 if "title" in layout or lifted else 16, "b": 40},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
         "font": {"color": "--ink", "family": "system-ui, sans-serif", "size": SIZE},
-        "legend": {"orientation": "h", "x": 0, "y": 1, "yanchor": "bottom"},
+        "legend": {"orientation": "h", "x": 0, "y": 1 + lifted * 20 / height, "yanchor": "bottom"},
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": "--muted", "activecolor": "--accent"},
         "uirevision": "same",
     }
@@ -283,6 +290,29 @@ def _place_title(layout: Json, key: str, height: int) -> None:
         at |= {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "font": {"size": SIZE}}
         layout["annotations"] = [*layout.get("annotations", ()), at]
         layout[key]["title"] = {"text": ""}
+
+
+POINTS = 160
+"""Points of a small picture: the least and the largest of each part, so that no peak is lost."""
+
+
+def overlay(traces: Mapping[str, Array]) -> None:
+    """Draw signals over each other in a small picture, each over its own range, with a legend."""
+    lines = []
+    for place, samples in enumerate(traces.values(), start=1):
+        finite = samples[np.isfinite(samples)]
+        parts = np.array_split(finite, min(POINTS // 2, len(finite)))
+        rows = [sorted((part.argmin(), part.argmax())) for part in parts]
+        ends = np.concatenate([part[each] for part, each in zip(parts, rows, strict=True)])
+        heights = 30 - 28 * (ends - ends.min()) / (np.ptp(ends) or 1.0)
+        across = np.linspace(0, 100, len(ends))
+        points = " ".join(f"{x:.4g},{y:.4g}" for x, y in zip(across, heights, strict=True))
+        lines.append(f'<polyline points="{points}" style="stroke: var(--series-{place})"/>')
+    picture = f'<svg viewBox="0 0 100 32" preserveAspectRatio="none">{"".join(lines)}</svg>'
+    with ui.element("div").classes("overlay"):
+        ui.html(picture, sanitize=False)  # numbers alone
+        for place, name in enumerate(filter(None, traces), start=1):
+            ui.label(name).style(f"color: var(--series-{place})")
 
 
 SCROLL = """{const row = getHtmlElement(%d), list = row?.closest(".list");
@@ -339,11 +369,42 @@ def items(found: Sequence[Item]) -> None:
                 lines = zip(item.rows, titles, strict=True)
                 table(
                     item.headings,
-                    [[partial(_titled, as_text(x), title), *rest] for (x, *rest), title in lines],
+                    [
+                        [partial(_titled, as_text(x), title), *map(_with_mathematics, rest)]
+                        for (x, *rest), title in lines
+                    ],
                 )
+        elif isinstance(item, Equations):
+            _equations(item.written)
         elif isinstance(item, Figure):
             for figure in item.plots[0]:
                 plot_of(figure)
+
+
+def _mathematics(latex: str, display: Literal["block", "inline"] = "block") -> None:
+    ui.html(mathml(latex, display), sanitize=False)  # elements of MathML alone
+
+
+def _with_mathematics(cell: Any) -> Any:
+    """Return a cell, or what sets its symbol."""
+    if isinstance(cell, dict):
+        return partial(_mathematics, cell["latex"], "inline")
+    return cell
+
+
+def _equations(written: Any) -> None:
+    """Show the equations of a model, and of its parts, with numbers folded."""
+    for line in written.equations:
+        _mathematics(line)
+    if written.numbers:
+        with details("Numbers"):
+            for line in written.numbers:
+                _mathematics(line)
+    if written.remark:
+        ui.label(written.remark).classes("muted")
+    for part in written.parts:
+        ui.label(part.title).classes("muted")
+        _equations(part)
 
 
 def _titled(text: str, title: str) -> None:

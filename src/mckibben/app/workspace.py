@@ -15,7 +15,7 @@ import os
 import re
 import threading
 import unicodedata
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -23,9 +23,8 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from mckibben.app.steps import LARGEST, Entry, Reading, Role, Step, applied, understand
+from mckibben.app.steps import LARGEST, UNTOUCHED, Entry, Reading, Role, Step, applied, understand
 from mckibben.errors import DataError, MckibbenError
-from mckibben.files.formats import READERS
 from mckibben.system.atomic import PART, replacing, write_json, written
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
 
@@ -133,13 +132,10 @@ class Workspace:
     def receiving(self, name: str, size: int) -> Iterator[tuple[Path, Path]]:
         """Give where to write an uploaded file to, and where it then is, under a safe name.
 
-        `DataError` if it is empty, too large, or no file that is read.
+        `DataError` if it is empty or too large.
         """
         given = Path(name.replace("\\", "/"))
-        ending = given.suffix.casefold()
-        if ending not in READERS:
-            problem = f"{given.name!r:.80} is no file with recordings"
-            raise DataError(problem, remedy=f"give {', '.join(READERS)}")
+        ending = re.sub(r"[^.\w]", "", given.suffix.casefold())[:10]
         if not 0 < size <= LARGEST:
             problem = f"{given.name!r:.80} is empty, or has more than {LARGEST // 2**20} MiB"
             raise DataError(problem, remedy="give another file")
@@ -181,7 +177,7 @@ class Workspace:
         return self.path("uploads", entry.upload)
 
     def _parts(self, path: Path, reading: Reading) -> list[Recording]:
-        return self.cached(path, reading.model_dump_json(), lambda: understand(path, reading)[0])
+        return self.cached(path, repr(reading), lambda: understand(path, reading)[0])
 
     def _made(self, entry: Entry) -> Recording:
         def make() -> Recording:
@@ -207,12 +203,32 @@ class Workspace:
         self, upload: str, *, name: str = "", role: Role = "train", reading: Reading | None = None
     ) -> list[str]:
         """Add the recordings of an uploaded file, and return their names."""
-        path, names, way = self.path("uploads", upload), [], reading or Reading()
+        path, names, way = self.path("uploads", upload), [], reading or UNTOUCHED
         for part, one in enumerate(self._parts(path, way)):
             chosen = self.new_name("recordings", name or one.name or path.stem)
             self.put(Entry(name=chosen, role=role, upload=upload, part=part, reading=way))
             names.append(chosen)
         return names
+
+    def join(self, uploads: Sequence[str]) -> str:
+        """Add the recording that uploaded files are pieces or channels of, and return its name.
+
+        Each is read as its recordings are, those of it that are used give way to it.
+        """
+        from mckibben.files import read
+
+        readings = {one.upload: one.reading for one in self.entries()}
+        parts = [
+            part
+            for upload in uploads
+            for part in self._parts(self.path("uploads", upload), readings.get(upload, UNTOUCHED))
+        ]
+        (joint,) = read(parts, join=True)
+        name = self.add_recording(joint, name=f"{Path(uploads[0]).stem}-joined")
+        for entry in self.entries():
+            if entry.upload in uploads:
+                self.change(entry.name, role="unused")
+        return name
 
     def add_recording(self, recording: Recording, *, name: str, role: Role = "train") -> str:
         """Add a recording that is in no file, such as of a virtual rig; it becomes a raw file."""

@@ -38,7 +38,7 @@ from mckibben.numerics.blocks import (
 from mckibben.numerics.statistics import correlation_length
 from mckibben.options import CompareOptions, given_options
 from mckibben.recording import Recording
-from mckibben.system.progress import telling
+from mckibben.system.progress import SURE, telling
 from mckibben.system.threads import cores
 from mckibben.system.workers import checked, outcomes
 
@@ -164,9 +164,6 @@ LEAST_SHARE = 0.1
 
 WORTH_A_PROCESS = 2.0
 """Seconds of work below which starting processes costs more time than it saves."""
-
-SURE = 0.1
-"""Share of the work after which the remaining time is extrapolated from the progress so far."""
 
 
 @dataclass(frozen=True)

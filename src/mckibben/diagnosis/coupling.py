@@ -11,9 +11,13 @@ from mckibben.arrays import Array
 from mckibben.channels import Channels, any_moves, moved_by
 from mckibben.numerics.statistics import dependence
 from mckibben.recording import Recording
+from mckibben.signals.lags import lag
 
 FOLLOWS = 0.9
 """R² of an input's regression on the others above which their effects are not separable."""
+
+LITTLE = 0.1
+"""Share of an output's variance below which its inputs explain hardly any of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,3 +99,22 @@ def coupling(
     explained = 1 - left / np.where(total > 0, total, 1.0)
     units = tuple(recordings[0].units[name] for name in outputs)
     return Coupling(tuple(inputs), tuple(outputs), effects, units, tuple(explained.tolist()))
+
+
+def unexplained(recordings: Sequence[Recording], found: Coupling) -> list[str]:
+    """Return the outputs of which inputs explain less than `LITTLE` of the variance.
+
+    That is the larger of the share of linear regression on all inputs, and of one input at any lag.
+    """
+
+    def correlated(run: Recording, name: str, output: str) -> float:
+        if min(np.ptp(run[name]), np.ptp(run[output])) <= 0:
+            return 0.0
+        return lag(run[name], run[output]).correlation ** 2
+
+    return [
+        output
+        for output, share in zip(found.outputs, found.explained, strict=True)
+        if share < LITTLE
+        and all(correlated(r, name, output) < LITTLE for r in recordings for name in found.inputs)
+    ]

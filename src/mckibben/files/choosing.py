@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files.channels import NAME
 from mckibben.files.headers import (
@@ -30,10 +31,10 @@ from mckibben.recording import COMMAND, REFERENCE, REST_LENGTH, conversion
 
 @dataclass(frozen=True)
 class Seen:
-    """A column of a file, as shown in an import, with its ``first`` cells.
+    """A column of a file, as shown in an import, with its ``first`` cells and all its numbers.
 
     The unit is empty where the file states none, and ``channel``, which it is read as, where it is left
-    out; ``unasked`` is the channel that it is read as without options.
+    out; ``unasked`` is the channel that it is read as without options. Text has no numbers.
     """
 
     header: str
@@ -41,6 +42,7 @@ class Seen:
     first: tuple[str, ...]
     channel: str
     unasked: str
+    numbers: Array | None = field(default=None, repr=False, compare=False)
 
 
 def seen(source: Source) -> list[Seen]:
@@ -58,6 +60,7 @@ def seen(source: Source) -> list[Seen]:
             else tuple(f"{value:.6g}" for value in column.values[:4]),
             asked.get(column.header, ""),
             unasked.get(column.header, ""),
+            column.values,
         )
         for column in source.table.columns
     ]

@@ -109,19 +109,15 @@ def read(
             found.append(one)
         else:
             found += _read(one, part)[0]
-    if chosen.join and found:
-        if chosen.resample is not None:
-            found = [resample(one, chosen.resample) for one in found]
-        with noted() as notes:
-            joint = joined(found, request)
-        found = [_with_notes(joint, [*joint.notes, *notes, *_early(joint)])]
+    found = _one_run(found, request)
     for one, text in continued(found):
         warn(Path(one.source or one.name), text)
     return observe(_prepared(found, chosen))
 
 
 def _request(options: ReadOptions, **more: Any) -> Request:
-    return Request(**{one.name: getattr(options, one.name) for one in fields(options)}, **more)
+    stated = {each.name: getattr(options, each.name) for each in fields(ReadOptions)}
+    return Request(**stated, **more)
 
 
 def _early(recording: Recording) -> list[str]:
@@ -133,6 +129,17 @@ def _early(recording: Recording) -> list[str]:
         for name, late in lags(recording).items()
         if comes_first(late)
     ]
+
+
+def _one_run(found: list[Recording], request: Request) -> list[Recording]:
+    """Return recordings as one where that is an option, else as they are."""
+    if not request.join or not found:
+        return found
+    if request.resample is not None:
+        found = [resample(one, request.resample) for one in found]
+    with noted() as notes:
+        joint = joined(found, request)
+    return [_with_notes(joint, [*joint.notes, *notes, *_early(joint)])]
 
 
 def _prepared(recordings: list[Recording], options: ReadOptions) -> list[Recording]:
@@ -159,7 +166,8 @@ def look(
     ``channels`` must be there; no column is left out for them.
     """
     request = _request(options, channels=channels, informative=False, most=most)
-    recordings, source = _read(data, request)
+    recordings, source = _read(data, replace(request, channels=None) if request.join else request)
+    recordings = _one_run(recordings, request)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # issued when the recordings were read
         columns = seen(replace(source, request=replace(source.request, channels=None)))

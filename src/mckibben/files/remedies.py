@@ -10,7 +10,8 @@ from typing import Any
 from mckibben.errors import DataError
 from mckibben.files.headers import unit_of
 from mckibben.files.notices import noted
-from mckibben.files.request import Request, merged
+from mckibben.files.request import Request
+from mckibben.options import merged
 
 STEPS = 3
 """Remedies that a reading may need, one after the other."""

@@ -89,14 +89,6 @@ class Request(ReadOptions):
                     problem, file=path, parameter="units", channel=one.header, remedy=remedy
                 )
 
-    def changed(self, options: Mapping[str, Any]) -> Request:
-        """Return the request with more options, or with others in place of what it has; None is none."""
-        more = merged({name: getattr(self, name) for name in options}, options)
-        for name, value in more.items():
-            if isinstance(value, Mapping):
-                more[name] = {key: each for key, each in value.items() if each is not None}
-        return replace(self, **more)
-
     @property
     def interprets(self) -> bool:
         """Whether an option of reading, and not of what is done then, is given."""
@@ -129,14 +121,6 @@ class Request(ReadOptions):
             if not (math.isfinite(gain) and math.isfinite(offset) and gain):
                 problem = f"it cannot be {gain:g} times a column plus {offset:g}"
                 raise error(problem, channel=channel, remedy="give finite numbers, the gain not 0")
-
-
-def merged(before: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return options with others, also within mappings."""
-    both: dict[str, Any] = {**before}
-    for name, value in more.items():
-        both[name] = merged(both.get(name) or {}, value) if isinstance(value, Mapping) else value
-    return both
 
 
 @dataclass(frozen=True)

@@ -32,13 +32,8 @@ def read(file: BufferedReader, path: Path, sheet: str | None = None) -> list[Tab
     DataError
         If it is not there, or has no numbers.
     """
-    demand("openpyxl", "xlsx", "spreadsheets", file=path)
-    import openpyxl
-
     wanted = sheet or about(path).sheet
-    with closing(
-        openpyxl.load_workbook(file, read_only=True, data_only=True, keep_links=False)
-    ) as book:
+    with _opened(file, path) as book:
         names = [one.title for one in book.worksheets]
         if wanted is not None and wanted not in names:
             problem, remedy = f"there is no sheet {wanted!r}", f"name one of {listed(names)}"
@@ -56,6 +51,20 @@ def read(file: BufferedReader, path: Path, sheet: str | None = None) -> list[Tab
     reason = f"one sheet is read, {name!r}: the one with most rows of numbers, or `sheet`"
     unread = dict.fromkeys((other for other in names if other != name), reason)
     return [replace(found, unread={**found.unread, **unread})]
+
+
+def sheets(path: Path) -> list[str]:
+    """Return the names of the sheets of a spreadsheet."""
+    with path.open("rb") as file, _opened(file, path) as book:
+        return [one.title for one in book.worksheets]
+
+
+def _opened(file: BufferedReader, path: Path) -> Any:
+    """Return the values of a spreadsheet, as a context."""
+    demand("openpyxl", "xlsx", "spreadsheets", file=path)
+    import openpyxl
+
+    return closing(openpyxl.load_workbook(file, read_only=True, data_only=True, keep_links=False))
 
 
 def _text(sheet: Any) -> tuple[bytes, int, int]:

@@ -176,6 +176,14 @@ def _time(
     return subjects.time_course(several, channels or named or [*several[0].channels])
 
 
+def _spectrum(recordings: Recordings, channels: Sequence[str] = ()) -> Drawing:
+    """Draw the power density of channels over frequency; by default of all."""
+    several = _several(recordings)
+    if any(each.sample_time is None for each in several):
+        raise DataError("a spectrum needs a sample time", remedy="give `sample_time` in reading")
+    return subjects.spectrum(several, channels or [*several[0].channels])
+
+
 def _loop(
     recordings: Recordings,
     input: str | None = None,  # noqa: A002
@@ -417,7 +425,7 @@ _AGAINST = {kind: _against(kind) for kind in ("loops", "fit", "residuals")}
 
 FIGURES: Mapping[str, Mapping[str, Callable[..., Drawing]]] = MappingProxyType(
     {
-        "recording": {"loop": _loop, "time": _time},
+        "recording": {"loop": _loop, "time": _time, "spectrum": _spectrum},
         "rig": {"loop": _of_rig(_loop), "time": _of_rig(_time)},
         "block": {"loop": _block_loop, **_AGAINST},
         "leaderboard": {"errors": model_subjects.leaderboard, **_AGAINST},

@@ -33,6 +33,9 @@ from mckibben.report.drawing import (
 HELD_OUT = "held out to test"
 """Label of the part of a recording that no model was fitted to."""
 
+LONGEST_SEGMENT = 4096
+"""Samples of a segment of a spectrum."""
+
 
 def time_course(
     recordings: Sequence[Recording], channels: Sequence[str], points: int = POINTS
@@ -48,6 +51,26 @@ def time_course(
             name = name if channel == channels[0] else ""
             curves.append(Curve(t, y, name, colour, _measured_style(recording)))
         panels.append(Panel(time_label(kept[0]), channel_label(kept[0], channel), tuple(curves)))
+    return Drawing(tuple(panels), stacked=True, note=note)
+
+
+def spectrum(recordings: Sequence[Recording], channels: Sequence[str]) -> Drawing:
+    """Draw the power density of channels over frequency, by Welch's method, one panel each."""
+    from scipy.signal import welch
+
+    kept, note = _first(recordings)
+    panels = []
+    for channel in channels:
+        curves = []
+        for recording, (name, colour) in zip(kept, _colours(kept), strict=True):
+            n = min(recording.n_samples, LONGEST_SEGMENT)
+            frequency, density = welch(recording[channel], 1.0 / recording.step, nperseg=n)
+            level = 10 * np.log10(np.maximum(density[1:], np.finfo(float).tiny))
+            name = name if channel == channels[0] else ""
+            curves.append(Curve(*over_time(frequency[1:], level), name, colour, "fine"))
+        of = channel_label(kept[0], channel)
+        label = Label(f"power of {of.name}", f"dB of ({of.unit})²/Hz" if of.unit else "dB/Hz")
+        panels.append(Panel(Label("frequency", "Hz"), label, tuple(curves)))
     return Drawing(tuple(panels), stacked=True, note=note)
 
 

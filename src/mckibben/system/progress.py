@@ -28,6 +28,10 @@ LINE = 0.01
 """Least progress between two lines, as a share of the whole."""
 
 
+SURE = 0.1
+"""Share of the work after which the time left is extrapolated from the progress so far."""
+
+
 @contextmanager
 def telling(
     progress: bool | Tell | None, what: str, *, lines: bool = False
@@ -59,7 +63,9 @@ def telling(
         def tell(first: Any, *rest: Any) -> None:
             share, words = getattr(first, "share", first), str(first)
             if share is first:
-                words = ", ".join(filter(None, [words_of(*rest), time_left(share, started)]))
+                words = ", ".join(
+                    filter(None, [words_of(*rest), time_left(share, time.monotonic() - started)])
+                )
             show(share, words)
 
         yield tell
@@ -76,13 +82,15 @@ def words_of(given: str | float = "", *_: object) -> str:
     return f"best so far {given:.3g}" if math.isfinite(given) else ""
 
 
-def time_left(share: float, started: float) -> str:
-    """Return the time left, such as "about 40 s left", from the share done since a start time.
+def time_left(share: float, elapsed: float) -> str:
+    """Return the time left in words, from the share done in some time [s].
 
-    Nothing within the first second, and at the end.
+    Nothing within the first second, before `SURE` is done, and at the end.
+
+    >>> time_left(0.2, 10.0), time_left(0.05, 10.0)
+    ('about 40 s left', '')
     """
-    elapsed = time.monotonic() - started
-    if elapsed < 1 or not 0 < share < 1:
+    if elapsed < 1 or not SURE <= share < 1:
         return ""
     return f"about {duration(elapsed * (1 - share) / share)} left"
 

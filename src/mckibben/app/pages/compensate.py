@@ -19,14 +19,31 @@ from mckibben.numerals import number
 from mckibben.options import InvertOptions, TrackOptions
 from mckibben.recording import COMMAND, Recording
 from mckibben.report import interactive, words
-from mckibben.report.drawing import Curve, Drawing, Panel, axis_label, over_time, series_colour
+from mckibben.report.drawing import (
+    Curve,
+    Drawing,
+    Panel,
+    Style,
+    axis_label,
+    over_time,
+    series_colour,
+)
 
 TITLE = "Compensate"
 ICON = "moving"
 
 TABS = {"motion": "Follow a motion", "force": "Estimate a force", "log": "Review a log"}
 
-SHAPES = {**following.MOTIONS, "hold": "Stay at one value", "points": "From a file"}
+TEXTS = {"formula": "5 + 3*sin(2*pi*t/10)", "drawn": "0 5; 2 10; 4 5"}
+"""Motions that are written, each with an example."""
+
+SHAPES = {
+    **following.MOTIONS,
+    "hold": "Stay at one value",
+    "formula": "Formula of t",
+    "drawn": "Points: time and value",
+    "points": "From a file or a recording",
+}
 
 LOOP = ("approach", "settle", "noise", "delay", "slew", "preview", "pressure_loop", "seed")
 """Fields of `TrackOptions` that are asked for."""
@@ -165,6 +182,10 @@ def _motion(state: State, names: list[str]) -> None:
             following.shape(wish)
             followed.refresh()
 
+    def written() -> None:
+        following.shape(wish)  # errors are shown, as it is a whole text
+        moved()
+
     def reshaped() -> None:
         moved()
         page.refresh()
@@ -178,6 +199,16 @@ def _motion(state: State, names: list[str]) -> None:
         found.props("dense outlined debounce=400").classes("number")
         mark(found, f"field-{key}").on_value_change(moved)
 
+    def of_recording(event: events.ValueChangeEventArguments[Any]) -> None:
+        _take(wish, recordings[event.value])
+        page.refresh()
+
+    recordings = {
+        run.name: run
+        for run in state.workspace.used().values()
+        if run.sample_time is not None and all(key in run for key in channels)
+    }
+
     with widgets.card("Motion"):
         if len(channels) > 1:
             toggle = ui.toggle([*channels]).bind_value(wish, "now")
@@ -186,13 +217,19 @@ def _motion(state: State, names: list[str]) -> None:
         with widgets.row(classes="fields"):
             kind = ui.select(SHAPES, label="Shape").bind_value(own, "kind").props("dense outlined")
             mark(kind, "shape").on_value_change(reshaped)
-            if ready:
+            if own["kind"] in TEXTS:
+                own.setdefault("text", "")
+                text = ui.input(axis_label("Value", unit), placeholder=TEXTS[own["kind"]])
+                text.bind_value(own, "text").props("dense outlined debounce=600")
+                mark(text, "field-text").on_value_change(widgets.guarded(written))
+            elif ready:
                 field(own, "first", axis_label("At" if own["kind"] == "hold" else "From", unit))
             if own["kind"] in following.MOTIONS:
                 field(own, "other", axis_label("To", unit))
         with widgets.row(classes="fields" if ready or held else "hidden"):
-            if ready:
+            if ready and own["kind"] != "drawn":
                 field(wish, "seconds", "Duration [s]")
+            if own["kind"] in following.MOTIONS:
                 field(wish, "cycles", "Cycles")
             for key, channel in held.items():
                 field(wish["held"], key, axis_label(f"{key}, held", channel.unit))
@@ -201,6 +238,10 @@ def _motion(state: State, names: list[str]) -> None:
                 files = widgets.upload("", loaded, ".csv,.tsv,.txt,.parquet,.xlsx,.mat")
                 mark(files, "reference-file")
             widgets.button("From a file", lambda: files.run_method("pickFiles"), "upload_file")
+            if recordings:
+                run_of = ui.select([*recordings], label="From a recording").props("dense outlined")
+                run_of.style("min-width: 200px")
+                mark(run_of, "reference-recording").on_value_change(widgets.guarded(of_recording))
     _compensator(state, name)
 
 
@@ -326,7 +367,7 @@ def _plot(
 ) -> None:
     """Draw the desired motion, the reachable range, and what a run measured; below, its commands."""
     one = None if run is None else _scored(state, run["name"])
-    panels = []
+    panels, errors = [], []
     for place, channel in enumerate(reach):
 
         def curve(time: Any, y: Any, name: str, colour: str, style: Any = "line") -> Curve:
@@ -334,22 +375,29 @@ def _plot(
             return Curve(*over_time(time, y), shown, colour, style)
 
         curves = [curve(reference.time, reference[channel], "desired", "measured")]
+        label = axis_label(channel, reference.units.get(channel, ""))
         if one is not None and run is not None:
             due = one.time - (one.sample_time or 0.0)  # it is recorded a step later
-            plain = one.channels.get(f"uncompensated_{channel}")
-            if plain is not None:
-                curves.append(curve(due, plain, "no compensation", "muted", "fine"))
-            if channel in one:
-                curves.append(curve(due, one[channel], _title(run), series_colour(0)))
-        label = axis_label(channel, reference.units.get(channel, ""))
+            desired = np.interp(due, reference.time, reference[channel])
+            away = []
+            for name, key, colour in (
+                ("no compensation", f"uncompensated_{channel}", "muted"),
+                (_title(run), channel, series_colour(0)),
+            ):
+                if key in one:
+                    style: Style = "fine" if colour == "muted" else "line"
+                    curves.append(curve(due, one[key], name, colour, style))
+                    away.append(curve(due, desired - one[key], "", colour, style))
+            errors.append(Panel("time [s]", f"error of {label}", tuple(away), zero=True))
         panels.append(Panel("time [s]", label, tuple(curves)))
+    panels += errors
     if one is not None and run is not None:
         known = {*run.get("rmse", {}), *_wish(state)["held"]}
         driven = [key for key in one.channels if key.startswith(DRIVEN) and key not in known]
         moved = [key for key in driven if np.ptp(one[key]) > 0]
         moved = [key for key in moved if key.startswith(COMMAND)] or moved
         commands = [
-            Curve(*over_time(one.time, one[x]), x, series_colour(k), "line")
+            Curve(*over_time(one.time, one[x]), x, series_colour(k + 1), "line")
             for k, x in enumerate(moved)
         ]
         if moved:

@@ -12,14 +12,13 @@ from nicegui import events, ui
 
 from mckibben import example
 from mckibben.app import together, widgets
-from mckibben.app.pages import importing
+from mckibben.app.pages import importing, parts
 from mckibben.app.state import State, view
-from mckibben.app.steps import Entry, Reading, Step
+from mckibben.app.steps import UNTOUCHED, Entry, Reading, Step
 from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files import read
-from mckibben.files.formats import READERS
 from mckibben.recording import Recording
 from mckibben.report.figures import draw
 
@@ -57,7 +56,7 @@ def build(state: State) -> None:
 
 
 def _upload(state: State) -> Any:
-    found = widgets.upload("Drop files here", partial(_received, state), ",".join(READERS))
+    found = widgets.upload("Drop files here", partial(_received, state))
     return mark(found, "upload")
 
 
@@ -171,7 +170,7 @@ async def _ask(state: State, upload: str) -> None:
         state.changed()
 
     path = workspace.path("uploads", upload)
-    await importing.ask(path, Reading(), take, others="All files that are not read yet")
+    await importing.ask(path, UNTOUCHED, take, others="All files that are not read yet")
 
 
 async def _correct(state: State, entry: Entry) -> None:
@@ -185,7 +184,7 @@ async def _correct(state: State, entry: Entry) -> None:
     async def take(reading: Reading, all_so: bool) -> None:
         for name in [entry.name, *(alike if all_so else ())]:
             await asyncio.to_thread(partial(workspace.change, name, reading=reading))
-        state.changed()
+        state.read_again()
 
     path = workspace.raw_path(entry)
     text = f"Also read {', '.join(alike[:3])}{' …' * (len(alike) > 3)} so" if alike else ""
@@ -232,7 +231,29 @@ def _recordings(state: State, entries: list[Entry]) -> None:
             "None is for testing: add another recording, or split this one in two. Without, models are "
             "judged by cross-validation alone."
         ).classes("muted")
+    if len(dict.fromkeys([*_unread(state), *(one.upload for one in entries)])) > 1:
+        widgets.button("Join files", partial(_join, state), "merge")
     _upload(state)
+
+
+def _join(state: State) -> None:
+    """Let files be chosen that are pieces of one run, or its channels, and make a recording of them."""
+    workspace, unread = state.workspace, _unread(state)
+    uploads = dict.fromkeys([*unread, *(one.upload for one in workspace.entries())])
+
+    async def join() -> None:
+        state.recording = await asyncio.to_thread(workspace.join, files.value)
+        for one in files.value:
+            unread.pop(one, None)
+        shown.close()
+        state.read_again()
+
+    text = "Pieces of one run, one after the other, or channels of one run by several loggers"
+    with widgets.dialog("Join files") as shown:
+        ui.label(text).classes("muted")
+        files = ui.select([*uploads], value=[*unread], multiple=True, label="Files")
+        mark(files.props("outlined dense use-chips"), "joined")
+        mark(widgets.primary("Join", join), "join")
 
 
 def _line(state: State, entry: Entry) -> list[Any]:
@@ -277,21 +298,19 @@ def _sides(state: State, known: list[str]) -> None:
     _further(state)
     rest = [name for name in known if name not in (*state.inputs, *state.outputs)]
 
-    def choose(side: str, event: Any) -> None:
-        if side == "load" or event.value:
-            setattr(state, side, event.value or "")
-            state.changed()
-
-    def field(side: str, options: Any, value: Any) -> None:
-        several, label = side != "load", side.capitalize()
-        made: Any = ui.select(options, value=value, multiple=several, label=label)
-        made.on_value_change(partial(choose, side)).set_visibility(several or bool(rest))
-        mark(made.props("dense outlined"), side)
+    def choose(side: str, names: Any) -> None:
+        if names or side == "load":
+            setattr(state, side, names)
+        state.changed()
 
     for side in ("inputs", "outputs"):
-        field(side, known, [name for name in getattr(state, side) if name in known])
-    loads = {"": "By name, or none", **{name: name for name in rest}}
-    field("load", loads, state.load if state.load in rest else "")
+        chosen = [name for name in getattr(state, side) if name in known]
+        mark(parts.several(side.capitalize(), known, chosen, partial(choose, side)), side)
+    if rest:
+        loads = {"": "By name, or none", **{name: name for name in rest}}
+        load: Any = ui.select(loads, value=state.load if state.load in rest else "", label="Load")
+        load.on_value_change(lambda event: choose("load", event.value or ""))
+        mark(load.props("dense outlined"), "load")
 
 
 # -- one recording ----------------------------------------------------------------------------------

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from nicegui import ui
 
-from mckibben.app import widgets
-from mckibben.app.steps import Reading, understand
-from mckibben.app.terms import GAPS, message_of
+from mckibben.app import forms, widgets
+from mckibben.app.steps import UNTOUCHED, Reading, understand
+from mckibben.app.terms import choice, message_of
 from mckibben.app.widgets import mark
+from mckibben.channels import by_name
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files.choosing import Seen
 from mckibben.files.formats import READERS
 from mckibben.files.reading import columns_of
-from mckibben.parsers import constant
+from mckibben.files.xlsx import sheets
 from mckibben.recording import Recording
 
 CHANNELS = (
@@ -29,14 +33,19 @@ CHANNELS = (
 )
 """Channels that are offered; any other name can be typed."""
 
-KNOWN = ("utf-8", "cp1252", "utf-16", "cp932", "gb18030", "cp949")
-ENCODINGS: dict[str | None, str] = {None: "As found", **{name: name for name in KNOWN}}
+ENCODINGS = ("utf-8", "cp1252", "utf-16", "cp932", "gb18030", "cp949")
+"""That are offered."""
 
 FIRST_LINES = 8
 """Of a text that are shown."""
 
-LAYOUT = ("header", "skip", "encoding")
+LAYOUT = ("header", "skip", "encoding", "sheet")
 """What the columns depend on."""
+
+SAMPLES = ("rate", "sample_time", "rest_length", "constants", "gaps", "join", "raw")
+"""What else is chosen for a whole file; columns, units and calibrations are controls of the columns."""
+
+OF_COLUMNS = ("columns", "units", "calibration", "channels")
 
 FIELD = "dense outlined debounce=600"
 
@@ -74,64 +83,63 @@ class Form:
     def start(self, reading: Reading) -> None:
         """Begin with a reading."""
         self.reading, self.columns = reading, []
-        self.values |= {name: getattr(reading, name) for name in ("rest_length", "gaps", "raw")}
-        self.values |= {name: getattr(reading, name) or None for name in ("rate", *LAYOUT)}
+        self.values |= {name: getattr(reading, name) for name in (*SAMPLES, *LAYOUT)}
         each = reading.constants.items()
-        self.values["held"] = "; ".join(f"{name} = {v:g} {unit}" for name, (v, unit) in each)
+        self.values["constants"] = "; ".join(f"{name}={v:g} {unit}" for name, (v, unit) in each)
 
     def look(self) -> bool:
-        """Read the file as it is said to be, and return whether its columns are others now."""
+        """Read the file as the controls say, and return whether its columns are others now."""
         columns: list[Seen] = []
         self.error, self.recordings = None, []
         try:
-            self.reading = self.message_of()
+            self.reading = self.stated()
             self.recordings, columns = understand(self.path, self.reading)
         except MckibbenError as error:
             self.error = error
             with suppress(DataError):
-                columns = columns_of(self.path, self.reading.read_options())
+                columns = columns_of(self.path, self.reading)
         if self.columns and [c.seen.header for c in self.columns] == [c.header for c in columns]:
             return False
-        units, lines = self.reading.units, self.reading.calibration
+        units, lines = self.reading.units, self.reading.lines
         self.columns = [
             Column(one, of, units.get(of, one.unit), *lines.get(of, (1.0, 0.0)))
             for one, of in ((one, one.channel) for one in columns)
         ]
         return True
 
-    def message_of(self) -> Reading:
-        """Return the reading that the controls say; `DataError` if they contradict each other."""
-        general = {name: self.values[name] for name in ("rate", "rest_length", "gaps", "raw")}
-        general |= {name: int(self.values[name] or 0) for name in ("header", "skip")}
-        general["encoding"] = self.values["encoding"]
-        held = [part.replace(" = ", "=").strip() for part in self.values["held"].split(";")]
-        try:
-            general["constants"] = dict(constant(part) for part in held if part)
-        except ValueError:
-            problem = f"{self.values['held']!r:.80} is no channel with a value and a unit"
-            raise DataError(problem, parameter="constants", remedy="write force = 200 g") from None
-        if any(general[name] != getattr(self.reading, name) for name in LAYOUT):
-            self.columns = []  # others: what was said of these is void
-            return Reading(**general)
+    def stated(self) -> Reading:
+        """Return the reading that the controls state; `DataError` if they contradict each other."""
+        plain = replace(UNTOUCHED, **forms.given(Reading, self.values))
+        if any(getattr(plain, name) != getattr(self.reading, name) for name in LAYOUT):
+            self.columns = []  # others: what was stated of these is void
+            return plain
         if not self.columns:
-            return self.reading.model_copy(update=general)
+            named = {name: getattr(self.reading, name) for name in OF_COLUMNS}
+            return replace(plain, **named)
         used = [(one.channel, one) for one in self.columns if one.channel]
         channel, count = Counter(name for name, _ in used).most_common(1)[0] if used else ("", 0)
         if count > 1:
             problem = "two columns are this channel"
             raise DataError(problem, channel=channel, remedy="clear one of `columns`")
         left_out = any(one.seen.unasked and not one.channel for one in self.columns)
-        return Reading(
-            **general,
+        return replace(
+            plain,
             columns={n: one.seen.header for n, one in used if n != one.seen.unasked},
             units={n: one.unit or "" for n, one in used if (one.unit or "") != one.seen.unit},
             calibration={n: one.line for n, one in used if one.line != (1.0, 0.0)},
             channels=[n for n, _ in used if n != "time"] if left_out else None,
         )
 
+    def layout(self) -> tuple[list[str], dict[str, list[str]]]:
+        """Return the fields of the layout that the file has, and what can be chosen in them."""
+        reader = READERS.get(self.path.suffix.casefold(), "text")
+        if reader == "xlsx":
+            return ["sheet"], {"sheet": sheets(self.path)}
+        return ["header", "skip", "encoding"] * (reader == "text"), {"encoding": [*ENCODINGS]}
+
     def lines(self) -> list[str]:
         """Return the first lines of a text."""
-        if READERS.get(self.path.suffix.casefold()) != "text":
+        if READERS.get(self.path.suffix.casefold(), "text") != "text":
             return []
         with self.path.open("rb") as file:
             start = file.read(4096)
@@ -150,7 +158,7 @@ async def ask(
     verb: str = "Import",
     ticked: bool = True,
 ) -> None:
-    """Ask how a file is to be read, now as ``reading`` says, and ``take`` that once it can be.
+    """Ask how a file is to be read, now as ``reading`` states, and ``take`` that once it can be.
 
     That is a coroutine function, called also with whether ``others`` (empty for none) are read so, too.
     """
@@ -170,39 +178,39 @@ async def ask(
             await take(form.reading, all_so.value)
             shown.close()
 
-    async def as_found() -> None:
-        form.start(Reading())
+    async def read_as(reading: Reading) -> None:
+        form.start(reading)
+        controls.refresh()
         await again()
+        columns.refresh()
 
     check = widgets.guarded(again)
 
-    def bound(made: Any, name: str) -> None:
-        made.bind_value(form.values, name).on_value_change(check).props(FIELD)
+    def fields(names: Iterable[str], choices: Mapping[str, Iterable[str]] = forms.FIXED) -> None:
+        with ui.element("div").classes("fields"):
+            forms.fields(Reading, names, form.values, choices=choices, changed=check)
+
+    @ui.refreshable
+    def controls() -> None:
+        fields(SAMPLES)
+        names, choices = form.layout()
+        if names:
+            with widgets.details(
+                "Sheet" if names == ["sheet"] else "Lines and encoding of the text"
+            ):
+                numbered = [[str(at), line[:160]] for at, line in enumerate(form.lines(), start=1)]
+                if numbered:
+                    widgets.table(["", "First lines"], numbered)
+                fields(names, choices)
 
     understood, columns = ui.refreshable(_understood), ui.refreshable(_columns)
     with widgets.dialog(f"Import settings of {path.name}") as shown:
         mark(shown, "importing")
-        understood(form)
+        understood(form, read_as)
         columns(form, check)
-        with widgets.row():
-            bound(ui.number("Samples per second").props("clearable"), "rate")
-            bound(ui.number("Rest length [mm]").props("clearable"), "rest_length")
-            bound(ui.select(GAPS, label="Gaps"), "gaps")
-            held = ui.input("Held, such as force = 200 g")
-            bound(held.tooltip("A constant channel that has no column"), "held")
-            bound(ui.checkbox("Codes and counters as measured"), "raw")
-        if lines := form.lines():
-            with widgets.details("Lines, header and encoding of the text"):
-                numbered = [[str(at), line[:160]] for at, line in enumerate(lines, start=1)]
-                widgets.table(["", "First lines"], numbered)
-                with widgets.row():
-                    labels = {"header": "Header in line", "skip": "Lines after it left out"}
-                    for name, label in labels.items():
-                        number = ui.number(label, min=0, precision=0, placeholder="as found")
-                        bound(number.props("clearable"), name)
-                    bound(ui.select(ENCODINGS, label="Encoding"), "encoding")
+        controls()
         with widgets.row(classes="spread"):
-            widgets.button("As found", as_found)
+            widgets.button("As found", partial(read_as, UNTOUCHED))
             ui.space()
             all_so = mark(ui.checkbox(others, value=bool(others) and ticked), "others")
             all_so.set_visibility(bool(others))
@@ -210,16 +218,26 @@ async def ask(
             button.set_enabled(form.error is None)
 
 
-def _understood(form: Form) -> None:
-    """Say what is understood as it stands, or what is wrong with it."""
+def _understood(form: Form, read_as: Callable[[Reading], Any]) -> None:
+    """Show what was read, or what is wrong, with the options that read it as buttons."""
     if form.error is not None:
-        widgets.error_box(form.error)
+        problem = copy(form.error)
+        problem.options = ()  # these are buttons
+        widgets.error_box(problem)
+        with widgets.row():
+            for options in form.error.options:
+                act = partial(read_as, form.reading.changed(options))
+                mark(widgets.button(choice(options), act, "auto_fix_high"), "remedy")
         return
     found = form.recordings
     more = [f"and {len(found) - 3} more recordings"] * (len(found) > 3)
     with ui.element("div"):
         for text in [*map(summary, found[:3]), *more, *map(message_of, found[0].notes)]:
             ui.label(text).classes("muted")
+    inputs, outputs = by_name(found[:1])
+    if inputs and outputs:
+        ui.label("Inputs and outputs, each over its own range").classes("muted")
+        widgets.overlay({name: found[0][name] for name in (*inputs, *outputs)})
 
 
 def summary(recording: Recording) -> str:
@@ -236,6 +254,7 @@ def summary(recording: Recording) -> str:
 
 def _columns(form: Form, check: Callable[[], Any]) -> None:
     """Show the columns with controls for what each is read as."""
+    sampled = form.recordings[0].meta.get("sampled", {}) if form.recordings else {}
 
     def cells(column: Column) -> list[Any]:
         def bound(made: Any, name: str, label: str, width: int) -> None:
@@ -259,11 +278,21 @@ def _columns(form: Form, check: Callable[[], Any]) -> None:
         def unit() -> None:
             bound(ui.input(), "unit", "Unit", 80)
 
-        return [column.seen.header, ", ".join(column.seen.first[:3]), channel, unit, calibration]
+        def values() -> None:
+            ui.label(", ".join(column.seen.first[:3])).classes("muted")
+            numbers = column.seen.numbers
+            if numbers is not None and np.isfinite(numbers).any():
+                widgets.overlay({"": numbers})
+                text = f"{np.nanmin(numbers):.4g} to {np.nanmax(numbers):.4g}"
+                if rate := sampled.get(column.channel):
+                    text += f", at {rate:.3g} Hz"
+                ui.label(text).classes("muted")
+
+        return [column.seen.header, values, channel, unit, calibration]
 
     if form.columns:
         with ui.element("datalist").props("id=channels"):
             for name in CHANNELS:
                 ui.element("option").props(f"value={name}")
-        heads = ["Column", "First values", "Channel", "Unit", "Gain, offset, sign"]
+        heads = ["Column", "Values", "Channel", "Unit", "Gain, offset, sign"]
         widgets.table(heads, [cells(one) for one in form.columns])

@@ -17,7 +17,7 @@ from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
 from mckibben.channels import Channels
 from mckibben.diagnosis.characterization import characterize
-from mckibben.diagnosis.coupling import Coupling, coupling
+from mckibben.diagnosis.coupling import Coupling, coupling, unexplained
 from mckibben.diagnosis.data_gaps import data_gaps
 from mckibben.numerals import number
 from mckibben.options import PlanOptions
@@ -35,7 +35,7 @@ DRAWN = 3
 MOST = 6
 """Channels that are drawn over time together."""
 
-VIEWS = {"loop": "Loop", "time": "Over time"}
+VIEWS = {"loop": "Loop", "time": "Over time", "spectrum": "Spectrum"}
 
 Pair = tuple[str, str]
 
@@ -75,6 +75,9 @@ def content(state: State) -> None:
         with ui.element("div").classes("stack"):
             with widgets.card("Recordings"):
                 _recordings(state, used, shown)
+                for name in unexplained(runs, found):
+                    text = f"The inputs explain hardly any of {name}: are these its inputs?"
+                    mark(ui.label(text).classes("error"), "unexplained")
             with widgets.card("Characterization" + f": {pair[1]}" * (len(sides.outputs) > 1)):
                 _words(state, runs, sides, pair)
         with ui.element("div").classes("stack"):
@@ -152,8 +155,8 @@ def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) ->
         ui.label(f"{wanted} over {given}").classes("subtitle")
         toggle = ui.toggle(VIEWS, value=kind).props("no-caps unelevated dense")
         toggle.on_value_change(lambda event: _choose(state, "look.view", event.value))
-    if kind == "time":
-        drawing = draw(runs, "time", channels=channels)
+    if kind != "loop":
+        drawing = draw(runs, kind, channels=channels)
     else:
         drawing = draw(runs, "loop", input=given, output=wanted)
     for plot in widgets.plot(drawing, height=360 if kind == "loop" else 130 + 90 * len(channels)):

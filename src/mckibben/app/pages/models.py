@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -23,7 +22,7 @@ from mckibben.estimators.catalogue import full_name
 from mckibben.numerals import number, typeset, typeset_within
 from mckibben.recording import Recording
 from mckibben.report import interactive, results, subjects
-from mckibben.report.builder import Figure, Table
+from mckibben.report.builder import Figure
 from mckibben.report.columns import Column, columns_of
 from mckibben.report.words import CAREFUL, CHOICES
 
@@ -291,33 +290,49 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
         uses = {key: f"{key} ({use})" for key, (*_, use) in runs.items()}
         run, tested, _ = runs[choice("run", "Recording", uses)]
         wanted = choice("output", "Output", {each: each for each in outputs})
+        beside = _beside(state)
     driving = [each for each in sides.inputs if each in inputs] or inputs[:1]
     pair = coupling([run], driving, [wanted]).pairs([run])[0]
 
-    def show(modelled: Recording) -> None:
-        y = modelled[wanted]
-        drawn = subjects.against(FIGURES[tab], run, pair, {name: y}, tested)
-        plots = interactive.plots(drawn)
+    def show(modelled: Mapping[str, Recording]) -> None:
+        curves = {each: simulated[wanted] for each, simulated in modelled.items()}
+        plots = interactive.plots(subjects.against(FIGURES[tab], run, pair, curves, tested))
         rows, unit = slice(tested or 0, None), run.units[wanted]
-        off = float(np.sqrt(np.mean((y[rows] - run[wanted][rows]) ** 2)))
         what = f"{'the held-out part of ' if tested else ''}{run.name}"
-        text = [f"RMSE of {wanted} on {what}: {number(off, 3)} {unit}".rstrip() + "."]
+        errors = [
+            f"{each} {number(np.sqrt(np.mean((y - run[wanted])[rows] ** 2)), 3)} {unit}".rstrip()
+            for each, y in curves.items()
+        ]
+        text = [f"RMSE of {wanted} on {what}: {', '.join(errors)}."]
         with ui.element("div").classes("columns-even" if len(plots) > 1 else "stack"):
             for plot in plots:
                 mark(widgets.plot_of(plot, height=HEIGHT), f"closer-{tab}")
         ui.label(typeset_within(" ".join(text))).classes("muted")
 
-    free = partial(block.simulate, run)
-    later(("free", *key, run.name), free, show, height=HEIGHT)
+    def free() -> dict[str, Recording]:
+        return {each: workspace.model(each).simulate(run) for each in (name, *beside)}
+
+    later(("free", *key, *beside, run.name), free, show, height=HEIGHT)
+
+
+def _beside(state: State) -> list[str]:
+    """Let other models of the same channels be drawn beside the chosen one; return which are."""
+    rows = modelling.comparable(state.workspace, state.sides)
+    others = [row["name"] for row in rows if row["name"] != state.model]
+    kept = [name for name in state.chosen.get("models.beside", ()) if name in others]
+
+    def draw_beside(names: list[str]) -> None:
+        state.chosen["models.beside"] = names
+        closer.refresh()
+
+    if others:
+        mark(parts.several("Beside", others, kept, draw_beside), "closer-beside")
+    return kept
 
 
 def _parameters(found: ModelDescription) -> None:
     with mark(ui.element("div").classes("stack"), "parameters"):
-        for item in results.description(found):
-            if isinstance(item, Table):  # symbols belong to equations, which the report has
-                head, *rows = ([a, *rest] for a, _, *rest in (item.headings, *item.rows))
-                item = replace(item, headings=head, rows=rows)
-            widgets.items([item])
+        widgets.items(results.description(found))
 
 
 CHECK = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import wraps
+from functools import partial, wraps
 from typing import Any
 
 from nicegui import events, ui
@@ -14,6 +14,7 @@ from mckibben.app.state import State, view
 from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
 from mckibben.app.workspace import Workspace
+from mckibben.system.progress import time_left
 
 
 def steady(
@@ -86,6 +87,31 @@ def select(
     return str(state.chosen[key])
 
 
+def several(
+    label: str, options: list[str], value: Sequence[str], changed: Callable[[list[str]], Any]
+) -> Any:
+    """Let some of several be chosen; ``changed`` gets them once the menu is closed, which stays open.
+
+    A chip that is removed is a change at once.
+    """
+    chosen, is_open = [[*value]], [False]
+
+    def turn(now_open: bool) -> Any:
+        is_open[0] = now_open
+        if not now_open and field.value != chosen[0]:
+            chosen[0] = [*field.value]
+            return changed(chosen[0])
+        return None
+
+    field = ui.select(options, value=[*value], multiple=True, label=label)
+    field.props("dense outlined use-chips")
+    field.on("popup-show", partial(turn, True), []).on(
+        "popup-hide", widgets.guarded(partial(turn, False)), []
+    )
+    field.on_value_change(widgets.guarded(lambda _: None if is_open[0] else turn(False)))
+    return field
+
+
 def model_of(state: State, names: Sequence[str]) -> str:
     """Return the model that is chosen, or else the first of some."""
     return state.model if state.model in names else names[0]
@@ -126,7 +152,8 @@ def show_job(state: State, job: Job, title: str = "") -> None:
 
     def tell() -> None:
         bar.set_value(round(job.share, 3))
-        share.set_text(f"{100 * job.share:.0f} %")
+        left = time_left(job.share, job.progress[-1][0]) if job.progress else ""
+        share.set_text(", ".join(filter(None, [f"{100 * job.share:.0f} %", left])))
 
     with widgets.row(classes="spread"):
         with ui.element("div").classes("grow"):

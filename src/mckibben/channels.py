@@ -476,17 +476,19 @@ def _loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tupl
     return found if len(found) < len(inputs) else ()
 
 
-def by_unit(one: Recording, wanted: Sequence[str]) -> dict[str, str]:
+def by_unit(one: Recording) -> dict[str, str]:
     """Return what channels of other names measure: by their units, and the number or place in the name.
 
-    So ``p1`` in bar is ``pressure_1``. Where two would be the same channel, neither is.
+    So ``p1`` in bar is ``pressure_1``. Where two would be the same channel, neither is. What stays above
+    half of its highest value in mm is a length, as no muscle shortens by more.
     """
-    kinds = QUANTITIES | ({"mm": "length"} if "length" in wanted else {})
     found: dict[str, str] = {}
-    for name in one.channels:
+    for name, samples in one.channels.items():
         unit, place = one.units.get(name) or "", re.search(r"(\d+|extensor)$", name)
-        if unit in kinds and standard_unit(name) is None:
-            found[name] = f"{kinds[unit]}_{place[1]}" if place else kinds[unit]
+        if unit in QUANTITIES and standard_unit(name) is None:
+            is_length = unit == "mm" and samples.min() > 0.5 * samples.max()
+            kind = "length" if is_length else QUANTITIES[unit]
+            found[name] = f"{kind}_{place[1]}" if place else kind
     counts = Counter([*found.values(), *one.channels])
     return {name: channel for name, channel in found.items() if counts[channel] == 1}
 

@@ -291,7 +291,8 @@ def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[
     if unit.target in ("V", "A") or text.casefold() in COUNTS:
         remedy = _to_calibrate(channel, column, expected)
     elif expected == "" and unit.target == "mm":
-        options, remedy = [quality.in_mm(channel, column, source)], f"state {REST_LENGTH} besides"
+        options = [quality.in_mm(channel, column, source)]
+        remedy = f"name it displacement or length, and state {REST_LENGTH} besides"
     elif weight(text) != text:  # of a mass
         options = [{"units": {channel: weight(text)}}]
     problem = f"in {text!r}, which does not convert to" if text else "without a unit: it is in"

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from importlib import import_module
+from itertools import product
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from mckibben import registry
 from mckibben.channels import by_unit, renamed
@@ -20,6 +24,9 @@ NOTED, UNLIKE = "as its rig noted", "like no run of the paper, not used"
 
 SIZE = 0.1
 """Largest difference from the paper's commands and length, relative to them, that is no other size."""
+
+FALLS = -0.5
+"""Correlation with the drive below which a shortening has the wrong sign."""
 
 
 class Labels(NamedTuple):
@@ -74,10 +81,11 @@ def recognise(name: str, data: Sequence[Recording]) -> Recognised:
     about, measured = paper(name), dict[str, str]()
     every = dict[str, Recording]()
     for one in data:
-        measured |= (names := by_unit(one, about.channels))
-        whole = renamed(one, names).with_derived(about.channels)
+        measured |= (names := by_unit(one))
+        whole = _of_one_muscle(renamed(one, names).with_derived(about.channels))
         whole.matrix(about.channels)  # raises an error for what is absent
         every[f"{one.name}, {len(every) + 1}" if one.name in every else str(one.name)] = whole
+    _check_sign(every.values())
     noted = {n for n, one in every.items() if one.meta.get("protocol") == name}
     labels = _labels(name, every, noted)
     kinds = {n: about.kind_of(*own) for n, own in labels.items()}
@@ -95,6 +103,29 @@ def recognise(name: str, data: Sequence[Recording]) -> Recognised:
             rows.append((n, kind.what, labels[n].role, why))
     used = {n: one for n, one in every.items() if kinds[n] is not None}
     return Recognised(Runs(used, {n: labels[n] for n in used}), tuple(rows), measured, absent)
+
+
+def _of_one_muscle(one: Recording) -> Recording:
+    """Return a recording without channels of other muscles, such as ``length_2`` beside ``length``."""
+    others = {name for name in one if (base := re.sub(r"_\d+$", "", name)) != name and base in one}
+    return one.select([name for name in one if name not in others]) if others else one
+
+
+def _check_sign(every: Iterable[Recording]) -> None:
+    """Raise an error where a shortening falls as its drive rises: it may be a length."""
+    for drive, moved in product(("pressure", "voltage"), ("displacement", "contraction")):
+        pairs = [
+            (one[drive], one[moved], one) for one in every if {drive, moved} <= {*one.channels}
+        ]
+        products = [float(np.cov(u, y)[0, 1]) for u, y, _ in pairs]
+        spans = [float(np.std(u) * np.std(y)) for u, y, _ in pairs]
+        if sum(products) < FALLS * sum(spans):
+            remedy = (
+                "if it is a length, name it so with `columns[length]=COLUMN` and state `rest_length`; "
+                f"else turn it with `calibration[{moved}]=-1:0`"
+            )
+            problem = f"it falls as {drive} rises, and a shortening rises"
+            raise DataError(problem, file=pairs[0][2].source, channel=moved, remedy=remedy)
 
 
 def _labels(name: str, every: Mapping[str, Recording], noted: Collection[str]) -> dict[str, Labels]:

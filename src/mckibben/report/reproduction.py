@@ -48,8 +48,11 @@ def heading(one: Table | Figure, *, quick: bool = False) -> str:
     return f"{one.text.title}{of}{', quick run' if quick else ''}"
 
 
-def reproduction_page(found: Reproduction) -> str:
-    """Return the report of a re-run as HTML: printed results with ours first, figures last."""
+def reproduction_page(found: Reproduction, command: str = "") -> str:
+    """Return the report of a re-run as HTML: printed results with ours first, figures last.
+
+    ``command`` repeats it; default the one on the paper's rig.
+    """
     paper = found.paper
     quick = ["A quick run: what takes long was left out, so figures are rougher."] * found.quick
     pictured = [table for table in found.tables if table.text.drawn]
@@ -63,8 +66,8 @@ def reproduction_page(found: Reproduction) -> str:
         chart(f"figure-{k}", one, heading(figure), "square", min(len(one.panels), one.abreast))
         for k, (one, figure) in enumerate(zip(drawn, found.figures, strict=True))
     ]
-    command = f"mckibben reproduce {found.name}{' --quick' if found.quick else ''}"
-    code = Code("", f"{command} --seed {found.seed} -o {found.name}")
+    quickly = " --quick" * found.quick
+    command = command or f"mckibben reproduce {found.name}{quickly} --seed {found.seed}"
     return Page(
         paper.title,
         published,
@@ -79,7 +82,7 @@ def reproduction_page(found: Reproduction) -> str:
             Section("tables", "Tables", tables(found.tables, found.quick)),
             Section("differences", "What differs from the paper", [Text(found.notes, listed=True)]),
             Section("figures", "Figures", figures),
-            Section("method", "How to repeat", [code]),
+            Section("method", "How to repeat", [Code("", command)]),
         ],
     ).html()
 

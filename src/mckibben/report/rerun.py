@@ -43,12 +43,14 @@ def rerun(
     force: bool = False,
     progress: Progress | None = None,
     recognised: Callable[[Table], None] | None = None,
+    command: str = "",
 ) -> Reproduction:
     """Re-run a paper's experiment on a rig or on a folder of recordings, and write its report.
 
     It runs in a process of its own, which can be ended whatever it is at. Parameters are those of
     `reproduce`; ``out`` is the folder for ``report.html`` and ``tables.json``, and ``recognised`` is
-    called with the table of which run each recording is, before anything is fitted.
+    called with the table of which run each recording is, before anything is fitted; ``command`` repeats
+    it.
     """
     paper(name)
     runs = None if data is None else _recordings(data, reading)
@@ -73,7 +75,7 @@ def rerun(
             )
         found: Reproduction = outcome.result()
         if results is not None:
-            results.write_text("report.html", reproduction_page(found))
+            results.write_text("report.html", reproduction_page(found, command))
             results.write_text("tables.json", to_json(found.to_dict()) + "\n")
             results.commit()
         Checkpoints(out).clear()

@@ -401,6 +401,7 @@ def reproduce(
     force: bool = False,
     progress: Progress = None,
     recognised: Callable[[Any], None] | None = None,
+    command: str = "",
     **keywords: Unpack[ReproduceKeywords],
 ) -> Reproduction:
     """Run a paper's protocol on its rig, with its methods and ours, and compare the tables.
@@ -413,6 +414,8 @@ def reproduce(
         Folder with recordings of the paper's runs, of any size and name, instead of the rig's.
     recognised : callable, optional
         Called with the table of which run each recording is, before anything is fitted.
+    command : str
+        That repeats it, for the report; default that on the paper's rig.
     options, reading, out, force, progress
         See `mckibben.workflow`; options are those of `mckibben.options.ReproduceOptions`.
     """
@@ -434,4 +437,5 @@ def reproduce(
             force=force,
             progress=tell,
             recognised=recognised,
+            command=command,
         )

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.channels import by_name
+from mckibben.errors import DataError
 from mckibben.papers.recognising import Labels
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, share
@@ -168,6 +169,9 @@ def recognised(runs: Sequence[Features]) -> list[Labels]:
     to the highest; else every other one trains.
     """
     muscles = [name for name in by_name([runs[0].recording])[0] if name != EXTENSOR]
+    if not muscles:
+        remedy = "name the columns of its muscles with `columns[pressure_1]=COLUMN` and so on"
+        raise DataError("no muscle beside the extensor has a pressure", remedy=remedy)
     highest = max(float(np.percentile(one.recording[name], 99)) for one in runs for name in muscles)
     apart = SAME * highest
     levels = grouped([one.level(EXTENSOR) for one in runs], apart)

@@ -19,6 +19,8 @@ from mckibben.papers.sdchm.loops import (
     widths,
 )
 from mckibben.papers.sdchm.run import DAMPED, LINEAR
+from tests.papers.test_figures import pictures
+from tests.report.legible import assert_readable
 
 OUTPUTS = ("displacement_1", "displacement_2", "displacement_3")
 
@@ -46,6 +48,8 @@ def test_widths_are_of_the_own_range_and_of_the_range_that_moves() -> None:
 def test_on_the_rig_of_the_paper() -> None:
     """Along the patterns the order is the paper's; what is printed has no damping elsewhere."""
     found = reproduce("sdchm", quick=True, jobs=1)
+    for picture in pictures(found):
+        assert_readable(picture)
     worst = {
         name: max(row[f"RMSE of y{k} [mm]"] for k in (1, 2, 3))
         for name, row in rows(found, "constant").items()

@@ -10,6 +10,8 @@ import pytest
 from mckibben.papers.experiment import reproduce
 from mckibben.papers.mpi_narmax.run import ALL_RATES, AS_PRINTED, OURS, PLAIN
 from mckibben.papers.paper import paper
+from tests.papers.test_figures import pictures
+from tests.report.legible import assert_readable
 
 Rows = dict[str, dict[str, Any]]
 Waves = dict[str, np.ndarray]
@@ -25,7 +27,10 @@ def by_key(found: dict[str, Any], key: str) -> Rows:
 
 @pytest.mark.long
 def test_the_force_beats_models_without_and_all_rates_make_the_better_front() -> None:
-    found = reproduce("mpi-narmax", quick=True).to_dict()
+    whole = reproduce("mpi-narmax", quick=True)
+    for picture in pictures(whole):
+        assert_readable(picture)
+    found = whole.to_dict()
     off = by_key(found, "errors")
     for where in ("status 4", "random", "held"):
         assert off[ALL_RATES][f"{where}, RMSE"] < 0.8 * off[AS_PRINTED][f"{where}, RMSE"]

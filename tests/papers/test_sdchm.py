@@ -21,6 +21,8 @@ from mckibben.papers.sdchm.loops import (
 from mckibben.papers.sdchm.protocol import strength
 from mckibben.papers.sdchm.run import DAMPED, LINEAR
 from mckibben.rigs import load_rig
+from tests.papers.test_figures import pictures
+from tests.report.legible import assert_readable
 
 OUTPUTS = ("displacement_1", "displacement_2", "displacement_3")
 
@@ -54,6 +56,8 @@ def test_loads_are_in_proportion_to_the_muscles() -> None:
 def test_on_the_rig_of_the_paper() -> None:
     """Along the patterns the order is the paper's; what is printed has no damping elsewhere."""
     found = reproduce("sdchm", quick=True, jobs=1)
+    for picture in pictures(found):
+        assert_readable(picture)
     worst = {
         name: max(row[f"RMSE of y{k} [mm]"] for k in (1, 2, 3))
         for name, row in rows(found, "constant").items()

@@ -72,9 +72,9 @@ DASHES, MARKERS = ("-", "--", "-.", ":"), ("", "o", "^")
 DOTS = "os^DvP*X<>"
 """Markers of points without a line, by series."""
 
-BEAD, STYLED_BEAD, LARGEST_BEAD, FEW_BEADS = 1.6, 2.4, 5.0, 40
-"""Size of a bead on a line, of one with a form of its own, of the first series' where these are few, and
-how many are few: there beads become smaller from series to series, so that equal ones show [pt]."""
+BEAD, STYLED_BEAD, LARGEST_BEAD, SMALLER, FEW_BEADS = 1.6, 2.4, 6.0, 1.8, 40
+"""Size of a bead on a line, of one with a form of its own, of the first series' where a line has few:
+there beads become smaller from series to series, so that equal ones show [pt]; how many are few."""
 
 N_MARKERS = 8
 """Markers along a line."""
@@ -492,7 +492,7 @@ def _curve(axis: Axes, curve: Curve, styled: bool) -> None:
     series = int(curve.colour.removeprefix("series-")) - 1 if "series" in curve.colour else None
     bead = BEAD
     if curve.x.size <= FEW_BEADS and series is not None:
-        bead = max(bead, LARGEST_BEAD - series)
+        bead = max(bead, LARGEST_BEAD - SMALLER * series)
     if not styled:
         series = None
     if curve.style in _WIDTHS:

@@ -58,8 +58,7 @@ def numbers(axis: Any) -> list[Any]:
     shown = []
     for place, side in enumerate((axis.xaxis, axis.yaxis)):
         low, high = sorted(side.get_view_interval())
-        labels = side.get_ticklabels() if side.get_tick_params().get("labelbottom", True) else []
-        shown += [one for one in labels if low <= one.get_position()[place] <= high]
+        shown += [x for x in side.get_ticklabels() if low <= x.get_position()[place] <= high]
     return [one for one in shown if one.get_text() and one.get_visible()]
 
 

@@ -221,7 +221,7 @@ def within(panel: Panel, least: float = 0.0) -> Panel:
     least : float
         What counts as near at least, if the first curve is low.
     """
-    known = [curve.y[np.isfinite(curve.y)] for curve in panel.curves]
+    known = [curve.y[~np.isnan(curve.y)] for curve in panel.curves]
     low, high = float(known[0].min()), float(known[0].max())
     reach = max(high - low, least)
     ends = [(float(y.min()), float(y.max())) if y.size else (low, high) for y in known]

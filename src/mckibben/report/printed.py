@@ -110,7 +110,7 @@ STYLE: Mapping[Any, Any] = MappingProxyType(
 MOST_TICKS, APART = 7, 0.6
 """Ticks along x that are tried first where numbers touch, and the least gap between [letter heights]."""
 
-_WIDTHS = {"line": 0.9, "fine": 0.4, "broad": 2.6, "beads": 0.5}
+_WIDTHS = {"line": 0.9, "fine": 0.4, "broad": 3.2, "beads": 0.5}
 """Of lines [pt], by style."""
 
 _POINTERS = {"ticks": "|", "above": "^", "below": "v"}

@@ -170,7 +170,9 @@ def drawing(figure: Figure) -> Drawing:
     left = [name for name, colour in colours.items() if colour in beyond]
     leaving = f"Arrow heads: beyond the axis, {'; '.join(left)}." if left else ""
     note = " ".join(filter(None, (leaving, left_out(others[N_COLOURS:]))))
-    return Drawing(tuple(panels), abreast=2 if len(panels) in (2, 4) else 3, note=note)
+    n = len(panels)
+    full = (abreast for abreast in (3, 4, 2) if n > abreast and n % abreast == 0)  # rows
+    return Drawing(tuple(panels), abreast=next(full, 3), note=note)
 
 
 def _within(panels: Sequence[Panel]) -> list[Panel]:

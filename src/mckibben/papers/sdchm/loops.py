@@ -232,11 +232,12 @@ def _shown(
         errors = np.array([late[y] - late[REFERENCE + y] for y in tracked.rmse])
         ends = {"lowest error [mm]": errors.min(), "highest error [mm]": errors.max()}
         rows[name] |= {end: float(error) for end, error in ends.items()}
+        shown = late.slice(len(late) - round(PERIOD / late.step), len(late)) if alone else late
         for y in tracked.rmse if name in [*found][:DRAWN] else ():
-            x = late[REFERENCE + one] if alone else late.time
+            x = shown[REFERENCE + one] if alone else shown.time
             title = f"y{one[-1]} moves: y{y[-1]}" if alone else f"y{y[-1]}"
-            panels.setdefault(title, {"reference": (x, late[REFERENCE + y])})
-            panels[title][name] = x, late[y]
+            panels.setdefault(title, {"reference": (x, shown[REFERENCE + y])})
+            panels[title][name] = x, shown[y]
     lines: dict[str, list[Cell]] = {name: [*cells.values()] for name, cells in rows.items()}
     experiment.table(key, [*rows[name]], lines, **task.facts)
     if not alone:

@@ -106,7 +106,8 @@ def test_slack_tendons_leave_a_pendulum() -> None:
     first = [hanging - math.asin(2.0 / moment), 0.0]
     solved = solve_ivp(rates, (0, time[-1]), first, t_eval=time, rtol=1e-9, max_step=STEP / 4)
     assert np.ptp(run["angle"]) > 1.0
-    np.testing.assert_allclose(run["angle"], solved.y[0], atol=2e-3)
+    # a thousandth of the swing, most of which is there at rest, at any step of integration
+    np.testing.assert_allclose(run["angle"], solved.y[0], rtol=0, atol=2.5e-3)
 
 
 def potential(rig: Joint, run: Recording) -> Array:

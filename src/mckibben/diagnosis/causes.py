@@ -21,6 +21,7 @@ from mckibben.blocks.runs import FreeRun
 from mckibben.numerics.blocks import blocks_of, squared_errors, sums_of_others
 from mckibben.numerics.least_squares import solve_products
 from mckibben.numerics.statistics import correlation_length, half_interval, hats
+from mckibben.recording import base_name
 from mckibben.signals.holds import holds
 from mckibben.signals.reversals import reversals
 
@@ -265,7 +266,7 @@ def _moving(block: Block, runs: Sequence[FreeRun]) -> list[str]:
     others = [
         name
         for name in runs[0].source.channels
-        if name.split("_")[0] in CAUSES and name not in (*inputs, *outputs)
+        if base_name(name) in CAUSES and name not in (*inputs, *outputs)
     ]
     recorded = [n for n in (*inputs, *others) if all(n in run.source for run in runs)]
     return [name for name in recorded if np.ptp(np.concatenate(_samples(runs, name))) > 0]

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.arrays import Array, Mask, true_runs
+from mckibben.arrays import Array, Mask, Rows, true_runs
 from mckibben.files import timebase
 from mckibben.files.notices import listed
 from mckibben.files.request import GAPS_BRIDGED, Source
@@ -142,7 +141,7 @@ def _enclosed(missing: dict[str, Mask], source: Source) -> Mask:
     return inside
 
 
-def _judge_gaps(cuts: NDArray[np.intp], times: Times, source: Source) -> None:
+def _judge_gaps(cuts: Rows, times: Times, source: Source) -> None:
     """Raise an error for gaps in time, or note that they are bridged."""
     lengths = convert(times.values[cuts] - times.values[cuts - 1], times.unit, "s")
     total = f"{len(cuts)} gap{'s' * (len(cuts) > 1)} in time, {lengths.sum():.6g} s in all"

@@ -12,7 +12,7 @@ from functools import lru_cache
 from mckibben.channels import QUANTITIES
 from mckibben.files.names import AMBIGUOUS, CHANNELS, ROLES, UNITS, words_of
 from mckibben.files.units import COUNTS, GAUGE, find, find_listed, weight
-from mckibben.recording import standard_unit
+from mckibben.recording import base_name, standard_unit
 
 LONGEST = 256
 """Characters of a header."""
@@ -118,7 +118,7 @@ def channel_of(header: Header) -> str:
         rest, _, about = name.rpartition("_")
         plain = f"{about}_of_{rest}" if unit_of(name) is not None and about in _ABOUT else name
         return _of_loop(name, header) or plain
-    base = standard.partition("_")[0]
+    base = base_name(standard)
     if unit is None or unit.target == _expected(base):
         return standard
     if base == "contraction" and unit.target == "mm":

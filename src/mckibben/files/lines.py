@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.arrays import Rows
+from mckibben.arrays import Mask, Rows
 from mckibben.errors import DataError
 from mckibben.files.headers import is_time, parse
 from mckibben.files.instants import may_be_instant
@@ -68,7 +68,7 @@ def _filled(rows: Sequence[bytes], layout: Layout, path: Path) -> list[int]:
 
 def _measured(
     lines: Sequence[bytes], numbers: Rows, layout: Layout, path: Path
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+) -> tuple[NDArray[np.int64], Mask]:
     """Return the number of cells of every line, and whether it begins with a number or a blank cell."""
     joined, mark = b"\n".join(lines), (layout.dialect.separator or " ").encode()
     slowly = re.compile(rb'[ "]*(?:[-+.]?\d|%s)' % re.escape(mark)).match
@@ -90,9 +90,7 @@ def _measured(
     return np.diff(cells, prepend=0) + 1, begins
 
 
-def _end(
-    lines: Sequence[bytes], numbers: Rows, sound: NDArray[np.bool_], width: int, path: Path
-) -> int:
+def _end(lines: Sequence[bytes], numbers: Rows, sound: Mask, width: int, path: Path) -> int:
     """Return the number of lines before words behind a blank line, such as "Maximum", with a note.
 
     Unless a good part of the samples follows.
@@ -123,7 +121,7 @@ def _is_of_words(line: bytes, layout: Layout) -> bool:
 
 
 def _refuse_many(
-    wrong: NDArray[np.bool_],
+    wrong: Mask,
     lines: Sequence[bytes],
     numbers: Rows,
     counts: NDArray[np.int64],
@@ -142,9 +140,7 @@ def _refuse_many(
     raise DataError(problem, file=path, row=numbers[at], remedy=remedy)
 
 
-def _note(
-    some: NDArray[np.bool_], what: str, lines: Sequence[bytes], numbers: Rows, path: Path
-) -> None:
+def _note(some: Mask, what: str, lines: Sequence[bytes], numbers: Rows, path: Path) -> None:
     if some.any():
         first = int(some.argmax())
         text = " ".join(lines[first].decode("utf-8", "replace").split())[:60]

@@ -304,7 +304,7 @@ def common_step(time: Array, spans: Spans) -> Step:
 
 
 def _fit_step(
-    t: Array, count: Array, starts: NDArray[np.intp], digit: float, noise: float
+    t: Array, count: Array, starts: Rows, digit: float, noise: float
 ) -> tuple[float, float]:
     """Return the step of numbered samples, and the RMS deviation from its grid; 0 if rounding."""
     lengths = np.diff(starts, append=t.size)

@@ -36,7 +36,7 @@ from mckibben.estimators.core.data import TrainingData, training_data
 from mckibben.estimators.core.leaving_out import stepped
 from mckibben.estimators.core.uncertainty import covariance_of, unknown, vanishing
 from mckibben.numerics.tracker import Progress, Tracker
-from mckibben.recording import REST_LENGTH, Recording, conversion, is_frame, listed
+from mckibben.recording import REST_LENGTH, Recording, base_name, conversion, is_frame, listed
 from mckibben.signals.checking import LARGEST_SEED
 from mckibben.system.progress import telling
 from mckibben.system.threads import one_blas_thread
@@ -287,7 +287,7 @@ class Estimator(ABC):
         if own.scheduling:
             return "the load is not one of its inputs"
         (given,), (wanted,) = own.inputs, own.outputs
-        kinds = (given.partition("_")[0], wanted.partition("_")[0])
+        kinds = (base_name(given), base_name(wanted))
         if cls.made_for is not None and kinds != cls.made_for:
             nearly = kinds[1] == cls.made_for[1] and conversion(cls.made_for[0], kinds[0], 1.0)
             made = (

@@ -26,7 +26,7 @@ from mckibben.estimators.coupled.balance import BalanceEstimator, fixed_in
 from mckibben.estimators.coupled.balance_prior import PriorLike, as_prior
 from mckibben.estimators.coupled.base import FEWEST_IN_A_ROW
 from mckibben.numerics.tracker import Tracker
-from mckibben.recording import Recording
+from mckibben.recording import Recording, base_name
 
 
 class BalanceForceEstimator(SearchEstimator):
@@ -80,7 +80,7 @@ class BalanceForceEstimator(SearchEstimator):
     @classmethod
     def objection(cls, recordings: Sequence[Recording], channels: Channels) -> str | None:
         own = cls.own_roles(channels)
-        kinds = [name.partition("_")[0] for name in (*own.inputs, *own.outputs)]
+        kinds = [base_name(name) for name in (*own.inputs, *own.outputs)]
         if kinds not in (["length", "force"], ["displacement", "force"]):
             return "it maps length, or displacement, to force"
         return super().objection(recordings, channels)

@@ -21,7 +21,7 @@ from mckibben.estimators.core.separable import DIFFERENCE, SEARCH_SAMPLES, Separ
 from mckibben.numerics.descent import by_differences
 from mckibben.numerics.multi_start import multi_start
 from mckibben.numerics.tracker import Tracker
-from mckibben.recording import Recording
+from mckibben.recording import Recording, base_name
 
 NO_COMMANDS = ("contraction", "displacement", "force", "length")
 """Channels that cannot be commands of a valve."""
@@ -83,7 +83,7 @@ class AirEstimator(SeparableEstimator):
     def objection(cls, recordings: Sequence[Recording], channels: Channels) -> str | None:
         if objection := super().objection(recordings, channels):
             return objection
-        (command, pressure) = (name.partition("_")[0] for name in channels.pair)
+        (command, pressure) = (base_name(name) for name in channels.pair)
         if command in NO_COMMANDS or pressure != "pressure":
             return "it maps a command to a pressure"
         return None

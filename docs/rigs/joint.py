@@ -77,7 +77,7 @@ pressures. On another joint its levels are in proportion to that one's ranges.
 ## Models
 
 Free-run RMSE of the angle on the test [mrad], fitted to the {fitted} training runs. The first test run
-has a co-contraction, others a mass or a pull, that no training run has. Seeds are of the sensors' noise.
+has a co-contraction, two have a mass, that no training run has. Seeds are of the sensors' noise.
 
 | model | {tests} | all, seeds {seeds} |
 |---|{dashes}---|

@@ -129,7 +129,7 @@ class TestRecordings:
         assert list(workspace.used()) == [joint]
         loggers = [written("c.csv", rows, (0, 1)), written("d.csv", rows, (0, 2))]
         other = workspace.recording(workspace.join(loggers))
-        assert all(np.array_equal(other[n], workspace.recording(joint)[n]) for n in other)
+        assert all(np.allclose(other[n], workspace.recording(joint)[n]) for n in other)
 
 
 class TestFiles:

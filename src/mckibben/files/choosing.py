@@ -27,10 +27,11 @@ from mckibben.files.request import Source
 from mckibben.files.table import Column, Table
 from mckibben.files.units import find, weight
 from mckibben.recording import COMMAND, REFERENCE, REST_LENGTH, conversion
+from mckibben.system.atomic import Numbers
 
 
 @dataclass(frozen=True)
-class Seen:
+class Seen(Numbers):
     """A column of a file, as shown in an import, with its ``first`` cells and all its numbers.
 
     The unit is empty where the file states none, and ``channel``, which it is read as, where it is left

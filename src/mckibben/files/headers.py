@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from mckibben.channels import QUANTITIES
-from mckibben.files.names import AMBIGUOUS, CHANNELS, ROLES, UNITS, words_of
+from mckibben.files.names import AMBIGUOUS, CHANNELS, MEASURED, ROLES, UNITS, words_of
 from mckibben.files.units import COUNTS, GAUGE, find, find_listed, weight
 from mckibben.recording import base_name, standard_unit
 
@@ -18,6 +18,7 @@ LONGEST = 256
 """Characters of a header."""
 
 _ROLES, _CHANNELS, _UNITS = words_of(ROLES), words_of(CHANNELS), words_of(UNITS)
+_MEASURED = words_of(MEASURED)
 _ATTACHED = re.compile("|".join(w for w in sorted(_ROLES, key=len, reverse=True) if w > "\u3000"))
 """Words for the ends of a loop that languages without blanks put before the channel: 目標圧力."""
 _EXTENSOR = {"extensor", "ext"}
@@ -160,11 +161,16 @@ def by_words(units: Mapping[str, str]) -> dict[str, str]:
     {'zylinderdruck': 'pressure', 'loadcell_force_z': 'force'}
     >>> by_words({"pam1_pressure": "bar", "pam2_pressure": "bar", "관절각도": "rad"})
     {'pam1_pressure': 'pressure_1', 'pam2_pressure': 'pressure_2', '관절각도': 'angle'}
+    >>> by_words({"p_ist": "bar", "p_soll": "bar"})
+    {'p_ist': 'pressure'}
     """
     found: dict[str, list[str]] = {}
     for name, unit in units.items():
-        meant = {*filter(None, map(_in_word, name.split("_")))}
-        other = {*_ABOUT, *_ROLES, *_REFERENCES} & {*name.split("_")}
+        words = name.split("_")
+        rest = "_".join(word for word in words if word not in _MEASURED)
+        plain = _standard(rest) if rest != name else None
+        meant = {plain} if plain else {*filter(None, map(_in_word, words))}
+        other = {*_ABOUT, *_ROLES, *_REFERENCES} & {*words}
         if unit_of(name) is None and len(meant) == 1 and not other:
             (channel,) = meant
             if unit == unit_of(channel) and channel not in units:

@@ -76,6 +76,14 @@ ROLES: dict[str, dict[str, str]] = {
 }  # fmt: skip
 """References and commands of a loop -> words for them, used with or instead of a channel's name."""
 
+MEASURED: dict[str, dict[str, str]] = {
+    "measured": {
+        "en": "measured meas actual", "de": "istwert ist gemessen", "fr": "mesuré mesurée",
+        "it": "misurato misurata", "es pt": "medido medida", "ja": "実測 測定 測定値",
+        "zh": "实测 实测值 测量", "ko": "측정 측정값"},
+}  # fmt: skip
+"""Words for what is no reference or command, used with a channel's name."""
+
 UNITS: dict[str, dict[str, str]] = {
     "bar": {"es pt": "bares", "ja": "バール", "zh": "巴"},
     "mbar": {"en": "millibar", "es pt": "milibar", "ja": "ミリバール", "zh": "毫巴"},

@@ -110,18 +110,33 @@ def features_of(recordings: Sequence[Recording]) -> list[Features]:
     return [Features(one, spans) for one in recordings]
 
 
-def grouped(values: Sequence[float], apart: float) -> list[float]:
-    """Return every value as the mean of its group, rounded; groups lie apart by at least so much.
+def grouped(values: Sequence[float], width: float) -> list[float]:
+    """Return every value as the mean of its group, rounded; no group is wider than ``width``.
 
-    >>> grouped([0.01, 49.8, 50.3, -0.02], apart=5.0)
+    Groups lie apart by the same distance at least: where neighbours are as far apart throughout, each
+    is a group of its own.
+
+    >>> grouped([0.01, 49.8, 50.3, -0.02], width=5.0)
     [0.0, 50.0, 50.0, 0.0]
+    >>> grouped([0.0, 0.04, 0.08, 0.12], width=0.05)
+    [0.0, 0.04, 0.08, 0.12]
     """
-    ordered = np.sort(np.asarray(values, dtype=np.float64))
-    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > apart) + 1)
+    if not values:
+        return []
+    ordered, apart = np.sort(np.asarray(values, dtype=np.float64)), width
+    groups = _split(ordered, apart)
+    while max(map(np.ptp, groups)) > width:
+        apart /= 2
+        groups = _split(ordered, apart)
     digits = -int(np.floor(np.log10(apart)))
-    levels = np.array([round(float(group.mean()), digits) + 0.0 for group in groups if group.size])
-    means = np.array([group.mean() for group in groups if group.size])
+    levels = np.array([round(float(group.mean()), digits) + 0.0 for group in groups])
+    means = np.array([group.mean() for group in groups])
     return [float(levels[np.argmin(np.abs(means - value))]) for value in values]
+
+
+def _split(ordered: Array, apart: float) -> list[Array]:
+    """Return sorted values, split where neighbours are further apart."""
+    return np.split(ordered, np.flatnonzero(np.diff(ordered) > apart) + 1)
 
 
 def _cycles(samples: Array) -> list[slice]:

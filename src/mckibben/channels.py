@@ -480,12 +480,14 @@ def by_unit(one: Recording) -> dict[str, str]:
     """Return what channels of other names measure: by their units, and the number or place in the name.
 
     So ``p1`` in bar is ``pressure_1``. Where two would be the same channel, neither is. What stays above
-    half of its highest value in mm is a length, as no muscle shortens by more.
+    half of its highest value in mm is a length, as no muscle shortens by more. Commands and references
+    measure nothing.
     """
     found: dict[str, str] = {}
     for name, samples in one.channels.items():
         unit, place = one.units.get(name) or "", re.search(r"(\d+|extensor)$", name)
-        if unit in QUANTITIES and standard_unit(name) is None:
+        is_set = name.startswith((COMMAND, REFERENCE))
+        if unit in QUANTITIES and standard_unit(name) is None and not is_set:
             is_length = unit == "mm" and samples.min() > 0.5 * samples.max()
             kind = "length" if is_length else QUANTITIES[unit]
             found[name] = f"{kind}_{place[1]}" if place else kind

@@ -393,7 +393,7 @@ class Experiment:
             fields = (name for _, name, _, _ in string.Formatter().parse(text) if name)
             if {name.partition("[")[0] for name in fields} <= {*self.facts}:
                 sentences.append(text.format(**self.facts))
-        own = [] if self.data is None else [OWN, *self.absent]
+        own = [*self.paper.rig_notes] if self.data is None else [OWN, *self.absent]
         own += [] if self.of_its_size else [OTHER_SIZE]
         return Reproduction(
             self.name,

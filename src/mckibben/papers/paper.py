@@ -111,7 +111,8 @@ class Paper(_Strict):
 
     ``given`` is what is taken from the paper or set, ``found`` what the recordings determine.
     Sentences of ``summary`` have fields in braces, which the experiment fills; one without its fields
-    is left out. ``notes`` are differences from the paper, ``quick`` what a quick run omits. Commands run
+    is left out. ``notes`` are differences from the paper, ``rig_notes`` those of the virtual rig,
+    ``quick`` what a quick run omits. Commands run
     in one folder, in the order of the items, once ``record`` has. They, kinds of runs, tables, figures
     and printed models are by key.
     """
@@ -128,6 +129,7 @@ class Paper(_Strict):
     found: tuple[Words, ...]
     summary: dict[str, Words]
     notes: tuple[Words, ...]
+    rig_notes: tuple[Words, ...]
     quick: Words
     commands: dict[str, Words]
     items: tuple[Item, ...]

@@ -25,6 +25,9 @@ NOTED, UNLIKE = "as its rig noted", "like no run of the paper, not used"
 SIZE = 0.1
 """Largest difference from the paper's commands and length, relative to them, that is no other size."""
 
+EXTENSOR = "pressure_extensor"
+"""Channel of arms, whose muscles are numbered; recordings of other papers are of one muscle."""
+
 FALLS = -0.5
 """Correlation with the drive below which a shortening has the wrong sign."""
 
@@ -78,11 +81,17 @@ def recognise(name: str, data: Sequence[Recording]) -> Recognised:
     DataError
         If a channel is absent, or there are too few runs of a kind to fit anything.
     """
-    about, measured = paper(name), dict[str, str]()
-    every = dict[str, Recording]()
-    for one in data:
-        measured |= (names := by_unit(one))
-        whole = _of_one_muscle(renamed(one, names).with_derived(about.channels))
+    about = paper(name)
+    alike = [by_unit(one) for one in data]
+    muscle = _moving(renamed(one, names) for one, names in zip(data, alike, strict=True))
+    every, measured = dict[str, Recording](), dict[str, str]()
+    for one, names in zip(data, alike, strict=True):
+        names = {own: names.get(own, own) for own in one}
+        names = _of_arm(names) if EXTENSOR in about.channels else _of_muscle(names, muscle)
+        measured |= {own: channel for own, channel in names.items() if own != channel}
+        whole = renamed(one.select([*names]), names)
+        wanted = (re.sub("^length_", "displacement_", channel) for channel in whole)
+        whole = whole.with_derived([*about.channels, *wanted])
         whole.matrix(about.channels)  # raises an error for what is absent
         every[f"{one.name}, {len(every) + 1}" if one.name in every else str(one.name)] = whole
     _check_sign(every.values())
@@ -105,10 +114,35 @@ def recognise(name: str, data: Sequence[Recording]) -> Recognised:
     return Recognised(Runs(used, {n: labels[n] for n in used}), tuple(rows), measured, absent)
 
 
-def _of_one_muscle(one: Recording) -> Recording:
-    """Return a recording without channels of other muscles, such as ``length_2`` beside ``length``."""
-    others = {name for name in one if (base := re.sub(r"_\d+$", "", name)) != name and base in one}
-    return one.select([name for name in one if name not in others]) if others else one
+def _moving(data: Iterable[Recording]) -> str:
+    """Return the number of the muscle whose pressure or voltage moves most, empty without numbers."""
+    moved = {"": 0.0}
+    for one in data:
+        for name in one:
+            base, _, number = name.rpartition("_")
+            if number.isdigit() and base in ("pressure", "voltage"):
+                low, high = np.percentile(one[name], (1, 99))
+                moved[number] = max(moved.get(number, 0.0), float(high - low))
+    return max(moved, key=moved.__getitem__)
+
+
+def _of_muscle(names: Mapping[str, str], muscle: str) -> dict[str, str]:
+    """Return names without numbers of the channels of one muscle, without those of others."""
+    found = dict[str, str]()
+    for own, channel in names.items():
+        base, _, number = channel.rpartition("_")
+        if not number.isdigit():
+            found[own] = channel
+        elif number == muscle and base not in names.values():
+            found[own] = base
+    return found
+
+
+def _of_arm(names: Mapping[str, str]) -> dict[str, str]:
+    """Return names whose pressure without a number, beside those of muscles, is the extensor's."""
+    known = {*names.values()}
+    plain = "pressure_1" in known and EXTENSOR not in known
+    return {own: EXTENSOR if plain and c == "pressure" else c for own, c in names.items()}
 
 
 def _check_sign(every: Iterable[Recording]) -> None:

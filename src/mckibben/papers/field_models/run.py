@@ -101,7 +101,7 @@ def run(experiment: Experiment) -> None:
         raise KeyboardInterrupt
     experiment.says(seeds=f"{seeds[0]} to {seeds[-1]}", n_seeds=len(seeds))
     _errors_tables(experiment, tried)
-    _parameters(experiment, tried)
+    _parameters(experiment, tried, train.step)
     _board_table(experiment, board)
     shown = _summary(experiment, tried, board)
     _figures(experiment, {"calibration": train, "test": test}, tried, shown)
@@ -180,7 +180,7 @@ def _errors_tables(experiment: Experiment, tried: Mapping[str, MethodResult]) ->
     experiment.table("seeds", ["match", *each, "seeds that worked"], spread, **experiment.facts)
 
 
-def _parameters(experiment: Experiment, tried: Mapping[str, MethodResult]) -> None:
+def _parameters(experiment: Experiment, tried: Mapping[str, MethodResult], step: float) -> None:
     """Add Table 1, and the parameters of P2UZ, Box-Jenkins and PI with the printed ones."""
     models = {name: one.models for name, one in tried.items() if one.models is not None}
     match: dict[str, Any] = {name: both[1].parts[1] for name, both in models.items()}
@@ -201,7 +201,7 @@ def _parameters(experiment: Experiment, tried: Mapping[str, MethodResult]) -> No
         monic = {"C": bj.noise_numerator, "D": bj.noise_denominator, "F": bj.denominator}
         terms: dict[str, list[Cell]] = {"B": [*map(float, bj.numerator)]}
         terms |= {name: [1.0, *map(float, values)] for name, values in monic.items()}
-        experiment.table("bj", ["z^0", "z^-1", "z^-2"], terms)
+        experiment.table("bj", ["z^0", "z^-1", "z^-2"], terms, step=step)
     every = {
         "share printed": experiment.paper.printed(PRINTED_PI),
         "share by slopes": plain.get(SLOPES),

@@ -18,8 +18,8 @@ from mckibben.estimators.coupled.fuzzy import Search, printed_swarm
 from mckibben.estimators.coupled.sdchm import learned_inverse
 from mckibben.metrics import crosstalk, loop_width
 from mckibben.papers.experiment import Cell, Curves, Experiment, Verdict
-from mckibben.papers.recognising import Runs
-from mckibben.papers.sdchm.protocol import EXTENSOR, HIGHEST, PERIOD, strength
+from mckibben.papers.recognising import EXTENSOR, Runs
+from mckibben.papers.sdchm.protocol import HIGHEST, PERIOD, strength
 from mckibben.recording import REFERENCE, Recording
 from mckibben.rigs import Rig, share
 from mckibben.system.workers import Tell, all_of

@@ -19,7 +19,7 @@ import numpy as np
 
 from mckibben.channels import by_name
 from mckibben.errors import DataError
-from mckibben.papers.recognising import Labels
+from mckibben.papers.recognising import EXTENSOR, Labels
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, share
 from mckibben.rigs.setups.arm import Arm
@@ -31,8 +31,6 @@ from mckibben.signals.protocol import PlannedRun, Protocol, Role
 PERIOD, HIGHEST, DIAMETER = 50.0, 2.5, 30.0
 """Of every sine [s]; the pressure that all muscles withstand [bar], and the diameter of those that
 contract [mm], Table 1."""
-
-EXTENSOR = "pressure_extensor"
 
 PATTERNS = ("1", "2", "3", "123")
 """Muscles that are driven together; the others have no pressure."""

@@ -18,7 +18,7 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.checkpoints import Checkpoints
-from mckibben.errors import DataError, ModelWarning
+from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.papers.paper import FigureText, Paper, TableText, paper
 from mckibben.papers.recognising import Labels, Recognised, Runs, of_its_size, recognise
 from mckibben.recording import Recording
@@ -271,7 +271,8 @@ class Experiment:
         """Return the model fitted to recordings, or its stored fit.
 
         The block is one of ``models`` from then on, under its name. ``model`` is the estimator's short
-        name; ``how`` is what else its ``fit`` takes. Errors are those of its ``fit``.
+        name; ``how`` is what else its ``fit`` takes. Errors are those of its ``fit``; a model that is no
+        better than the mean is returned, with a note.
         """
         made = registry.load("estimators", model)
         estimator: Any = made(**{"seed": self.seed} | dict(settings or {}))
@@ -284,7 +285,12 @@ class Experiment:
 
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ModelWarning)
-                estimator.fit(recordings, **{"progress": heard} | how)
+                try:
+                    estimator.fit(recordings, **{"progress": heard} | how)
+                except ModelError as error:  # one that is no better than the mean is told by its errors
+                    if not hasattr(estimator, "model_"):
+                        raise
+                    self.warned[f"{name}: {error.problem}."] = None
             found = estimator.diagnostics_
             errors = tuple(getattr(found, "standard_errors", ()))
             best = tuple(cost for cost in search if np.isfinite(cost))

@@ -420,7 +420,8 @@ class Estimator(ABC):
         DataError
             On recordings that cannot be learned from.
         ModelError
-            On settings out of range, or if the model found is no better than the mean of the output.
+            On settings out of range, or if the model found is no better than the mean of the output:
+            then ``model_`` and ``diagnostics_`` are there to look at.
         """
         owner = type(self).__name__
         require_outputs(recordings, y, owner)
@@ -433,9 +434,10 @@ class Estimator(ABC):
         every = recorded(recordings, inputs, y, outputs, sample_time, owner)
         fitted = copy(self)  # a fit that fails or is interrupted leaves no traces
         with one_blas_thread(), telling(progress, "fitting") as tell:
-            fitted._fit(every, rows, tell)
+            data = fitted._fit(every, rows, tell)
         vars(self).update(vars(fitted))
         self.sample_time_ = sample_time
+        refuse_useless(self.diagnostics_, data)
         return self
 
     def _fit(
@@ -443,7 +445,7 @@ class Estimator(ABC):
         recordings: Sequence[Recording],
         rows: Sequence[Mask] | None,
         progress: Progress | None,
-    ) -> None:
+    ) -> TrainingData:
         started = time.perf_counter()
         self.check_settings()
         tracker = Tracker(progress=progress)
@@ -456,9 +458,9 @@ class Estimator(ABC):
         if elsewhere and runs.apart(runs.from_rest) > MATTERS * runs.rmse:
             runs = self._after_pasts(runs, recordings, rows, tracker)
         self.diagnostics_ = self._diagnose(runs, data, tracker, started)
-        refuse_useless(self.diagnostics_, data)
         if progress is not None:
             progress(1.0, self.diagnostics_.rmse)
+        return data
 
     def _after_pasts(
         self,

@@ -12,7 +12,7 @@ from mckibben.arrays import Array
 from mckibben.channels import by_name
 from mckibben.metrics import err, loop_width, rmse
 from mckibben.papers.experiment import Axes, Cell, Experiment, Fitted, Verdict, rms
-from mckibben.papers.recognising import EXTENSOR, Runs
+from mckibben.papers.recognising import Runs
 from mckibben.papers.sdchm import loops
 from mckibben.papers.sdchm.loops import BALANCE, OURS, PUBLISHED
 from mckibben.papers.sdchm.protocol import PATTERNS, quick

@@ -304,9 +304,10 @@ class BalanceEstimator(CoupledEstimator):
         data = scheduled_by(in_one_order(without_held(data)[0]), [*bench.scheduled, *bench.loaded])
         return self._model(self._search, of_coordinates(data, bench.sensors), tracker)
 
-    def _fit(self, *given: Any) -> None:
-        super()._fit(*given)
+    def _fit(self, *given: Any) -> TrainingData:
+        data = super()._fit(*given)
         del self._search  # needed for `find_again` only
+        return data
 
     def _model(self, search: Search, data: TrainingData, tracker: Tracker) -> Block:
         """Return the model after a last descent on all samples."""

@@ -223,6 +223,7 @@ def _sets(experiment: Experiment, runs: Runs) -> None:
         experiment.figure(kind, {str(one.name): {n: (one.time, z) for n, z in curves.items()}})
         failing = [f"{n} ({size[n]:.1f} mm)" for n in names if size[n] > size[LINEAR]]
         facts = {"best": size[best], "worst": rows[best][len(outputs)], "linear": size[LINEAR]}
+        facts["other"] = size[BALANCE if best == OURS else OURS]
         facts["all"] = ", ".join(f"{name} {value:.2f} mm" for name, value in size.items())
         facts |= {"failing": ", ".join(failing)} if failing else {}
         experiment.says(best=best, on="validation" if held else "training")

@@ -31,8 +31,9 @@ from mckibben.control import track
 from mckibben.measured.running import span_of
 from mckibben.measured.sets import parted, sets_in
 from mckibben.papers.activation_pressure.protocol import FORCES
+from mckibben.papers.recognising import EXTENSOR
 from mckibben.papers.sdchm.loops import MOVES, held, widths
-from mckibben.papers.sdchm.protocol import EXTENSOR, PERIOD
+from mckibben.papers.sdchm.protocol import PERIOD
 from mckibben.registry import load
 from mckibben.rigs import record
 from mckibben.signals import random_wave

@@ -16,6 +16,7 @@ from mckibben.blocks.base import Block
 from mckibben.control import Controller, tune_pid
 from mckibben.estimators.coupled.fuzzy import Search, printed_swarm
 from mckibben.estimators.coupled.sdchm import learned_inverse
+from mckibben.papers.recognising import EXTENSOR
 from mckibben.papers.sdchm.loops import (
     BALANCE,
     INDIVIDUAL,
@@ -31,7 +32,6 @@ from mckibben.papers.sdchm.loops import (
     F,
     held,
 )
-from mckibben.papers.sdchm.protocol import EXTENSOR
 from mckibben.papers.sdchm.run import PAPERS
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, load_rig, record

@@ -137,7 +137,8 @@ def carried(model: Block) -> Balance:
         Else, with what is in the way.
     """
     again = (
-        "fit it with `mckibben fit balance FILES --for mjcf`, on recordings with a measured force"
+        "fit it with `mckibben fit balance FILES --for mjcf`, under a measured force, or "
+        "several masses, each a constant of its recordings"
     )
     placed = balance_in(model)
     if placed is None:

@@ -287,10 +287,12 @@ class Experiment:
                 warnings.simplefilter("ignore", ModelWarning)
                 try:
                     estimator.fit(recordings, **{"progress": heard} | how)
-                except ModelError as error:  # one that is no better than the mean is told by its errors
+                except (
+                    ModelError
+                ) as poor:  # one that is no better than the mean is told by its errors
                     if not hasattr(estimator, "model_"):
                         raise
-                    self.warned[f"{name}: {error.problem}."] = None
+                    self.warned[f"{name}: {poor.problem}."] = None
             found = estimator.diagnostics_
             errors = tuple(getattr(found, "standard_errors", ()))
             best = tuple(cost for cost in search if np.isfinite(cost))

@@ -135,7 +135,8 @@ class LoadEstimate(Block):
         if n_loads == 0:
             raise ModelError(
                 "this balance has no load to estimate",
-                remedy="identify it on recordings with a measured force",
+                remedy="identify it under several forces: measured, or of two masses or more, each a "
+                "constant of its recordings",
             )
         if any(channel.unit != "bar" for channel in self.forward.given):
             raise ModelError(

@@ -47,7 +47,7 @@ COLOURS: Mapping[str, str] = MappingProxyType(
         "series-1": "#0071b0",
         "series-2": "#e7a209",
         "series-3": "#701c46",
-        "series-4": "#da701c",
+        "series-4": "#ee5a63",
         "series-5": "#86c9ef",
         "series-6": "#0d5926",
         "series-7": "#d187b0",

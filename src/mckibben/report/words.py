@@ -311,14 +311,14 @@ WHITE = 0.01
 
 _KINDS = {
     "offset": "an offset",
-    "curve": "the curve over {channel}",
+    "curve": "the nonlinearity over {channel}",
     "load": "{channel}",
-    "hysteresis": "the branch of {channel} (hysteresis)",
-    "lag": "a lag of the output",
+    "hysteresis": "the direction of {channel} (hysteresis)",
+    "lag": "a delay of the output",
     "drift": "time within a recording (drift)",
-    "speed": "the speed of the output",
+    "speed": "the speed of the output (rate dependence)",
     "creep": "slow motion in holds (creep)",
-    "output": "the position (curve or stop)",
+    "output": "the output itself (nonlinearity or stop)",
 }
 
 
@@ -338,10 +338,10 @@ def _residual(one: OutputCheck, *, sized: bool = True) -> str:
     sizes.append(f"mean {size(one.unit, mean or 0.0)}")
     residual = f"The residual of {one.output}, {', '.join(sizes)},"
     if not one.missing:
-        return f"{residual} follows none of {len(one.suspects)} causes tested."
+        return f"{residual} is explained by none of the {len(one.suspects)} causes tested."
     first = max(one.missing, key=lambda cause: cause.share)
     of = "mean square" if first.kind == "offset" else "variance"
-    return f"{residual} follows {missed(one, first)}: {percent(first.share)} of its {of}."
+    return f"{residual} is partly explained by {missed(one, first)}: {percent(first.share)} of its {of}."
 
 
 def probability(value: float) -> str:

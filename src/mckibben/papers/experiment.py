@@ -272,7 +272,7 @@ class Experiment:
 
         The block is one of ``models`` from then on, under its name. ``model`` is the estimator's short
         name; ``how`` is what else its ``fit`` takes. Errors are those of its ``fit``; a model that is no
-        better than the mean is returned, with a note.
+        better than the mean is returned, as its errors in the tables tell.
         """
         made = registry.load("estimators", model)
         estimator: Any = made(**{"seed": self.seed} | dict(settings or {}))
@@ -287,12 +287,9 @@ class Experiment:
                 warnings.simplefilter("ignore", ModelWarning)
                 try:
                     estimator.fit(recordings, **{"progress": heard} | how)
-                except (
-                    ModelError
-                ) as poor:  # one that is no better than the mean is told by its errors
+                except ModelError:
                     if not hasattr(estimator, "model_"):
                         raise
-                    self.warned[f"{name}: {poor.problem}."] = None
             found = estimator.diagnostics_
             errors = tuple(getattr(found, "standard_errors", ()))
             best = tuple(cost for cost in search if np.isfinite(cost))

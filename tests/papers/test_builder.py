@@ -35,6 +35,15 @@ def experiment(name: str = "field-models", quick: bool = True) -> Experiment:
     )
 
 
+def test_a_model_no_better_than_the_mean_is_told_by_its_errors() -> None:
+    noise = np.random.default_rng(3).standard_normal((2, 500))
+    unrelated = Recording({"pressure": noise[0], "displacement": np.cumsum(noise[1])}, 0.1)
+    fitted = experiment().fit("ARX", "arx", unrelated)
+    assert fitted.rmse > np.std(unrelated["displacement"])
+    with pytest.raises(DataError):  # where nothing can be fitted, there is nothing to tell
+        experiment().fit("ARX", "arx", unrelated.select(["pressure"]))
+
+
 def test_papers_are_numbered_one_after_another() -> None:
     assert [each.number for each in papers().values()] == [*range(1, len(PAPERS) + 1)]
     with pytest.raises(ModelError, match="field-models"):

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from mckibben import Recording, registry
+from mckibben.channels import renamed
 from mckibben.errors import DataError
+from mckibben.files.headers import by_words
 from mckibben.papers.recognising import Recognised, of_its_size, recognise
 from mckibben.rigs import Rig, load_rig
 from mckibben.signals.protocol import PlannedRun, Protocol, protocol, scaling
@@ -111,3 +113,36 @@ def test_channels_of_other_names_are_known_by_their_units() -> None:
     found = recognise("field-models", own)
     assert found.measured == {"regulator": "pressure", "wire": "displacement"}
     assert found.runs.names("train") == ["decaying-triangle"]
+
+
+def alone(one: Recording, names: dict[str, str], **more: Any) -> Recording:
+    channels = {own: one[name] for name, own in names.items()} | more
+    units = {name: "bar" if name.startswith("p") else "mm" for name in channels}
+    return Recording(channels, one.step, units=units, meta={"name": str(one.meta["name"])})
+
+
+def test_of_several_muscles_the_one_that_moves_is_the_papers() -> None:
+    names = {"pressure": "p2_ist", "displacement": "laser2"}
+    own = []
+    for run in protocol("field-models").runs:
+        still = np.zeros(len(one := measured(run, run.name)))
+        own.append(alone(one, names, p1_ist=still, laser1=still))
+    found = recognise("field-models", [by_words_of(one) for one in own])
+    assert {*found.measured.values()} == {"pressure", "displacement"}
+    assert all("2" in own for own in found.measured)
+    assert found.runs.names("train") == ["decaying-triangle"]
+
+
+def by_words_of(one: Recording) -> Recording:
+    """Return a recording as a file of its columns is read."""
+    return renamed(one, by_words({name: one.units[name] or "" for name in one}))
+
+
+def test_beside_numbered_pressures_that_of_another_name_is_the_extensors() -> None:
+    names = {"pressure_extensor": "p_core"} | {f"pressure_{k}": f"pressure_{k}" for k in (1, 2, 3)}
+    names["displacement_1"] = "displacement_1"
+    runs = [measured(run, f"{k}") for k, run in enumerate(protocol("sdchm").runs)]
+    own = [alone(one, names) for one in runs]
+    found = recognise("sdchm", own)
+    assert found.measured == {"p_core": "pressure_extensor"}
+    assert found.absent == ""

@@ -231,6 +231,25 @@ def test_the_sheet_with_most_rows_of_numbers_is_read_or_the_one_named(
     assert refused(tmp_path / "a.csv", sheet="Run").parameter == "sheet"
 
 
+def test_sheets_with_the_same_columns_are_recordings(tmp_path: Path) -> None:
+    other = [[t, p / 2, x] for t, p, x in SOUND[:-10]]
+    path = book(tmp_path / "a.xlsx", First=[*NAMES, *SOUND], Second=NAMES + other)
+    first, second = mckibben.read(path)
+    check(first)
+    assert len(second) == len(other)
+    assert {one.meta["name"] for one in (first, second)} == {"a[First]", "a[Second]"}
+    check(one(path, sheet="First"))
+
+
+def test_structs_alike_with_times_of_their_own_are_recordings(tmp_path: Path) -> None:
+    runs = [{"name": f"run{k}", "t_s": T, "p_kPa": P / k, "Weg_cm": X} for k in (1, 2, 3)]
+    savemat(tmp_path / "a.mat", {"runs": runs})
+    first, *others = mckibben.read(tmp_path / "a.mat")
+    check(first)
+    assert [one.meta["name"] for one in others] == ["a[run2]", "a[run3]"]
+    assert others[0]["pressure"].max() == pytest.approx(first["pressure"].max() / 2)
+
+
 @pytest.mark.parametrize(
     "text",
     ["{:.4f}".format, "{:.4f} kPa".format, lambda value: f"{value:.4f}".replace(".", ","),

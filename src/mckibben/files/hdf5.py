@@ -36,7 +36,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         has_objects = matlab and "#subsystem#" in root and not _leads_out(root)
     if has_objects and (decoded := objects.variables(path)) is not None:
         found = decoded
-    return [tree.table(found, path, dot="." if matlab else "/", meta=meta)]
+    return tree.runs(found, path, dot="." if matlab else "/", meta=meta)
 
 
 def _leads_out(root: Any) -> bool:

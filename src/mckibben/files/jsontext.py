@@ -40,7 +40,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         )
     node = _node(content)
     found = node if isinstance(node, Mapping) else {"data": node}
-    return [tree.table(found, path, meta=plain_meta(about))]
+    return tree.runs(found, path, meta=plain_meta(about))
 
 
 def _content(text: str, path: Path) -> Any:

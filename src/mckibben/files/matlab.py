@@ -32,7 +32,7 @@ _OF_MATRICES = {1, 2, 3, 16, _OPAQUE}
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Read the vectors of a MAT file, of version 4 to 7.3."""
+    """Read the vectors of a MAT file, of version 4 to 7.3; of a struct array, each a recording."""
     start = file.peek(520)
     if b"\x89HDF\r\n\x1a\n" in (start[:8], start[512:520]):
         return hdf5.read(file, path)
@@ -50,7 +50,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
                 raise ValueError("two variables have one name")
             # a str is SciPy's reason why it cannot read a variable
             found[name] = Unread(value) if isinstance(value, str) else objects.node(value, name)
-    return [tree.table(found if decoded is None else decoded, path)]
+    return tree.runs(found if decoded is None else decoded, path)
 
 
 def _variables(data: bytes) -> Iterator[tuple[str, Any, int]]:

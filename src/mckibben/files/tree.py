@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +114,34 @@ def table(
             columns[place] = replace(each, header=full, alias=alias, place=full)
     found = (*columns.values(), *texts)
     return Table(found, meta=meta or {}, rates=rates, unread=unread)
+
+
+def runs(tree: Mapping[str, Node], path: Path, **how: Any) -> list[Table]:
+    """Return a table of every run of a list of structs alike that each have times, else of the tree.
+
+    ``how`` is what else `table` takes.
+    """
+    lists = {name: node for name, node in tree.items() if _is_of_runs(node)}
+    if len(lists) != 1:
+        return [table(tree, path, **how)]
+    ((variable, structs),) = lists.items()
+    others = {name: node for name, node in tree.items() if name != variable}
+    found: list[Table] = []
+    for number, one in enumerate(structs, start=1):
+        named = [node for key, node in one.items() if key in NAMES and isinstance(node, str)]
+        own = {key: node for key, node in one.items() if not isinstance(node, str)}
+        name = named[0] if named else f"{variable} {number}"
+        found.append(replace(table({**others, **own}, path, **how), name=name))
+    return found
+
+
+def _is_of_runs(node: Node) -> TypeGuard[Sequence[Mapping[str, Node]]]:
+    """Return whether a node is a list of structs with the same names, of times and something else."""
+    if not isinstance(node, list) or len(node) < 2 or not isinstance(node[0], dict):
+        return False
+    vectors = [name for name, of in node[0].items() if isinstance(of, np.ndarray) and of.size > 1]
+    timed = any(map(is_time, vectors)) and len(vectors) > 1
+    return timed and all(isinstance(one, dict) and {*one} == {*node[0]} for one in node)
 
 
 def _since_first(arrays: Mapping[Place, NDArray[Any]]) -> dict[Place, NDArray[Any]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import math
 import re
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
 from io import BufferedReader
 from pathlib import Path
@@ -27,6 +27,8 @@ _NUMBER = re.compile(r"[-+.]?\d")
 def read(file: BufferedReader, path: Path, sheet: str | None = None) -> list[Table]:
     """Read a sheet: by default the one of ``channels.toml``, or that with the most rows of numbers.
 
+    Sheets with the same columns as the latter are recordings, too.
+
     Raises
     ------
     DataError
@@ -47,10 +49,26 @@ def read(file: BufferedReader, path: Path, sheet: str | None = None) -> list[Tab
             file=path,
             remedy="save samples in columns under one line of names, or name a `sheet` with numbers",
         )
-    found = texts.parsed(text, path, ("\t",))
+    found = {name: texts.parsed(text, path, ("\t",))}
+    headers = _headers(found[name])
+    for other, (text, _, n_numbers) in texts_of.items():
+        with suppress(DataError):  # of a sheet that is no table
+            one = texts.parsed(text, path, ("\t",)) if other != name and n_numbers else None
+            if one is not None and _headers(one) == headers:
+                found[other] = one
     reason = f"one sheet is read, {name!r}: the one with most rows of numbers, or `sheet`"
-    unread = dict.fromkeys((other for other in names if other != name), reason)
-    return [replace(found, unread={**found.unread, **unread})]
+    unread = dict.fromkeys((other for other in names if other not in found), reason)
+    return [
+        replace(
+            found[one], unread={**found[one].unread, **unread}, name=one if len(found) > 1 else None
+        )
+        for one in names
+        if one in found
+    ]
+
+
+def _headers(table: Table) -> list[str]:
+    return [column.header for column in table.columns]
 
 
 def sheets(path: Path) -> list[str]:

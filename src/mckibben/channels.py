@@ -476,7 +476,7 @@ def _loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tupl
     return found if len(found) < len(inputs) else ()
 
 
-def by_unit(one: Recording) -> dict[str, str]:
+def by_unit(channels: Mapping[str, Array], units: Mapping[str, str]) -> dict[str, str]:
     """Return what channels of other names measure: by their units, and the number or place in the name.
 
     So ``p1`` in bar is ``pressure_1``. Where two would be the same channel, neither is. What stays above
@@ -484,14 +484,14 @@ def by_unit(one: Recording) -> dict[str, str]:
     measure nothing.
     """
     found: dict[str, str] = {}
-    for name, samples in one.channels.items():
-        unit, place = one.units.get(name) or "", re.search(r"(\d+|extensor)$", name)
+    for name, samples in channels.items():
+        unit, place = units[name], re.search(r"(\d+|extensor)$", name)
         is_set = name.startswith((COMMAND, REFERENCE))
         if unit in QUANTITIES and standard_unit(name) is None and not is_set:
             is_length = unit == "mm" and samples.min() > 0.5 * samples.max()
             kind = "length" if is_length else QUANTITIES[unit]
             found[name] = f"{kind}_{place[1]}" if place else kind
-    counts = Counter([*found.values(), *one.channels])
+    counts = Counter([*found.values(), *channels])
     return {name: channel for name, channel in found.items() if counts[channel] == 1}
 
 

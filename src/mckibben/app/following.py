@@ -108,10 +108,11 @@ def uses(workspace: Workspace, name: str) -> dict[str, str]:
 
 
 def having(workspace: Workspace, use: str) -> list[str]:
-    """Return the models that can be used as something; those not recommended come last."""
-    refused = {row["name"] for row in workspace.results() if row.get("not_recommended")}
+    """Return the models that can be used so; those not recommended, or on other data, are last."""
+    rows = {row["name"]: row for row in workspace.results()}
+    last = {name for name, row in rows.items() if row.get("not_recommended") or not row["current"]}
     names = [name for name in workspace.models() if use in uses(workspace, name)]
-    return sorted(names, key=lambda name: name in refused)
+    return sorted(names, key=lambda name: name in last)
 
 
 def estimate(workspace: Workspace, name: str, recording: str) -> Simulation:

@@ -153,7 +153,7 @@ def fit(
     allow_shared: bool = False,
     seed: int = 0,
 ) -> str:
-    """Fit, validate and test a model as `mckibben.compare` does; a fit done again takes its place."""
+    """Fit, validate and test a model as `mckibben.compare` does, in place of one on the same data."""
     (train, test), data = workspace.train_and_test(), workspace.digest()
     plan = plan_of(
         *(train, test),
@@ -164,7 +164,7 @@ def fit(
     board, (row,) = last.board, last.board.rows
     if row.reason is not None or row.block is None:
         raise ModelError((row.reason or "it gave no model: try other settings").rstrip("."))
-    about: Json = {"model": model, "input": board.input, "output": board.output}
+    about: Json = {"model": model, "input": board.input, "output": board.output, "data": data}
     about["load"] = ", ".join(board.loads)
     olds = {name: workspace.read("results", name) or {} for name in workspace.names("results")}
     same = (n for n, old in olds.items() if all(old.get(key) == about[key] for key in about))
@@ -177,7 +177,7 @@ def fit(
     told["compensator"] = None if undone is None else undone.to_dict()
     told["no_compensator"] = refused.get(row.model, "")
     told["notes"] = [*board.notes, *row.diagnostics.get("notes", ())]
-    workspace.save_model(name, row.block, row.to_dict() | about | told | {"data": data})
+    workspace.save_model(name, row.block, row.to_dict() | about | told)
     by = "fit" if row.validation_rmse is None else board.chosen_by
     errors = [f"{numeral(x, 3)} {board.unit}".strip() for x in (row.chosen_by, row.test_error)]
     return f"{words.CHOICES[by][0]} {errors[0]}, test RMSE {errors[1]}"

@@ -6,6 +6,7 @@ Every job is given its file, its options, and what all have in common: ``model``
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,7 +61,7 @@ def code(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json
     if path.suffix == ".xml":
         export(found, to, "mjcf", force=True, **options)
         return f"{file} is written"
-    target: Any = next((x for x in ("c", "ros2") if file.endswith(f"-{x}.zip")), "fmu")
+    target: Any = next((x for x in ("c", "ros2") if re.search(rf"-{x}(-\d+)?\.zip$", file)), "fmu")
     name = "".join(c if c.isalnum() else "_" for c in path.stem).strip("_")
     given: Json = {"name": name.lower() if target == "ros2" else name, "force": True} | options
     given["sample_time"] = None

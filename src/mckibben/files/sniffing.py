@@ -30,8 +30,11 @@ _STATED = {
     mark: re.compile(
         r"(?<![A-Za-z])(?P<name>(?P<rate>(?:sampl(?:e|ing)|frame|scan|acquisition)[ _]?"
         r"(?:rate|freq(?:uency)?)|samples per second"
+        r"|abtast(?:rate|frequenz)|(?:fréquence|taux) d'échantillonnage|frequenza di campionamento"
+        r"|frecuencia de muestreo|frequência de amostragem|サンプリング(?:周波数|レート)|采样(?:频率|率)"
         r"|(?-i:fs|Fs|Trajectories|NO_OF_FRAMES[\s\S]*?\nFREQUENCY))"
         r"|sampl(?:e|ing)[ _]?(?:interval|increment|step|period)|sample[ _]?time"
+        r"|abtast(?:zeit|intervall)|サンプリング(?:間隔|周期)|采样(?:间隔|周期)"
         r"|time[ _]?(?:interval|increment|step)|x[ _]?increment|delta[ _]?x|(?-i:dt|Ts))"
         r"\b[ \"]*[\[(]?(?P<in>[A-Za-zµμ]*)[\])]?[\s\",;:=|]+"
         rf"(?P<value>\d+(?:[{mark}]\d+)?(?:e[+-]?\d+)?)(?![.,']?\d)[ ]?(?P<unit>[A-Za-zµμ]*)",

@@ -5,6 +5,7 @@ A paper's module says what is recorded, fitted and compared; every word of it is
 
 from __future__ import annotations
 
+import re
 import string
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -350,7 +351,7 @@ class Experiment:
     def _compares(self, text: TableText, name: Cell) -> bool:
         """Return whether a row or column of some name has a meaning for a rig of this size."""
         relative = "[%]" in str(name) or name in text.relative
-        return self.of_its_size or relative or "printed" not in str(name)
+        return self.of_its_size or relative or not re.search(r"(^|, )printed$", str(name))
 
     def _columns(
         self, text: TableText, ours: Mapping[str, Sequence[Cell]]

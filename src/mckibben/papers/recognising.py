@@ -25,6 +25,9 @@ NOTED, UNLIKE = "as its rig noted", "like no run of the paper, not used"
 SIZE = 0.1
 """Largest difference from the paper's commands and length, relative to them, that is no other size."""
 
+PEAK = 99.5
+"""Percentile that is the highest value of a run, beyond which a regulator overshoots."""
+
 EXTENSOR = "pressure_extensor"
 """Channel of arms, whose muscles are numbered; recordings of other papers are of one muscle."""
 
@@ -82,14 +85,11 @@ def recognise(name: str, data: Sequence[Recording]) -> Recognised:
         If a channel is absent, or there are too few runs of a kind to fit anything.
     """
     about = paper(name)
-    alike = [by_unit(one) for one in data]
-    muscle = _moving(renamed(one, names) for one, names in zip(data, alike, strict=True))
-    every, measured = dict[str, Recording](), dict[str, str]()
-    for one, names in zip(data, alike, strict=True):
-        names = {own: names.get(own, own) for own in one}
-        names = _of_arm(names) if EXTENSOR in about.channels else _of_muscle(names, muscle)
-        measured |= {own: channel for own, channel in names.items() if own != channel}
-        whole = renamed(one.select([*names]), names)
+    names = _channels(data, of_arm=EXTENSOR in about.channels)
+    measured = {own: channel for own, channel in names.items() if own != channel}
+    every = dict[str, Recording]()
+    for one in data:
+        whole = renamed(one.select([own for own in one if own in names]), names)
         wanted = (re.sub("^length_", "displacement_", channel) for channel in whole)
         whole = whole.with_derived([*about.channels, *wanted])
         whole.matrix(about.channels)  # raises an error for what is absent
@@ -114,39 +114,40 @@ def recognise(name: str, data: Sequence[Recording]) -> Recognised:
     return Recognised(Runs(used, {n: labels[n] for n in used}), tuple(rows), measured, absent)
 
 
-def _moving(data: Iterable[Recording]) -> str:
-    """Return the number of the muscle whose pressure or voltage moves most, empty without numbers."""
-    moved = {"": 0.0}
-    for one in data:
-        for name in one:
-            base, _, number = name.rpartition("_")
-            if number.isdigit() and base in ("pressure", "voltage"):
-                low, high = np.percentile(one[name], (1, 99))
-                moved[number] = max(moved.get(number, 0.0), float(high - low))
-    return max(moved, key=moved.__getitem__)
-
-
-def _of_muscle(names: Mapping[str, str], muscle: str) -> dict[str, str]:
-    """Return names without numbers of the channels of one muscle, without those of others."""
+def _channels(data: Sequence[Recording], *, of_arm: bool) -> dict[str, str]:
+    """Return own names of channels and what they are: by their names, units, and what moves most."""
+    units = {name: one.units.get(name) or "" for one in data for name in one}
+    samples = {name: np.concatenate([one[name] for one in data if name in one]) for name in units}
+    known = {name: name for name in units} | by_unit(samples, units)
+    if of_arm:
+        plain = {"pressure_1"} <= {*known.values()} and EXTENSOR not in known.values()
+        return {own: EXTENSOR if plain and c == "pressure" else c for own, c in known.items()}
+    each: dict[str, dict[str, str]] = {}
+    for own, channel in known.items():
+        base, number = re.fullmatch(r"(.*?)_?(\d*)", channel).groups()  # type: ignore[union-attr]
+        each.setdefault(base, {})[number] = own
+    muscle = ""
+    for drive in ("voltage", "pressure"):
+        numbered = each.get(drive, {})
+        moved = {n: np.ptp(np.percentile(samples[own], (1, 99))) for n, own in numbered.items()}
+        muscle = max(moved, key=moved.__getitem__) if len(moved) > 1 else muscle
     found = dict[str, str]()
-    for own, channel in names.items():
-        base, _, number = channel.rpartition("_")
-        if not number.isdigit():
-            found[own] = channel
-        elif number == muscle and base not in names.values():
-            found[own] = base
+    for base, by_number in each.items():
+        likely = (muscle, "", *by_number) if len(by_number) == 1 else (muscle, "")
+        number = next((one for one in likely if one in by_number), None)
+        found |= {} if number is None else {by_number[number]: base}
     return found
 
 
-def _of_arm(names: Mapping[str, str]) -> dict[str, str]:
-    """Return names whose pressure without a number, beside those of muscles, is the extensor's."""
-    known = {*names.values()}
-    plain = "pressure_1" in known and EXTENSOR not in known
-    return {own: EXTENSOR if plain and c == "pressure" else c for own, c in names.items()}
-
-
-def _check_sign(every: Iterable[Recording]) -> None:
-    """Raise an error where a shortening falls as its drive rises: it may be a length."""
+def _check_sign(every: Collection[Recording]) -> None:
+    """Raise an error where pulls are negative, or a shortening falls as its drive rises."""
+    pulls = [(float(one["force"].mean()), one) for one in every if "force" in one]
+    if pulls and sum(force for force, _ in pulls) < FALLS * sum(abs(force) for force, _ in pulls):
+        problem, remedy = (
+            "it is negative, and a pull is positive",
+            "turn it with `calibration[force]=-1:0`",
+        )
+        raise DataError(problem, file=pulls[0][1].source, channel="force", remedy=remedy)
     for drive, moved in product(("pressure", "voltage"), ("displacement", "contraction")):
         pairs = [
             (one[drive], one[moved], one) for one in every if {drive, moved} <= {*one.channels}
@@ -194,7 +195,7 @@ def _highest(every: Iterable[tuple[Recording, Mapping[str, float]]]) -> dict[str
     """Return the highest value of every channel, to which something may be added."""
     highest = dict[str, float]()
     for one, more in every:
-        for channel, (_, high) in one.ranges.items():
-            value = high + more.get(channel, 0.0)
+        for channel, samples in one.channels.items():
+            value = float(np.percentile(samples, PEAK)) + more.get(channel, 0.0)
             highest[channel] = max(value, highest.get(channel, value))
     return highest

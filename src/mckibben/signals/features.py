@@ -34,7 +34,10 @@ HINTS: Mapping[Role, str] = {
     "validation": "valid",
     "test": "test",
 }
-"""Of a role, in the name of a file."""
+"""Of a role, at the beginning of a word in the name of a file."""
+
+STILL = 0.02
+"""Share of the widest range of channels of a unit within which one is noise."""
 
 
 @dataclass(frozen=True)
@@ -78,15 +81,14 @@ class Features:
         """Return the highest frequency with power beyond noise, of a random wave [Hz]."""
         x = self.recording[channel]
         power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size))) ** 2
-        place = int(np.flatnonzero(power > NOISE * power.max())[-1])
+        place = int(np.flatnonzero(power >= NOISE * power.max())[-1]) if np.ptp(x) > 0 else 0
         return place / (x.size * self.recording.step)
 
     @cached_property
     def hint(self) -> Role | None:
         """Role by the name of its file."""
-        found = [
-            r for r, words in HINTS.items() if re.search(words, str(self.recording.name), re.I)
-        ]
+        name = str(self.recording.name)
+        found = [r for r, words in HINTS.items() if re.search(rf"(?<![a-z])({words})", name, re.I)]
         return found[0] if len(found) == 1 else None
 
     def _durations(self, channel: str) -> Array:
@@ -106,37 +108,43 @@ def features_of(recordings: Sequence[Recording]) -> list[Features]:
             low, high = np.percentile(samples, (1, 99))
             lows[channel] = min(low, lows.get(channel, np.inf))
             highs[channel] = max(high, highs.get(channel, -np.inf))
-    spans = {channel: max(highs[channel] - lows[channel], 1e-9) for channel in lows}
+    units = {channel: one.units.get(channel) for one in recordings for channel in one}
+    widest = dict[str | None, float]()
+    for channel, unit in units.items():
+        widest[unit] = max(widest.get(unit, 1e-9), highs[channel] - lows[channel])
+    spans = {
+        channel: max(highs[channel] - lows[channel], STILL / MOVES * widest[unit])
+        for channel, unit in units.items()
+    }
     return [Features(one, spans) for one in recordings]
 
 
 def grouped(values: Sequence[float], width: float) -> list[float]:
     """Return every value as the mean of its group, rounded; no group is wider than ``width``.
 
-    Groups lie apart by the same distance at least: where neighbours are as far apart throughout, each
-    is a group of its own.
+    A group that would be wider is split by half the distance: where neighbours are as far apart
+    throughout, each is a group of its own.
 
     >>> grouped([0.01, 49.8, 50.3, -0.02], width=5.0)
     [0.0, 50.0, 50.0, 0.0]
     >>> grouped([0.0, 0.04, 0.08, 0.12], width=0.05)
     [0.0, 0.04, 0.08, 0.12]
     """
-    if not values:
-        return []
-    ordered, apart = np.sort(np.asarray(values, dtype=np.float64)), width
-    groups = _split(ordered, apart)
-    while max(map(np.ptp, groups)) > width:
-        apart /= 2
-        groups = _split(ordered, apart)
-    digits = -int(np.floor(np.log10(apart)))
-    levels = np.array([round(float(group.mean()), digits) + 0.0 for group in groups])
-    means = np.array([group.mean() for group in groups])
-    return [float(levels[np.argmin(np.abs(means - value))]) for value in values]
+    if not values or width <= 0:
+        return [*values]
+    groups = _split(np.sort(np.asarray(values, dtype=np.float64)), width, width)
+    means = np.array([group.mean() for group, _ in groups])
+    digits = -int(np.floor(np.log10(min(apart for _, apart in groups))))
+    levels = [round(float(mean), digits) + 0.0 for mean in means]
+    return [levels[np.argmin(np.abs(means - value))] for value in values]
 
 
-def _split(ordered: Array, apart: float) -> list[Array]:
-    """Return sorted values, split where neighbours are further apart."""
-    return np.split(ordered, np.flatnonzero(np.diff(ordered) > apart) + 1)
+def _split(ordered: Array, apart: float, width: float) -> list[tuple[Array, float]]:
+    """Return sorted values, split where neighbours are further apart, until none is too wide."""
+    found: list[tuple[Array, float]] = []
+    for group in np.split(ordered, np.flatnonzero(np.diff(ordered) > apart) + 1):
+        found += [(group, apart)] if np.ptp(group) <= width else _split(group, apart / 2, width)
+    return found
 
 
 def _cycles(samples: Array) -> list[slice]:

@@ -123,7 +123,11 @@ def _empty(state: State, tab: str) -> None:
             "It computes the commands for a desired motion. Fit a model that "
             "has one, such as gpi for one muscle, or balance or sdchm for several."
         )
+    rows = [row for row in state.workspace.results() if row["current"] and tab != "force"]
     with widgets.card(), widgets.empty("moving", title, text):
+        for row in rows:
+            if why := row.get("no_compensator"):
+                widgets.error_box(f"{row['name']}: {why}")
         ui.link("Models →", "/models")
 
 
@@ -139,10 +143,11 @@ def _wish(state: State) -> Json:
     """Return the motion that is wanted of the chosen model: made by default, or the newest that ran."""
     workspace, name = state.workspace, _able(state)
     wish: Json = state.chosen.get("compensate.wish", {})
+    data = (workspace.read("results", name) or {}).get("data", "")
     asked = [[*some] for some in following.asked_for(workspace, name)]
-    if asked == [[*wish.get("channels", {})], [*wish.get("held", {})]]:
+    if [data, *asked] == [wish.get("data"), [*wish.get("channels", {})], [*wish.get("held", {})]]:
         return wish
-    wish = state.chosen["compensate.wish"] = following.wish(workspace, name)
+    wish = state.chosen["compensate.wish"] = following.wish(workspace, name) | {"data": data}
     for one in [*_runs(state).values()][:1]:
         with suppress(MckibbenError):  # it may be gone
             _take(wish, following.read_run(workspace, one["reference"]), one["reference"])
@@ -277,6 +282,7 @@ def _compensator(state: State, name: str) -> None:
 
 def _expected(state: State, name: str) -> None:
     """Show the error to expect of the model's compensator, or why it is not recommended."""
+    parts.warn_of_other_data(state, name)
     row = state.workspace.read("results", name) or {}
     if own := row.get("compensator"):
         mark(ui.label(words.expected(own)), "expected")

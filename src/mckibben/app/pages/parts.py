@@ -117,6 +117,18 @@ def model_of(state: State, names: Sequence[str]) -> str:
     return state.model if state.model in names else names[0]
 
 
+def on_other_data(state: State) -> set[str]:
+    """Return the models that were fitted to recordings that are no longer these."""
+    return {row["name"] for row in state.workspace.results() if not row["current"]}
+
+
+def warn_of_other_data(state: State, name: str) -> None:
+    """Say where a model is of other recordings."""
+    if name in on_other_data(state):
+        with mark(ui.element("div"), "other-data"):
+            widgets.error_box(f"{name} was fitted to other recordings than those in use now.")
+
+
 def select_model(state: State, names: Sequence[str], name: str = "model") -> None:
     """Let one of some models be chosen."""
 
@@ -124,7 +136,9 @@ def select_model(state: State, names: Sequence[str], name: str = "model") -> Non
         state.model = str(event.value)
         state.changed()
 
-    field = ui.select([*names], value=model_of(state, names), label="Model", on_change=chosen)
+    stale = on_other_data(state)
+    options = {one: f"{one} · other data" if one in stale else one for one in names}
+    field = ui.select(options, value=model_of(state, names), label="Model", on_change=chosen)
     mark(field.props("dense outlined"), name)
 
 

@@ -40,7 +40,8 @@ def page(state: State) -> None:
             return
         if models:
             uses = following.uses(state.workspace, state.model)
-            if state.chosen.get("takeaway.take-use") not in uses:
+            if state.chosen.get("takeaway.of") != state.model:
+                state.chosen["takeaway.of"] = state.model
                 usual = state.chosen.get("compensate.form", "inverse")
                 usual = usual if usual in uses else next(reversed(uses))
                 state.chosen["takeaway.take-use"] = usual

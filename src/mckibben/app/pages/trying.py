@@ -34,6 +34,7 @@ def force(state: State, names: list[str]) -> None:
         ui.label(text).classes("muted")
         with widgets.row(classes="fields"):
             parts.select_model(state, names)
+            parts.warn_of_other_data(state, parts.model_of(state, names))
             of = {name: fitting[name] for name in order}
             parts.select(state, "compensate.recording", of, "Recording", estimated.refresh)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from mckibben.app import modelling
+from mckibben.app import following, modelling
 from mckibben.app.modelling import comparable, offered, sides_of
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
@@ -39,6 +39,27 @@ def test_offers_follow_the_recordings(workspace: Workspace) -> None:
     with pytest.raises(DataError) as raised:
         offered(workspace, sides)
     assert raised.value.remedy
+
+
+def test_models_of_other_recordings_stay_and_come_last(workspace: Workspace) -> None:
+    modelling.fit(workspace, silent, model="gpi", **GIVEN)
+    first = workspace.path("models", "gpi.json").read_bytes()
+    train = next(entry.name for entry in workspace.entries() if entry.role == "train")
+    workspace.split(train, len(workspace.recording(train)) // 2)
+    modelling.fit(workspace, silent, model="gpi", **GIVEN)
+    assert workspace.path("models", "gpi.json").read_bytes() == first
+    assert following.having(workspace, "inverse") == ["gpi-2", "gpi"]
+
+
+def test_commands_are_tried_on_models_that_they_drive(workspace: Workspace) -> None:
+    modelling.fit(workspace, silent, model="gpi", **GIVEN)
+    written = workspace.path("models", "gpi.json").read_text(encoding="utf-8")
+    for name in ("first", "second"):
+        of_command = written.replace('"pressure"', '"command_pressure"')
+        workspace.path("models", f"{name}.json").write_text(of_command, encoding="utf-8")
+    assert workspace.model("first").inputs[0].name == "command_pressure"
+    assert [*following.plants(workspace, "first")][-1] == "model first"
+    assert "model second" in following.plants(workspace, "first")
 
 
 def test_jobs_write_results_that_compare(workspace: Workspace) -> None:

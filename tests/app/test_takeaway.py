@@ -40,6 +40,7 @@ def test_code_and_recordings_are_written(workspace: Workspace) -> None:
         work(workspace, silent, file=file, options=options, of=OF)
 
     take(taking.code, "a-c.zip", single=True)
+    take(taking.code, "a-c-2.zip")  # taken a second time
     take(taking.code, "b-ros2.zip")
     take(taking.code, "c.json")
     take(taking.recordings, "r.zip")
@@ -51,6 +52,7 @@ def test_code_and_recordings_are_written(workspace: Workspace) -> None:
     assert '<general name="m"' in (folder / "m.xml").read_text()
     held = {p.name: zipfile.ZipFile(p).namelist() for p in folder.glob("*.zip")}
     assert {"a_c.c", "a_c.h"} <= {Path(name).name for name in held["a-c.zip"]}
+    assert {"a_c_2.c", "a_c_2.h"} <= {Path(name).name for name in held["a-c-2.zip"]}
     assert any(name.endswith("package.xml") for name in held["b-ros2.zip"])
     assert {name.partition("/")[0] for name in held["r.zip"]} == {"train", "test"}
     assert [c.name for c in mckibben.load(folder / "c.json").outputs] == ["pressure"]

@@ -22,10 +22,10 @@ from mckibben.app.modelling import Json, stored_items
 from mckibben.app.workspace import Workspace
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.fields import Channel
+from mckibben.blocks.fields import Channel, drives
 from mckibben.blocks.ranges import known_ranges
 from mckibben.errors import DataError, MckibbenError, ModelError
-from mckibben.recording import REFERENCE, Recording
+from mckibben.recording import COMMAND, REFERENCE, Recording
 
 if TYPE_CHECKING:
     from mckibben.simulation import Simulation
@@ -68,7 +68,6 @@ DRAWN = 2000
 
 def made(workspace: Workspace, name: str, use: str, settings: Mapping[str, Any]) -> Block:
     """Return a model of the folder as one of `USES`; `ModelError` if it cannot be that."""
-    from mckibben.blocks.fields import drives
     from mckibben.workflow import invert
 
     if use == "model":
@@ -404,13 +403,16 @@ def plants(workspace: Workspace, name: str) -> dict[str, str]:
     from mckibben.rigs import rig_names
 
     block = workspace.model(name)
-    inputs, outputs = ({channel.name for channel in ends} for ends in (block.inputs, block.outputs))
+    # a plant is driven by what a recording has as a command
+    inputs = {channel.name.removeprefix(COMMAND) for channel in block.inputs}
+    outputs = {channel.name for channel in block.outputs}
 
     def fits(plant: str) -> bool:
         with suppress(MckibbenError):
             there = plant_of(workspace, plant)
             more = {*there.inputs} - inputs
-            driven = any(one.startswith(("pressure", "voltage")) for one in more)
+            units = getattr(there, "units", {})  # channels of rigs have standard names
+            driven = any(drives(Channel(one, units.get(one, ""))) for one in more)
             return inputs <= {*there.inputs} and outputs <= {*there.outputs} and not driven
         return False
 

@@ -79,12 +79,12 @@ def jobs_of(state: State, kinds: Sequence[str]) -> list[Job]:
 def select(
     state: State, key: str, options: dict[str, str], label: str, changed: Callable[[], Any]
 ) -> str:
-    """Let one of some options be chosen, the first by default; return which is."""
+    """Let one of some options be chosen, the first by default; return which is, empty without any."""
     if state.chosen.get(key) not in options:
-        state.chosen[key] = next(iter(options), "")
+        state.chosen[key] = next(iter(options), None)  # what a field without options has
     field = ui.select(options, label=label).bind_value(state.chosen, key).props("dense outlined")
     mark(field, key.partition(".")[2]).on_value_change(lambda _: changed())
-    return str(state.chosen[key])
+    return str(state.chosen[key] or "")
 
 
 def several(

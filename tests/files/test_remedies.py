@@ -70,6 +70,16 @@ def test_a_second_question_with_one_answer_is_answered_at_once(tmp_path: Path) -
     assert one(path, **options)["force"] == pytest.approx(9.80665 * Y)
 
 
+def test_a_unit_is_that_of_all_channels_that_are_numbered_alike(tmp_path: Path) -> None:
+    path = put(
+        tmp_path / "a.csv", "t_ms,p1,p2,p3,p4,displacement_mm", 20 * T * 50, *[100 * P] * 4, Y
+    )
+    (first, *_) = refused(path).options
+    assert first == {"units": {f"pressure_{k}": "kPa" for k in (1, 2, 3, 4)}}
+    found = one(path, **first)
+    assert all(found[f"pressure_{k}"].max() == pytest.approx(P.max(), rel=1e-3) for k in (1, 4))
+
+
 def test_an_option_without_a_value_takes_back_what_was_stated() -> None:
     request = Request(units={"contraction": "mm"}, rate=50.0)
     more = {"units": {"contraction": None, "displacement": "mm"}, "rate": None}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -56,16 +57,20 @@ def _outcomes(
     error: DataError, request: Request, works: Callable[[Request], bool], steps: int
 ) -> Iterator[tuple[Mapping[str, Any], DataError | None]]:
     """Yield the options of an error that lead on, each with the error that remains, or None."""
-    for options in error.options:
+    each = [*reversed(error.options)]
+    while each:
+        options = each.pop()
         try:
             changed = request.changed(options)
             with warnings.catch_warnings(), noted():
                 warnings.simplefilter("ignore")
                 nothing_else = works(changed)
         except DataError as further:
-            if (further.channel, further.problem) == (error.channel, error.problem):
-                continue
-            if not further.options:
+            if alike := _answered(options, further):
+                each.append(merged(options, alike))
+            elif (further.channel, further.problem) == (error.channel, error.problem):
+                pass
+            elif not further.options:
                 yield options, further
             elif steps > 1:
                 later = list(_outcomes(further, changed, works, steps - 1))
@@ -77,3 +82,16 @@ def _outcomes(
             continue
         if nothing_else:
             yield options, None
+
+
+def _answered(options: Mapping[str, Any], further: DataError) -> Mapping[str, Any]:
+    """Return the unit of a channel for one numbered alike that is asked for next; empty if it is not."""
+
+    def base(channel: str | None) -> str:
+        return re.sub(r"_?\d+$", "", channel or "")
+
+    given = options.get("units", {})
+    alike = {unit for name, unit in given.items() if base(name) == base(further.channel)}
+    answers = [one for one in further.options if {*one} == {"units"}]
+    known = (one for one in answers if {*one["units"].values()} == alike)
+    return {} if further.channel in given else next(known, {})

@@ -13,6 +13,7 @@ from mckibben.errors import DataError
 from mckibben.files.headers import by_words
 from mckibben.papers.recognising import Recognised, of_its_size, recognise
 from mckibben.rigs import Rig, load_rig
+from mckibben.signals.features import grouped
 from mckibben.signals.protocol import PlannedRun, Protocol, protocol, scaling
 
 SMALLER: dict[str, dict[str, Any]] = {
@@ -146,3 +147,35 @@ def test_beside_numbered_pressures_that_of_another_name_is_the_extensors() -> No
     found = recognise("sdchm", own)
     assert found.measured == {"p_core": "pressure_extensor"}
     assert found.absent == ""
+
+
+def test_a_supply_beside_the_muscle_is_not_its_pressure() -> None:
+    own = []
+    for run in protocol("field-models").runs:
+        supply = np.full(len(one := measured(run, run.name)), 7.0)
+        own.append(alone(one, {"pressure": "pressure_1", "displacement": "wire"}, p_supply=supply))
+    found = recognise("field-models", own)
+    assert found.measured["pressure_1"] == "pressure"
+    assert max(one["pressure"].max() for one in found.runs.values()) < 7.0
+
+
+def test_what_a_channel_measures_is_the_same_in_all_runs() -> None:
+    own = []
+    for place, run in enumerate(protocol("field-models").runs):
+        one = measured(run, f"{place}")
+        wire = 200.0 * (place % 2) + 10 * one["pressure"]  # alone, one of two is as a length
+        own.append(alone(one, {"pressure": "pressure"}, wire=wire))
+    assert recognise("field-models", own).measured == {"wire": "displacement"}
+
+
+def test_pulls_of_the_wrong_sign_are_refused() -> None:
+    own = [measured(run, run.name) for run in protocol("mpi-narmax").runs]
+    turned = [one.with_channels(force=-one["force"]) for one in own]
+    with pytest.raises(DataError) as refused:
+        recognise("mpi-narmax", turned)
+    assert refused.value.channel == "force"
+
+
+def test_levels_are_split_where_their_group_is_too_wide() -> None:
+    assert grouped([49, 50, 51, 52, 53, 54, 200, 201], 4.0)[-2:] == [200.0, 200.0]
+    assert grouped([0.0, 0.1], 0.0) == [0.0, 0.1]

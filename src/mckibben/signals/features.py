@@ -134,8 +134,8 @@ def grouped(values: Sequence[float], width: float) -> list[float]:
         return [*values]
     groups = _split(np.sort(np.asarray(values, dtype=np.float64)), width, width)
     means = np.array([group.mean() for group, _ in groups])
-    digits = -int(np.floor(np.log10(min(apart for _, apart in groups))))
-    levels = [round(float(mean), digits) + 0.0 for mean in means]
+    digits = [-int(np.floor(np.log10(apart))) for _, apart in groups]
+    levels = [round(float(mean), n) + 0.0 for mean, n in zip(means, digits, strict=True)]
     return [levels[np.argmin(np.abs(means - value))] for value in values]
 
 

@@ -49,6 +49,10 @@ def test_models_of_other_recordings_stay_and_come_last(workspace: Workspace) -> 
     modelling.fit(workspace, silent, model="gpi", **GIVEN)
     assert workspace.path("models", "gpi.json").read_bytes() == first
     assert following.having(workspace, "inverse") == ["gpi-2", "gpi"]
+    for entry in workspace.entries():
+        workspace.remove(entry.name)
+    assert following.having(workspace, "inverse") == []  # no recording has its channels
+    assert following.reach(workspace, "gpi", {})  # of what it was identified on
 
 
 def test_commands_are_tried_on_models_that_they_drive(workspace: Workspace) -> None:

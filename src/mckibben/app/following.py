@@ -107,10 +107,20 @@ def uses(workspace: Workspace, name: str) -> dict[str, str]:
 
 
 def having(workspace: Workspace, use: str) -> list[str]:
-    """Return the models that can be used so; those not recommended, or on other data, are last."""
-    rows = {row["name"]: row for row in workspace.results()}
-    last = {name for name, row in rows.items() if row.get("not_recommended") or not row["current"]}
+    """Return the models that can be used so; those not recommended, or on other data, are last.
+
+    Those on other data whose channels no recording has are left out.
+    """
+    rows, known = {row["name"]: row for row in workspace.results()}, {*workspace.channels()}
+
+    def recorded_here(name: str) -> bool:
+        block = workspace.model(name)
+        return {channel.name for channel in (*block.inputs, *block.outputs)} <= known
+
+    stale = {name for name, row in rows.items() if not row["current"]}
     names = [name for name in workspace.models() if use in uses(workspace, name)]
+    names = [name for name in names if name not in stale or recorded_here(name)]
+    last = stale | {name for name, row in rows.items() if row.get("not_recommended")}
     return sorted(names, key=lambda name: name in last)
 
 
@@ -216,8 +226,9 @@ def reach(
         others = {c.name: held[c.name] for c in block.inputs if c.name not in driven}
         found: dict[str, tuple[float, float]] = {}
         with suppress(MckibbenError):
-            recorded_inputs = RecordedInputs.of(runs, driven)
-            found = recorded_inputs.reached(block, others, pace(workspace, name)[1])
+            if runs:
+                inputs = RecordedInputs.of(runs, driven)
+                found = inputs.reached(block, others, pace(workspace, name)[1])
         for channel in asked_for(workspace, name)[0]:
             values = levels(workspace, block, channel)
             low, high = found.get(channel, (-np.inf, np.inf))

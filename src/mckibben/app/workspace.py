@@ -356,6 +356,10 @@ class Workspace:
                 found.append(row | {"name": name, "current": row.get("data", "") in ("", now)})
         return sorted(found, key=place)
 
+    def on_other_data(self) -> set[str]:
+        """Return the models that were fitted to recordings that are no longer these."""
+        return {row["name"] for row in self.results() if not row["current"]}
+
     def cached(self, path: Path, key: str, make: Callable[[], Any]) -> Any:
         """Return what is made of a file, made again only when that has changed."""
         try:

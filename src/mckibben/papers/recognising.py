@@ -124,8 +124,8 @@ def _channels(data: Sequence[Recording], *, of_arm: bool) -> dict[str, str]:
         return {own: EXTENSOR if plain and c == "pressure" else c for own, c in known.items()}
     each: dict[str, dict[str, str]] = {}
     for own, channel in known.items():
-        base, number = re.fullmatch(r"(.*?)_?(\d*)", channel).groups()  # type: ignore[union-attr]
-        each.setdefault(base, {})[number] = own
+        base = re.sub(r"_?\d*$", "", channel)
+        each.setdefault(base, {})[channel[len(base) :].lstrip("_")] = own
     muscle = ""
     for drive in ("voltage", "pressure"):
         numbered = each.get(drive, {})

@@ -123,13 +123,15 @@ class Form:
             raise DataError(problem, channel=channel, remedy="clear one of `columns`")
         left_out = any(one.seen.unasked and not one.channel for one in self.columns)
         # a unit that a remedy stated is stated from then on, also if it is that of the file
-        said = [(n, one.unit or "") for n, one in used]
-        seen = {n: one.seen.unit for n, one in used}
-        units = {n: unit for n, unit in said if unit != seen[n] or n in self.reading.units}
+        kept = self.reading.units
         return replace(
             plain,
             columns={n: one.seen.header for n, one in used if n != one.seen.unasked},
-            units=units,
+            units={
+                n: one.unit or ""
+                for n, one in used
+                if (one.unit or "") != one.seen.unit or n in kept
+            },
             calibration={n: one.line for n, one in used if one.line != (1.0, 0.0)},
             channels=[n for n, _ in used if n != "time"] if left_out else None,
         )

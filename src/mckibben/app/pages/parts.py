@@ -117,14 +117,9 @@ def model_of(state: State, names: Sequence[str]) -> str:
     return state.model if state.model in names else names[0]
 
 
-def on_other_data(state: State) -> set[str]:
-    """Return the models that were fitted to recordings that are no longer these."""
-    return {row["name"] for row in state.workspace.results() if not row["current"]}
-
-
 def warn_of_other_data(state: State, name: str) -> None:
     """Say where a model is of other recordings."""
-    if name in on_other_data(state):
+    if name in state.workspace.on_other_data():
         with mark(ui.element("div"), "other-data"):
             widgets.error_box(f"{name} was fitted to other recordings than those in use now.")
 
@@ -136,7 +131,7 @@ def select_model(state: State, names: Sequence[str], name: str = "model") -> Non
         state.model = str(event.value)
         state.changed()
 
-    stale = on_other_data(state)
+    stale = state.workspace.on_other_data()
     options = {one: f"{one} · other data" if one in stale else one for one in names}
     field = ui.select(options, value=model_of(state, names), label="Model", on_change=chosen)
     mark(field.props("dense outlined"), name)

@@ -104,7 +104,7 @@ reference at other frequencies and under loads that are not among their inputs: 
 33 + 6 sin(2 pi f t) mm, the others hold 33 mm, extensor at 0.7 bar, on the virtual rig `soft-arm`.
 Errors are RMSE of the worst muscle after the first third. A control step is 0.05 s: ten a cycle at 2 Hz.
 PID is tuned without a load and measures the motion; the others are feedforward. No compensation is a
-static map from one slow rise of all pressures.
+static map from one slow cycle of all pressures.
 
 ![Error over frequency and over load](../pictures/papers/rates-and-loads.png)
 """

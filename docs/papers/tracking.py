@@ -16,7 +16,7 @@ from matplotlib.ticker import NullFormatter
 from mckibben.blocks.base import Block
 from mckibben.control import Controller, track
 from mckibben.control.controller import Ahead, BlockController
-from mckibben.control.uncompensated import slow_rise, uncompensated
+from mckibben.control.uncompensated import slow_cycle, uncompensated
 from mckibben.errors import ModelWarning
 from mckibben.recording import Recording
 from mckibben.report.printed import METADATA, STYLE
@@ -64,7 +64,7 @@ def followed(_: None, trial: Trial, tell: Tell) -> dict[str, float]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
         if law is None:
-            law = uncompensated(rig, reference, slow_rise(rig, reference, seed=seed), seed=seed)
+            law = uncompensated(rig, reference, slow_cycle(rig, reference, seed=seed), seed=seed)
         settle = (reference.duration or 0.0) / 3
         return dict(track(law, rig, reference, settle=settle, seed=seed).rmse)
 

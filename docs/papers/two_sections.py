@@ -110,7 +110,7 @@ the worst of six muscles after the first third.
 
 Compensators are inverses of `balance`, all feedforward: one of all six muscles; or one of each section,
 without the other's channels, identified on runs in which only that section is driven, or on these and
-those in which both are. No compensation is a static map from one slow rise of all pressures.
+those in which both are. No compensation is a static map from one slow cycle of all pressures.
 
 ![Errors by the sections that move, and by load](../pictures/papers/two-sections.png)
 """

@@ -87,8 +87,8 @@ has a co-contraction, two have a mass, that no training run has. Seeds are of th
 
 RMSE [mrad] of desired angles at random up to {fastest:g} Hz, from {low:g} to {high:g} rad; one motion a
 seed. `preload` is the pressure from which the compensator of `balance` departs as little as it can: the
-co-contraction is the second wish, beside the angle. The static map is the rising branch of a slow loop
-at {map:g} bar. *{uncompensated}* is that of `mckibben track`: each muscle's own rise, linear.
+co-contraction is the second wish, beside the angle. The static map is the middle of a slow loop
+at {map:g} bar. *{uncompensated}* is that of `mckibben track`: each muscle driven alone, linear.
 
 The torque that a sensor measures has the inertia of the mass in it. Given back at once by the
 compensator, it makes the loop oscillate (last rows); given the weight at the desired angle, as a column
@@ -151,10 +151,10 @@ def loaded(load: str) -> Rig:
 
 
 def static_map(recordings: dict[str, Recording]) -> Rule:
-    """Return the static map: half the difference of pressures, read from the first rise of a loop."""
+    """Return the static map: half the difference of pressures, from the first of its loops."""
     loop = recordings[f"loops-{MAP:g}bar"]
-    rise = loop.slice(0, len(loop) // 10)
-    knots, half = curve(0.5 * (rise["pressure_1"] - rise["pressure_2"]), rise["angle"], "angle")
+    first = loop.slice(0, len(loop) // 5)
+    knots, half = curve(0.5 * (first["pressure_1"] - first["pressure_2"]), first["angle"], "angle")
 
     def commands(angle: Array) -> Array:
         d = float(np.interp(angle[0], knots, half))

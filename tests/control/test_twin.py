@@ -24,8 +24,9 @@ from mckibben.blocks.bands import Band
 from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import PIDFeedback
 from mckibben.blocks.fields import Channel
-from mckibben.control import Twin, before, track, tune_pid
+from mckibben.control import Twin, before, slow_cycle, track, tune_pid
 from mckibben.control.connecting import flatters_feedback, kind_of
+from mckibben.control.uncompensated import curve
 from mckibben.registry import load as registered
 from mckibben.registry import names
 from tests.cli.conftest import Cli
@@ -52,6 +53,17 @@ def plants() -> list[Block]:
         if moves and drives and name not in ("banded", "band", "inverse", "load-estimate"):
             found.append(block)
     return found
+
+
+def test_no_compensation_is_the_middle_of_a_loop() -> None:
+    wave_of = wave()
+    found = slow_cycle(Twin(MODEL), wave_of)
+    knots, pressures = curve(found["pressure"], found["displacement"], "displacement")
+    middle = np.interp(found["pressure"], pressures, knots)
+    off = middle - found["displacement"]
+    half = len(off) // 2
+    assert off[:half].mean() == pytest.approx(-off[half:].mean(), rel=0.1)
+    assert abs(off[:half].mean()) > 0.01 * (HIGH - LOW)
 
 
 @pytest.mark.parametrize("block", plants(), ids=lambda block: block.kind)

@@ -66,6 +66,9 @@ FORMS = {
     "target pos (1)": ("reference_displacement_1", ""),
     "p0 (extensor) [bar]": ("pressure_extensor", "bar"),
     "extensor_pressure_kPa": ("pressure_extensor", "kPa"),
+    "p_flex [bar]": ("pressure_flexor", "bar"),
+    "Druck Strecker [bar]": ("pressure_extensor", "bar"),
+    "屈筋圧力［MPa］": ("pressure_flexor", "MPa"),
     "pressure_model": ("pressure_model", ""), "pressure_variance": ("variance_of_pressure", ""),
 }  # fmt: skip
 

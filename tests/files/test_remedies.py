@@ -55,6 +55,11 @@ def test_the_likely_unit_comes_first(tmp_path: Path) -> None:
         assert refused(path).options[0] == {"units": {"time": unit}}
 
 
+def test_a_unit_that_the_file_states_comes_before_those_it_may_be(tmp_path: Path) -> None:
+    path = put(tmp_path / "run.csv", "t_s,p [psi],x_mm", T, 600 * P, Y)
+    assert refused(path).options[0] == {"units": {"pressure": "psi"}}
+
+
 def test_an_option_that_does_not_help_is_not_offered(tmp_path: Path) -> None:
     at_ends = [["", *Y[1:]][k] if k % 3 else "" for k in range(N)]  # no stretch is long enough
     path = put(tmp_path / "run.csv", "t_s,p_bar,displacement_mm", T, P, at_ends)

@@ -389,6 +389,7 @@ OTHERS: dict[str, tuple[str, dict[str, tuple[str, list[float]]]]] = {
     "Qualisys": (QUALISYS + "MARKER_NAMES\tM1\tM2\n" + rows(*SIX, separator="\t"),
         {name: ("", values) for name, (_, values) in MARKED.items()}),
     "a rate above": ("# Sampling rate: 0.1 kHz\np_bar,Weg_mm\n" + rows(P, X), TIMED),
+    "a full-width rate": ("# サンプリング周波数：100Hz\np_bar,Weg_mm\n" + rows(P, X), TIMED),
     "an interval above": ("Sample Interval,1.0E-02\nPoints,40\n\nCH1 (V),CH2 (V)\n"
         + rows(P, X), UNTIMED),
     "units alone": ("sec,bar,mm\n" + rows(T, P, X), TIMED),

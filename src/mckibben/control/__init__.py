@@ -17,5 +17,5 @@ from mckibben.control.twin import Twin as Twin
 from mckibben.control.uncompensated import UNCOMPENSATED as UNCOMPENSATED
 from mckibben.control.uncompensated import Before as Before
 from mckibben.control.uncompensated import before as before
-from mckibben.control.uncompensated import slow_rise as slow_rise
+from mckibben.control.uncompensated import slow_cycle as slow_cycle
 from mckibben.control.uncompensated import uncompensated as uncompensated

@@ -1,8 +1,8 @@
 """Baseline without compensation: a static map of the plant.
 
-The map is measured in one slow rise of pressure from the lowest to the highest, and is monotone and
-memoryless: falling motion uses the same curve. Several muscles rise together, and each has its own
-curve. With more muscles than motions, each rises alone, and the map is linear.
+The map is measured in one slow cycle of pressure, from the lowest to the highest and back; it is
+monotone and memoryless, in the middle of the loop. Several muscles are driven together, and each has its
+own curve. With more muscles than motions, each is driven alone, and the map is linear.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from mckibben.recording import Recording, sample_time_of
 UNCOMPENSATED = "no compensation"
 """Label of that loop in tables and figures."""
 
-RISE = 30.0
-"""Duration of the slow rise of pressure [s]: long compared with air dynamics."""
+CYCLE = 60.0
+"""Duration of the slow cycle of pressure [s]: long compared with air dynamics."""
 
 KNOTS = 65
 """Number of knots of a curve."""
@@ -66,7 +66,7 @@ def straight(rest: Array, slopes: Array, low: Array, high: Array) -> Callable[[A
     return commands
 
 
-def slow_rise(
+def slow_cycle(
     plant: Plant,
     reference: Recording,
     *,
@@ -74,15 +74,15 @@ def slow_rise(
     pressure_loop: bool = True,
     seed: int = 0,
 ) -> Recording:
-    """Return the plant's response to a slow rise of all commands together, or of one.
+    """Return the plant's response to a slow cycle of all commands together, or of one.
 
     Parameters
     ----------
     plant : Plant
     reference : Recording
-        What is to be followed: its sample time, and what it holds at first, are those of the rise.
+        What is to be followed: its sample time, and what it holds at first, are those of the cycle.
     only : str, optional
-        The one that rises, while the others stay lowest.
+        The one that is driven, while the others stay lowest.
     pressure_loop : bool
         As of `track`.
     seed : int
@@ -103,18 +103,18 @@ def slow_rise(
     low, high = _limits(plant, driven)
     if only is not None:
         high = np.where([name == only for name in driven], high, low)
-    steps = round(RISE / sample_time_of(reference, "be a reference"))
+    steps = round(CYCLE / sample_time_of(reference, "be a reference"))
     first = {name: np.full(steps + 2, reference[name][0]) for name in (*followed, *offer.held)}
-    shares = np.minimum(np.arange(steps + 2) / steps, 1.0)
-    rise = low + shares[:, np.newaxis] * (high - low)
-    rows = iter(rise)
+    shares = np.maximum(0.0, 1.0 - np.abs(2.0 * np.arange(steps + 2) / steps - 1.0))
+    cycle = low + shares[:, np.newaxis] * (high - low)
+    rows = iter(cycle)
     given = Recording(first, reference.sample_time, {n: reference.units[n] for n in first})
     ramp = Rule(lambda _: next(rows))
     found = track(
         ramp, plant, given, approach=0.0, pressure_loop=pressure_loop, seed=seed
     ).recording
     channels = {name: first[name][:-1] for name in offer.held}
-    channels |= dict(zip(driven, rise[:-1].T, strict=True))
+    channels |= dict(zip(driven, cycle[:-1].T, strict=True))
     channels |= {name: found[name][1:] for name in followed}
     return Recording(channels, reference.sample_time)
 
@@ -127,22 +127,22 @@ def _limits(plant: Plant, driven: list[str]) -> tuple[Array, Array]:
 def uncompensated(
     plant: Plant,
     reference: Recording,
-    rise: Recording,
+    cycle: Recording,
     *,
     pressure_loop: bool = True,
     seed: int = 0,
 ) -> Controller:
-    """Return the controller without compensation, from a plant's slow rise.
+    """Return the controller without compensation, from a plant's slow cycle.
 
     Parameters
     ----------
     plant : Plant
     reference : Recording
         What is to be followed.
-    rise : Recording
-        From `slow_rise`.
+    cycle : Recording
+        From `slow_cycle`.
     pressure_loop, seed
-        As of `slow_rise`.
+        As of `slow_cycle`.
 
     Raises
     ------
@@ -154,17 +154,17 @@ def uncompensated(
     if len(followed) != len(driven):
         found = []
         for name in driven:
-            alone = slow_rise(plant, reference, only=name, pressure_loop=pressure_loop, seed=seed)
-            risen = alone[name] - alone[name][0]
-            found.append(np.polynomial.polynomial.polyfit(risen, alone.matrix(followed), 1))
+            alone = slow_cycle(plant, reference, only=name, pressure_loop=pressure_loop, seed=seed)
+            driven_by = alone[name] - alone[name][0]
+            found.append(np.polynomial.polynomial.polyfit(driven_by, alone.matrix(followed), 1))
         rests, slopes = np.transpose(found, (1, 2, 0))
         return Rule(straight(rests.mean(axis=1), slopes, *_limits(plant, driven)))
-    curves = [curve(rise[u], rise[y], y) for u, y in zip(driven, followed, strict=True)]
+    curves = [curve(cycle[u], cycle[y], y) for u, y in zip(driven, followed, strict=True)]
     return Rule(lambda y: np.array([np.interp(x, *one) for x, one in zip(y, curves, strict=True)]))
 
 
 def curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
-    """Return the monotonic curve of a slow rise: output, increasing, and command.
+    """Return the monotonic curve of a slow cycle: output, increasing, and command.
 
     Raises
     ------
@@ -173,7 +173,9 @@ def curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
     """
     from scipy.optimize import isotonic_regression  # slow to load
 
-    falls = moved[-1] < moved[0]
+    order = np.argsort(command, kind="stable")
+    command, moved = command[order], moved[order]
+    falls = np.polynomial.polynomial.polyfit(command, moved, 1)[1] < 0.0
     smooth = np.asarray(isotonic_regression(moved, increasing=not falls).x)
     if falls:
         smooth, command = smooth[::-1], command[::-1]
@@ -194,7 +196,7 @@ class Before:
     Parameters
     ----------
     tracked : Tracked or None
-        Result with commands from the plant's own slow rise; None if it could not be run.
+        Result with commands from the plant's own slow cycle; None if it could not be run.
     notes : tuple of str
         Why it could not be run.
     """
@@ -222,8 +224,8 @@ def before(compensator: Block, plant: Plant, reference: Recording, **settings: A
     reference = asked(plant, reference, compensator)
     few = {name: settings[name] for name in ("pressure_loop", "seed") if name in settings}
     try:
-        rise = slow_rise(plant, reference, **few)
-        controller = uncompensated(plant, reference, rise, **few)
+        cycle = slow_cycle(plant, reference, **few)
+        controller = uncompensated(plant, reference, cycle, **few)
         return Before(track(controller, plant, reference, **settings))
     except MckibbenError as error:
         return Before(None, (f"there is no run without compensation: {error}",))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from mckibben.channels import QUANTITIES
-from mckibben.files.names import AMBIGUOUS, CHANNELS, MEASURED, ROLES, UNITS, words_of
+from mckibben.files.names import AMBIGUOUS, CHANNELS, MEASURED, PLACES, ROLES, UNITS, words_of
 from mckibben.files.units import COUNTS, GAUGE, find, find_listed, weight
 from mckibben.recording import base_name, standard_unit
 
@@ -18,10 +18,10 @@ LONGEST = 256
 """Characters of a header."""
 
 _ROLES, _CHANNELS, _UNITS = words_of(ROLES), words_of(CHANNELS), words_of(UNITS)
-_MEASURED = words_of(MEASURED)
-_ATTACHED = re.compile("|".join(w for w in sorted(_ROLES, key=len, reverse=True) if w > "\u3000"))
-"""Words for the ends of a loop that languages without blanks put before the channel: 目標圧力."""
-_EXTENSOR = {"extensor", "ext"}
+_MEASURED, _PLACES = words_of(MEASURED), words_of(PLACES)
+_BEFORE = sorted({*_ROLES, *_PLACES}, key=len, reverse=True)
+_ATTACHED = re.compile("|".join(word for word in _BEFORE if word > "\u3000"))
+"""Words that languages without blanks put before the channel: 目標圧力."""
 _ABOUT = {"variance", "var", "covariance", "std", "stddev", "status", "valid", "flag", "count"}
 """Words for properties of a channel that do not have its unit: ``pressure_variance``."""
 _DOUBTFUL = {"in", "min", "rev", "turn", "second", "grad", "pouce", "tour", "pollice", "segundo"}
@@ -77,7 +77,7 @@ def parse(text: str) -> Header:
         inner = parse(last)
         return Header(" ".join([*path, inner.name]), inner.unit)
     bracketed = _BRACKETED.fullmatch(text)
-    if bracketed and bracketed["name"] and not _EXTENSOR & set(_words(bracketed["unit"])):
+    if bracketed and bracketed["name"] and _PLACES.keys().isdisjoint(_words(bracketed["unit"])):
         name, unit = bracketed["name"], bracketed["unit"].strip()
         if GAUGE.fullmatch(f"{_last(name)} {unit}"):  # Pressure kPa(a)
             return Header(name.removesuffix(_last(name)).rstrip(" _,"), f"{_last(name)} {unit}")
@@ -131,8 +131,7 @@ def channel_of(header: Header) -> str:
 
 def _of_loop(name: str, header: Header) -> str | None:
     """Return the channel of a loop's reference or command, or None: a desired pressure is a command."""
-    name = _ATTACHED.sub(r"_\g<0>_", name.replace("set_point", "setpoint"))
-    words = [word for word in name.split("_") if word]
+    words = _apart(name.replace("set_point", "setpoint"))
     roles = [_ROLES[word] for word in words if word in _ROLES]
     if len(roles) != 1:
         return None
@@ -276,7 +275,7 @@ def unknown_ending(text: str) -> str:
     >>> unknown_ending("pressure_qux"), unknown_ending("Inlet pressure 2"), unknown_ending("data")
     ('qux', '', '')
     """
-    known = {part for word in (*_CHANNELS, *_ROLES) for part in word.split("_")} | _EXTENSOR
+    known = {part for word in (*_CHANNELS, *_ROLES) for part in word.split("_")} | {*_PLACES}
     words = re.findall(r"[^\W\d_]+", snake_case(text.rpartition("/")[2]))  # not of a topic
     named = next((k for k, word in enumerate(words) if word in known), len(words))
     return next((word for word in words[named:] if word not in known), "")
@@ -291,11 +290,17 @@ def _words(text: str) -> list[str]:
     return [word for word in re.split(r"[\W_]+", text.casefold()) if word]
 
 
+def _apart(name: str) -> list[str]:
+    """Return the words of a name, also of those that languages without blanks write as one."""
+    return [word for word in _ATTACHED.sub(r"_\g<0>_", name).split("_") if word]
+
+
 def _standard(name: str) -> str | None:
-    words = name.split("_")
-    others = "_".join(word for word in words if word not in _EXTENSOR)
-    if others != name and _CHANNELS.get(re.sub(r"_?\d*$", "", others)) == "pressure":
-        return "pressure_extensor"
+    words = _apart(name)
+    places = {_PLACES[word] for word in words if word in _PLACES}
+    others = "_".join(word for word in words if word not in _PLACES)
+    if len(places) == 1 and _CHANNELS.get(re.sub(r"_?\d*$", "", others)) == "pressure":
+        return f"pressure_{places.pop()}"
     alias, number = _numbered(name)
     if name in _CHANNELS or not number:
         return _CHANNELS.get(name)

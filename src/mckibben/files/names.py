@@ -76,6 +76,16 @@ ROLES: dict[str, dict[str, str]] = {
 }  # fmt: skip
 """References and commands of a loop -> words for them, used with or instead of a channel's name."""
 
+PLACES: dict[str, dict[str, str]] = {
+    "extensor": {
+        "en": "extensor ext", "de": "strecker", "fr": "extenseur", "it": "estensore", "ja": "伸筋",
+        "zh": "伸肌", "ko": "신근"},
+    "flexor": {
+        "en": "flexor flex", "de": "beuger", "fr": "fléchisseur", "it": "flessore", "ja": "屈筋",
+        "zh": "屈肌", "ko": "굴근"},
+}  # fmt: skip
+"""Muscles of a joint or a backbone -> words for them, used with a pressure's name."""
+
 MEASURED: dict[str, dict[str, str]] = {
     "measured": {
         "en": "measured meas actual", "de": "istwert ist gemessen", "fr": "mesuré mesurée",

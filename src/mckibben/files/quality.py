@@ -87,16 +87,16 @@ def question_size(
     if excess.max() <= 0 and not rare:
         return
     suspect = known[np.argmax(excess if excess.max() > 0 else sizes)]
-    units = fitting_units(suspect, read_in, target)
+    stated = read_in or "1"
+    fitting = fitting_units(suspect, read_in, target)
+    units = [*dict.fromkeys([*fitting, stated] if assumed else [stated, *fitting])]
     options: list[dict[str, Any]] = [{"units": {channel: unit}} for unit in units]
     if target == "" and assumed:
-        options.append(in_mm(channel, column, source))
-    stated = read_in or "1"
-    if stated not in units:
-        options.append({"units": {channel: stated}})
+        options.insert(len(fitting), in_mm(channel, column, source))
     size = f"it reaches {suspect:.6g} {target}".rstrip()
     problem = f"{size}{', without a unit' if assumed else ''}"
-    problem += f": is it in {' or '.join(units)}?" if units else ", which is not usual"
+    asked = fitting if assumed else units
+    problem += f": is it in {' or '.join(asked)}?" if fitting else ", which is not usual"
     at = int(np.argmax(values == suspect))
     remedy = f"name another unit with `units[{channel}]=UNIT`, or correct that cell"
     raise source.error(problem, remedy, channel, at, options)

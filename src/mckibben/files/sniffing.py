@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -165,13 +166,14 @@ def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
         units = [metric[1] if "Position" in h else u for h, u in zip(headers, units, strict=True)]
     least = head.width if any(headers[head.used : head.width]) else head.used
     least = len(headers) if names.at < 0 else least
+    stated = _STATED[head.dialect.decimal].finditer(unicodedata.normalize("NFKC", text))
     return Layout(
         head.dialect,
         headers,
         units,
         first,
         least,
-        rates=dict(filter(None, map(_stated, _STATED[head.dialect.decimal].finditer(text)))),
+        rates=dict(filter(None, map(_stated, stated))),
         start_time=head.dialect.value(head.dialect.form(start)[1]) if start else 0.0,
     )
 

@@ -56,8 +56,8 @@ USES = {
         "Invert a model, close the loop",
         "mckibben: invert track learn; mckibben.studying.results: Inverse Tracking; "
         "mckibben.control: track Tracked learn learned Learned control_law Controller BlockController "
-        "tune_pid DisturbanceObserver EstimatedLoad Twin preview_time previewed before Before slow_cycle "
-        "uncompensated; mckibben.stream: run FixedRate Deadlines Step",
+        "tune_pid DisturbanceObserver EstimatedLoad Twin preview_time previewed before Before "
+        "slow_cycle uncompensated; mckibben.stream: run FixedRate Deadlines Step",
     ),
     "rigs": Use(
         "Virtual rigs and environments",

@@ -36,17 +36,18 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 
 
 def test_code_and_recordings_are_written(workspace: Workspace) -> None:
-    def take(work: Any, file: str, **options: Any) -> None:
-        work(workspace, silent, file=file, options=options, of=OF)
+    def take(key: str, file: str, of: Any = OF, **options: Any) -> None:
+        thing = taking.THINGS[key]
+        thing.work(workspace, silent, file=file, options=options, of=of, **thing.more)
 
-    take(taking.code, "a-c.zip", single=True)
-    take(taking.code, "a-c-2.zip")  # taken a second time
-    take(taking.code, "b-ros2.zip")
-    take(taking.code, "c.json")
-    take(taking.recordings, "r.zip")
+    take("c", "a-c.zip", single=True)
+    take("c", "a-c-2.zip")  # taken a second time
+    take("ros2", "b-ros2.zip")
+    take("json", "c.json")
+    take("recordings", "r.zip")
     MUSCLE.save(workspace.path("models", "muscle.json"))
     of = OF | {"model": "muscle", "use": "model"}
-    taking.code(workspace, silent, file="m.xml", options={"rest_length": 200.0}, of=of)
+    take("mjcf", "m.xml", of, rest_length=200.0)
     workspace.path("models", "muscle.json").unlink()
     folder = workspace.folder / "takeaway"
     assert '<general name="m"' in (folder / "m.xml").read_text()

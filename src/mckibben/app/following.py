@@ -25,6 +25,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel, drives
 from mckibben.blocks.ranges import known_ranges
 from mckibben.errors import DataError, MckibbenError, ModelError
+from mckibben.numerals import number
 from mckibben.recording import COMMAND, REFERENCE, Recording
 
 if TYPE_CHECKING:
@@ -243,9 +244,10 @@ def reach(
 
 
 def wish(workspace: Workspace, name: str) -> Json:
-    """Return a motion of the first channel that a model is asked for, from rest, within reach.
+    """Return a motion of the first channel that a model is asked for, through its reach and back.
 
-    It is made smaller, down to a fifth of the reach, until the inverse clips nothing of it.
+    It begins at the end that is nearer to the first sample; other channels stay at their median. It is
+    made smaller, down to a fifth of the reach, until the inverse clips nothing of it.
     """
     step, cycle = pace(workspace, name)
     channels, held = asked_for(workspace, name)
@@ -256,11 +258,13 @@ def wish(workspace: Workspace, name: str) -> Json:
     inverse, units = made(workspace, name, "inverse", {}), units_of(channels | held)
     for margin in (0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4):
         for channel, (low, high) in reach(workspace, name, found["held"]).items():
-            digits, least = 2 - math.floor(math.log10(high - low)), margin * (high - low)
-            first = float(np.clip(levels(workspace, block, channel)[0], low + least, high - least))
-            other = high - least if high - first >= first - low else low + least
-            kind = "sine" if channel == found["now"] else "hold"
-            ends = {"first": round(first, digits), "other": round(other, digits)}
+            seen, digits = levels(workspace, block, channel), 2 - math.floor(math.log10(high - low))
+            lower, upper = low + margin * (high - low), high - margin * (high - low)
+            near, far = (lower, upper) if seen[0] - lower < upper - seen[0] else (upper, lower)
+            first, kind = near, "sine"
+            if channel != found["now"]:
+                first, kind = min(max(float(np.median(seen)), lower), upper), "hold"
+            ends = {"first": round(first, digits) + 0.0, "other": round(far, digits) + 0.0}
             found["channels"][channel] = {"kind": kind, **ends, "points": []}
         shape(found)
         asked = reference(points_of(found), found["held"], step, units)
@@ -427,9 +431,16 @@ def plants(workspace: Workspace, name: str) -> dict[str, str]:
             return inputs <= {*there.inputs} and outputs <= {*there.outputs} and not driven
         return False
 
-    unstable = {row["name"] for row in workspace.results() if diverged(row)}
+    rows = {row["name"]: row for row in workspace.results()}
+    unstable = {one for one, row in rows.items() if diverged(row)}
     models = [one for one in workspace.models() if one not in unstable]
-    found = {f"model {x}": f"{x} (another model)" for x in models if x != name}
+
+    def another(one: str) -> str:
+        test, unit = rows.get(one, {}).get("test"), rows.get(one, {}).get("unit", "")
+        own = f", itself off by {number(test['rmse'], 3)} {unit}".rstrip() if test else ""
+        return f"{one} (another model{own})"
+
+    found = {f"model {x}": another(x) for x in models if x != name}
     found |= {f"rig {rig}": f"{rig} (virtual rig, another muscle)" for rig in rig_names()}
     found[f"model {name}"] = f"{name} (the same model: exact by construction)"
     key = f"plants {models} {workspace.channels()}"

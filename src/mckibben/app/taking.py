@@ -6,9 +6,8 @@ Every job is given its file, its options, and what all have in common: ``model``
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -49,19 +48,20 @@ def report(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Js
     return f"{file} is written"
 
 
-def code(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json) -> str:
+def code(
+    workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json, target: Any = "json"
+) -> str:
     """Write a model, or what is made of it, as JSON or code; a folder becomes a zip."""
     from mckibben.workflow import export
 
     found, path = made(workspace, of["model"], of["use"], of["settings"]), Path(file)
     to = workspace.path("takeaway", file)
-    if path.suffix == ".json":
+    if target == "json":
         found.save(to)
         return f"{file} is written"
-    if path.suffix == ".xml":
-        export(found, to, "mjcf", force=True, **options)
+    if target == "mjcf":
+        export(found, to, target, force=True, **options)
         return f"{file} is written"
-    target: Any = next((x for x in ("c", "ros2") if re.search(rf"-{x}(-\d+)?\.zip$", file)), "fmu")
     name = "".join(c if c.isalnum() else "_" for c in path.stem).strip("_")
     given: Json = {"name": name.lower() if target == "ros2" else name, "force": True} | options
     given["sample_time"] = None
@@ -109,7 +109,7 @@ def _zip(path: Path, fill: Callable[[Path], Any]) -> None:
 class Thing:
     """Something to take away: what it is and what for, the job, and its options that are asked for.
 
-    The name of its file has ``{stem}`` where it is of a model.
+    The name of its file has ``{stem}`` where it is of a model; ``more`` is given to the job.
     """
 
     title: str
@@ -118,6 +118,7 @@ class Thing:
     file: str
     kind: type | None = None
     fields: tuple[str, ...] = ()
+    more: Mapping[str, str] = field(default_factory=dict)
 
 
 THINGS = {
@@ -131,19 +132,21 @@ THINGS = {
         "C99", "For a microcontroller or a PC: compiles as it is, with a self-test.",
         *(code, "{stem}-c.zip", COptions),
         ("name", "sample_time", "single", "check", "emulate", "link", "limits", "safe", "watchdog"),
+        {"target": "c"},
     ),
     "fmu": Thing(
         "FMU", "For Simulink and other tools; it is compiled here, up to a minute.",
-        *(code, "{stem}.fmu", FMUOptions, ("name", "sample_time", "library")),
+        *(code, "{stem}.fmu", FMUOptions, ("name", "sample_time", "library"), {"target": "fmu"}),
     ),
     "ros2": Thing(
         "ROS 2", "A controller of ros2_control, to be built by colcon.",
-        *(code, "{stem}-ros2.zip", ExportOptions, ("name", "sample_time")),
+        *(code, "{stem}-ros2.zip", ExportOptions, ("name", "sample_time"), {"target": "ros2"}),
     ),
     "mjcf": Thing(
         "MuJoCo", "A muscle as plain XML, of a balance fitted within what MJCF carries.",
         *(code, "{stem}.xml", MJCFOptions),
         ("rest_length", "site_from", "site_to", "example", "lag"),
+        {"target": "mjcf"},
     ),
     "recordings": Thing(
         "Recordings", "As they are after cuts and filters, by role, with units.",

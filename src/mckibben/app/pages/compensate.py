@@ -342,7 +342,8 @@ def followed(state: State) -> None:
                 share = f"{100 * out.mean():.0f} % of {channel} is out of reach"
                 mark(ui.label(f"{share}: {low:.3g} to {high:.3g}."), "out-of-reach")
         for job in parts.jobs_of(state, ["loop"]):
-            parts.show_job(state, job)
+            if job.given["asked"]["model"] == _able(state):
+                parts.show_job(state, job)
         if runs:
             _errors(state, runs, chosen)
         else:
@@ -400,14 +401,13 @@ def _plot(
     if one is not None and run is not None:
         known = {*run.get("rmse", {}), *_wish(state)["held"]}
         driven = [key for key in one.channels if key.startswith(DRIVEN) and key not in known]
-        moved = [key for key in driven if np.ptp(one[key]) > 0]
-        moved = [key for key in moved if key.startswith(COMMAND)] or moved
+        sent = [key for key in driven if key.startswith(COMMAND)] or driven
         commands = [
             Curve(*over_time(one.time, one[x]), x, series_colour(k + 1), "line")
-            for k, x in enumerate(moved)
+            for k, x in enumerate(sent)
         ]
-        if moved:
-            label = axis_label("command", one.units.get(moved[0], ""))
+        if sent:
+            label = axis_label("command", one.units.get(sent[0], ""))
             panels.append(Panel("time [s]", label, tuple(commands)))
     (figure,) = interactive.plots(Drawing(tuple(panels), stacked=True))
     for row, (low, high) in enumerate(reach.values()):

@@ -96,7 +96,7 @@ def _button(state: State, key: str, thing: Thing) -> None:
         file = f"{state.workspace.new_name('takeaway', wish, '.' + ending)}.{ending}"
         path = state.workspace.path("takeaway", file)
         path.unlink()  # only its name was reserved; exports replace what they wrote alone
-        job = state.jobs.submit(thing.work, file, file=file, options=options, of=of)
+        job = state.jobs.submit(thing.work, file, file=file, options=options, of=of, **thing.more)
         while job.active:
             await asyncio.sleep(0.1)
         if job.state != "done":

@@ -110,9 +110,21 @@ def test_runs_from_rest_to_rest_are_no_pieces(
     assert not recwarn.list
 
 
-def test_dated_loggers_side_by_side(tmp_path: Path) -> None:
-    first = [f"2026-03-01T12:00:{t:09.6f}" for t in T]
-    then = [f"2026-03-01T12:00:{t + 0.5:09.6f}" for t in T[:2500:4]]
+@pytest.mark.parametrize(
+    ("gauge_at", "laser_at"),
+    [
+        ("2026-03-01T12:00:{:09.6f}", "2026-03-01T12:00:{:09.6f}"),
+        ("2026-03-01T12:00:{:09.6f}", "12:00:{:09.6f}"),
+        ("1772366400 + {:.6f}", "2026-03-01T12:00:{:09.6f}"),
+    ],
+)
+def test_loggers_with_clocks_side_by_side(gauge_at: str, laser_at: str, tmp_path: Path) -> None:
+    def stamp(form: str, t: float) -> str:
+        whole, plus, _ = form.partition(" + ")
+        return f"{int(whole) + t:.6f}" if plus else form.format(t)
+
+    first = [stamp(gauge_at, t) for t in T]
+    then = [stamp(laser_at, t + 0.5) for t in T[:2500:4]]
     gauge = put(tmp_path / "gauge.csv", "time,pressure_bar", first, P)
     laser = put(
         tmp_path / "laser.csv", "time,displacement_mm", then, np.interp(T[:2500:4] + 0.5, T, Y)

@@ -167,6 +167,8 @@ def test_counts_since_1970_are_recognised_and_noted(
     stated = one(written(tmp_path, times, f"time_{unit}"))
     for recording in (assumed, stated):
         assert recording.sample_time == pytest.approx(0.01, rel=1e-3)
+        assert recording.start_time == 0.0
+        assert recording.meta["began"].startswith("2025-06-15T15:06:40")
     assert f"units[time]={unit}" in refused(written(tmp_path, times, "time_s")).remedy
 
 

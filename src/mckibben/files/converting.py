@@ -140,10 +140,11 @@ def _with_clocks(source: Source) -> Source:
     if sum(map(bool, groups[1:])) < 2:
         return source
     groups[:2] = [groups[0] + groups[1]]  # what is before the first clock has that one
-    columns = []
-    for clock, group in zip(clocks, groups, strict=True):
-        times = times_of(clock, source)
-        seconds = convert(times.values, times.unit, "s")
+    columns, times = [], [times_of(clock, source) for clock in clocks]
+    dated = [instants.moment(one.began) for one in times if one.began]
+    for one, group in zip(times, groups, strict=True):
+        late = instants.moment(one.began) - min(dated) if one.began else 0.0
+        seconds = late + convert(one.values, one.unit, "s")
         known = np.isfinite(seconds)
         for column in group:
             values = None if column.values is None else column.values[known]
@@ -196,7 +197,8 @@ def times_of(column: Column, source: Source) -> Times:
     if not stated:
         seconds = convert(values, unit, "s")
         quality.question_size("time", column, seconds, unit, source, assumed=assumed)
-    return Times(values, unit, stated or unit != "s", assumed)
+    times = Times(values, unit, stated or unit != "s", assumed)
+    return times if source.table.own else timebase.since_first(times)
 
 
 def _signal(channel: str, column: Column, jumps: Rows, source: Source) -> Signal:

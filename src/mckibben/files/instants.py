@@ -84,6 +84,27 @@ def seconds(texts: Sequence[str], source: Source) -> tuple[Array, str]:
     return since, date.partition("T")[2] if form is not None and form["first"] is None else date
 
 
+def moment(began: str) -> float:
+    """Return the seconds from 1970 to an instant, or from midnight to a time of day.
+
+    >>> moment("2026-01-31T12:00:00"), moment("00:01:00.5")
+    (1769860800.0, 60.5)
+    """
+    return (
+        float(np.datetime64(began if "T" in began else f"1970-01-01T{began}", "ns").astype(int))
+        / 1e9
+    )
+
+
+def instant(seconds: float) -> str:
+    """Return the instant so many seconds after 1970 as ISO 8601.
+
+    >>> instant(1769860800.25)
+    '2026-01-31T12:00:00.250000'
+    """
+    return str(np.datetime64(round(seconds * 1e6), "us"))
+
+
 def _in_one_form(parts: Any, form: re.Match[str]) -> tuple[Any, list[str]]:
     """Return instants of one form from their parts, and formats for `pandas.to_datetime`."""
     clock = parts["clock"] if form["clock"] else parts["clock"].fillna("00:00")

@@ -15,10 +15,10 @@ from mckibben.channels import by_name
 from mckibben.errors import DataError
 from mckibben.files.clocks import on_one, rates
 from mckibben.files.headers import unit_of
+from mckibben.files.instants import moment
 from mckibben.files.notices import listed, warn
 from mckibben.files.request import GAPS_BRIDGED, Request, Source
 from mckibben.files.table import Column, Table
-from mckibben.files.timebase import YEARS_2001_TO_2103
 from mckibben.recording import SAME_TIME, Recording
 
 MEETS = 0.02
@@ -72,7 +72,7 @@ def _joined(recordings: Sequence[Recording], request: Request) -> Recording:
         remedy = "join pieces with the same channels, or loggers with different ones"
         raise DataError(problem, file=recordings[0].source, channel=shared[0], remedy=remedy)
     own = [one.select([name for name in one if name not in twice]) for one in recordings]
-    if any(_moment(one) is None for one in own):
+    if any(_began(one) is None for one in own):
         warn(_path(own), "clocks are taken to begin at one moment, as not all files have dates")
     return _side_by_side(_on_one_clock(own), request)
 
@@ -143,24 +143,23 @@ def _follows(before: Recording, after: Recording) -> bool:
 
 
 def _on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
-    """Return recordings whose start times are from one moment, if all are known to be."""
-    starts = [_moment(one) for one in recordings]
-    known = [start for start in starts if start is not None]
-    if len(known) == len(starts):
-        pairs = zip(recordings, known, strict=True)
-        return [_starting(one, start - min(known)) for one, start in pairs]
-    return list(recordings)
+    """Return recordings whose start times are from one moment, if all are known to be.
+
+    Where some have no date, times of day are compared.
+    """
+    began = [began for one in recordings if (began := _began(one)) is not None]
+    if len(began) < len(recordings):
+        return list(recordings)
+    dated = all("T" in one for one in began)
+    starts = [moment(one if dated else one.rpartition("T")[2]) for one in began]
+    pairs = zip(recordings, starts, strict=True)
+    return [_starting(one, start - min(starts)) for one, start in pairs]
 
 
-def _moment(recording: Recording) -> float | None:
-    """Return when a recording began [s], since 1970 or, without a date, midnight; None if unknown."""
-    import pandas as pd
-
+def _began(recording: Recording) -> str | None:
+    """Return when a recording began, as ISO 8601 or a time of day; None if unknown."""
     began = recording.meta.get("began")
-    if isinstance(began, str):
-        dated = "T" in began
-        return pd.Timestamp(began if dated else f"1970-01-01T{began}").timestamp()
-    return recording.start_time if recording.start_time > YEARS_2001_TO_2103[0] else None
+    return began if isinstance(began, str) else None
 
 
 def _starting(recording: Recording, start: float) -> Recording:

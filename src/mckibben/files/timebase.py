@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array, Rows
 from mckibben.errors import DataError
 from mckibben.files.headers import snake_case
+from mckibben.files.instants import instant
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.units import convert
@@ -47,7 +49,7 @@ class Times:
     """Times in their original unit, with the recorded digits.
 
     The unit is ``certain`` where it was requested or is not the second. ``began`` is the first instant
-    of dates.
+    of dates, from which the others are counted.
     """
 
     values: Array
@@ -59,6 +61,18 @@ class Times:
     def seconds(self, duration: float) -> float:
         """Return a time or duration in this unit in seconds."""
         return float(convert(np.array([duration]), self.unit, "s")[0])
+
+
+def since_first(times: Times) -> Times:
+    """Return times since the first where they are counted since 1970, else as they are."""
+    known = times.values[np.isfinite(times.values)]
+    first = float(known[0]) if known.size else 0.0
+    low, high = YEARS_2001_TO_2103
+    if not low < times.seconds(first) < high:
+        return times
+    digits = -math.ceil(math.log10(2.0 * np.spacing(first)))  # what a number of that size can hold
+    values = np.round(times.values - first, digits)
+    return replace(times, values=values, began=instant(times.seconds(first)))
 
 
 class Step(NamedTuple):

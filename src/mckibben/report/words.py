@@ -373,6 +373,8 @@ GAPS["load"] = GAPS["resting"]
 PLAN = "{seconds} s: {parts}."
 LEFT_OPEN = "Not closed by this plan: {gap} {run}"
 EXTRAPOLATED = "{channel} goes beyond the recordings: errors there are extrapolated."
+ROUNDED = 1e-3
+"""An end of a range is written as 0 if it is smaller than this, relative to the larger end."""
 RUN = "Record {what}."
 RUNS = {
     "random": "all inputs and loads moving at random{levels}",
@@ -417,14 +419,15 @@ def plan_sentences(plan: Plan) -> list[str]:
 
 
 def _levels(ranges: Mapping[str, tuple[float, float]]) -> str:
-    """Return recorded ranges of channels."""
-    return listing(
-        [
-            " to ".join(dict.fromkeys(f"{end:.3g}" for end in ends))
-            + f" {standard_unit(name) or ''}"
-            for name, ends in ranges.items()
-        ]
-    ).strip()
+    """Return recorded ranges of channels; an end that is small beside the other is 0."""
+
+    def ends_of(ends: tuple[float, float]) -> str:
+        largest = max(map(abs, ends))
+        shown = (end if abs(end) > ROUNDED * largest else 0.0 for end in ends)
+        return " to ".join(dict.fromkeys(f"{end:.3g}" for end in shown))
+
+    each = ((ends_of(ends), standard_unit(name) or "") for name, ends in ranges.items())
+    return listing([f"{ends} {unit}" for ends, unit in each]).strip()
 
 
 def listing(names: Sequence[str]) -> str:

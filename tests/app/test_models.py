@@ -62,7 +62,7 @@ def test_commands_are_tried_on_models_that_they_drive(workspace: Workspace) -> N
         of_command = written.replace('"pressure"', '"command_pressure"')
         workspace.path("models", f"{name}.json").write_text(of_command, encoding="utf-8")
     assert workspace.model("first").inputs[0].name == "command_pressure"
-    assert [*following.plants(workspace, "first")][-1] == "model first"
+    assert "model first" in following.plants(workspace, "first")
     assert "model second" in following.plants(workspace, "first")
 
 

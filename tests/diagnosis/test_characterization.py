@@ -204,6 +204,17 @@ def test_what_cannot_be_characterized_is_refused(
         characterize(recordings)
 
 
+def test_a_load_that_follows_from_the_motion_hides_no_loop() -> None:
+    pressure = triangle(np.arange(1201) / 100, period=4.0, peaks=4.0)
+    moved = pressure - 0.5 * np.sign(np.gradient(pressure))
+    noise = np.random.default_rng(0).normal(0.0, 0.1, moved.size)
+    alone = Recording({"pressure": pressure, "displacement": moved}, 0.01)
+    spring = alone.with_channels({"force": "N"}, force=20.0 + 2.0 * moved + noise)
+    found = characterize(spring, "pressure", "displacement")
+    assert found.mid_width == pytest.approx(characterize(alone).mid_width)
+    assert found.notes
+
+
 def test_units_must_agree() -> None:
     runs = [Recording({"a": RAMP, "b": RAMP}, 1.0, {"a": unit}) for unit in ("rad", "deg")]
     with pytest.raises(DataError, match="deg"):

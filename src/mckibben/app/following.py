@@ -107,6 +107,13 @@ def uses(workspace: Workspace, name: str) -> dict[str, str]:
     return {use: words for use, words in USES.items() if use in known}
 
 
+def is_balance(workspace: Workspace, name: str) -> bool:
+    """Return whether a model is a balance, which MJCF can carry."""
+    from mckibben.blocks.coupled.balance import balance_in
+
+    return balance_in(workspace.model(name)) is not None
+
+
 def having(workspace: Workspace, use: str) -> list[str]:
     """Return the models that can be used so; those not recommended, or on other data, are last.
 
@@ -413,7 +420,7 @@ def plant_of(workspace: Workspace, plant: str) -> Any:
 
 
 def plants(workspace: Workspace, name: str) -> dict[str, str]:
-    """Return what a compensator can be tried on, in words; its own model comes last."""
+    """Return what a compensator can be tried on, in words; other muscles come last."""
     from mckibben.report.columns import diverged
     from mckibben.rigs import rig_names
 
@@ -433,16 +440,18 @@ def plants(workspace: Workspace, name: str) -> dict[str, str]:
 
     rows = {row["name"]: row for row in workspace.results()}
     unstable = {one for one, row in rows.items() if diverged(row)}
+    stale = workspace.on_other_data()
     models = [one for one in workspace.models() if one not in unstable]
 
     def another(one: str) -> str:
         test, unit = rows.get(one, {}).get("test"), rows.get(one, {}).get("unit", "")
         own = f", itself off by {number(test['rmse'], 3)} {unit}".rstrip() if test else ""
-        return f"{one} (another model{own})"
+        return f"{one} (another model{own}{', of other data' if one in stale else ''})"
 
-    found = {f"model {x}": another(x) for x in models if x != name}
-    found |= {f"rig {rig}": f"{rig} (virtual rig, another muscle)" for rig in rig_names()}
+    found = {f"model {x}": another(x) for x in models if x not in (name, *stale)}
     found[f"model {name}"] = f"{name} (the same model: exact by construction)"
+    found |= {f"rig {rig}": f"{rig} (virtual rig, another muscle)" for rig in rig_names()}
+    found |= {f"model {x}": another(x) for x in models if x in stale and x != name}
     key = f"plants {models} {workspace.channels()}"
     fitting = of_model(workspace, name, key, lambda: [*filter(fits, found)])
     return {plant: found[plant] for plant in fitting}

@@ -135,6 +135,18 @@ def dialog(title: str) -> Iterator[Any]:
     found.open()
 
 
+def sure(title: str, text: str, act: Callable[[], Any]) -> None:
+    """Ask whether to delete something, and ``act`` if so."""
+    with dialog(title) as asked:
+        ui.label(text)
+
+        def yes() -> None:
+            act()
+            asked.close()
+
+        mark(primary("Delete", yes), "delete-sure")
+
+
 def empty(icon: str, title: str, text: str) -> Any:
     """Show what a place is for while there is nothing in it; add a button with ``with``."""
     with ui.element("div").classes("empty") as found:

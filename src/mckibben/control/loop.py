@@ -230,11 +230,12 @@ def track(
     far = {name: beyond(parts[name], out[name][scored], *reached[name]) for name in reached}
     references = {REFERENCE + c.name: c.unit for c in offer.followed}
     sent = {COMMAND + c.name: c.unit for c in offer.driven}
+    units = {c.name: c.unit for c in offer.measured} | references | sent
     channels = dict(zip((*references, *sent), (*due.T, *commands.T), strict=True))
     channels |= dict(zip(changed.outputs, seen.T, strict=True))
     channels = dict(zip(held, imposed.T, strict=True)) | channels
     return Tracked(
-        Recording(channels, step, references | sent, -lead * step, {"plant": changed.name}),
+        Recording(channels, step, units, -lead * step, {"plant": changed.name}),
         dict(zip(followed, np.sqrt(np.mean(part**2, axis=0)).tolist(), strict=True)),
         dict(zip(followed, np.abs(part).max(axis=0).tolist(), strict=True)),
         int(clipped[scored].sum()),

@@ -225,9 +225,12 @@ def characterize(
     if not others:
         return _measured(runs, given, wanted)
     levels = _levels(runs, given, wanted, others)
+    if not levels and {*others} <= {*channels_of(runs, given, wanted).further}:
+        together = f"{', '.join(others)} moves with the input, and its effect is in the loop"
+        return replace(_measured(runs, given, wanted), notes=(together,))
     if not levels:
         raise DataError(
-            f"it never moves while constant: {', '.join(others)}; its effect cannot be identified",
+            f"it moves only together with {', '.join(others)}: its effect alone cannot be identified",
             file=runs[0].source,
             channel=given,
             remedy="record one in which it moves alone; models of several inputs need no such recording",

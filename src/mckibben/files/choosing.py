@@ -244,7 +244,7 @@ def _only_time(named: Mapping[str, Column], source: Source) -> Column | None:
         for column in named.values()
         if column.values is not None
         and (_target(column) == "s" or time_unit(column.label))
-        and np.all(np.diff(column.values) > 0)
+        and np.all(np.diff(column.values[np.isfinite(column.values)]) > 0)
     ]
     dates = [
         column

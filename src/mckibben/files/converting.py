@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -92,7 +93,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         "calibration": {name: one.calibration for name, one in each if one.calibration},
         "assumed_units": [name for name, one in each if one.assumed and one.unit],
         "sampled": sampled,
-        "began": None if times is None else times.began,
+        "began": _began(times, source),
     }
     assumed = ["time in s"] if times is not None and times.assumed else []
     assumed += [f"{name} in {one.unit}" for name, one in each if one.assumed and one.unit]
@@ -107,6 +108,16 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         source.warn(f"not read: {listed(reasons)}")
     signals |= {name: _derived(name, of, signals[of], source) for name, of in derived.items()}
     return signals, times, {name: found for name, found in meta.items() if found}
+
+
+def _began(times: Times | None, source: Source) -> str | None:
+    """Return the instant of the first sample, by its time or else by what the file tells of it."""
+    told = source.table.meta.get("began")
+    if (times is not None and times.began) or not isinstance(told, str):
+        return None if times is None else times.began
+    with suppress(DataError):
+        return instants.seconds([told], source)[1]
+    return None
 
 
 def _derived(channel: str, of: str, signal: Signal, source: Source) -> Signal:
@@ -187,10 +198,12 @@ def _apart(columns: dict[str, Column], times: Times | None, source: Source) -> d
 
 def times_of(column: Column, source: Source) -> Times:
     """Return the times in a column of numbers or dates."""
+    line = _calibration("time", column, source)
+    gain, offset = line.get("gain", 1.0), line.get("offset", 0.0)
     if column.values is None:
         since, began = instants.seconds(column.texts, source)
-        return Times(since, began=began)
-    values = _numbers("time", column, source)
+        return Times(gain * since + offset, began=began)
+    values = gain * _numbers("time", column, source) + offset
     found, assumed = _unit("time", column, values, source)
     unit = found.name
     stated = _is_stated("time", column, source)

@@ -101,14 +101,14 @@ def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
     found: dict[str, Mask] = {}
     for name, samples in channels.items():
         missing = ~np.isfinite(samples)
-        n = int(missing.sum())
-        if n and not source.request.needs(name):
+        n, inside = int(missing.sum()), _within(missing)
+        bridged = source.request.gaps == "interpolate" and inside.sum() == n
+        if n and not (bridged or source.request.needs(name)):
             source.warn(f"channel {name!r} is left out: {n} of its samples are missing")
             continue
         if n == missing.size:
             remedy = f"name a column that holds numbers with `columns[{name}]=COLUMN`"
             raise source.error("all of its samples are missing", remedy, name, 0)
-        inside = _within(missing)
         if inside.any() and source.request.gaps == "error":
             problem = f"{inside.sum()} of {missing.size} samples are missing or not finite"
             remedy = "use `raw` where they are numbers that were measured"

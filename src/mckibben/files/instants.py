@@ -17,6 +17,8 @@ _FORM = (
     r"(?P<clock>\d{1,2}:\d{2})?(?::(?P<whole>\d{2})(?:[.,:](?P<part>\d{1,9}))?)?"
     r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)? ?(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2})?$"
 )
+_MINUTES = re.compile(r"(\d{1,3}):(\d{2}[.,]\d+)", re.ASCII)
+"""Minutes and seconds of a stopwatch, ``12:58.000``."""
 _BEGINNING = re.compile(
     r"\d{4}\D?\d\d|\d{1,2}[./-](?:\d{1,2}|[A-Za-z]{3})[./-]\d{2}|\d{1,2}:\d\d", re.ASCII
 )
@@ -31,8 +33,10 @@ def may_be_instant(text: str) -> bool:
     return _BEGINNING.match(text) is not None
 
 
-def seconds(texts: Sequence[str], source: Source) -> tuple[Array, str]:
+def seconds(texts: Sequence[str], source: Source) -> tuple[Array, str | None]:
     """Return instants as seconds since the first, NaN where blank; and the first as ISO 8601.
+
+    Minutes and seconds are no instants: there is no first.
 
     Parameters
     ----------
@@ -50,6 +54,8 @@ def seconds(texts: Sequence[str], source: Source) -> tuple[Array, str]:
 
     cells = pd.Series(list(texts), dtype=object)
     first = next((text for text in texts if text), "")
+    if _MINUTES.fullmatch(first):
+        return _of_minutes(texts, source), None
     form = re.match(_FORM, first, re.ASCII)
     if form is None or (form["mark"] == "-" and len(form["first"]) == 4):
         form, patterns = None, ["ISO8601"]
@@ -82,6 +88,19 @@ def seconds(texts: Sequence[str], source: Source) -> tuple[Array, str]:
         since[1:] += 86400.0 * np.cumsum(np.diff(since) < -43200.0)
     date = str(instants[at])
     return since, date.partition("T")[2] if form is not None and form["first"] is None else date
+
+
+def _of_minutes(texts: Sequence[str], source: Source) -> Array:
+    """Return minutes and seconds as seconds, NaN where blank."""
+    found = np.full(len(texts), np.nan)
+    for at, text in enumerate(texts):
+        parts = _MINUTES.fullmatch(text)
+        if parts is not None:
+            found[at] = 60.0 * float(parts[1]) + float(parts[2].replace(",", "."))
+        elif text:
+            problem = f"{text[:40]!r} is no time in minutes and seconds"
+            raise source.error(problem, "correct that cell, or give `rate`", "time", at)
+    return found
 
 
 def moment(began: str) -> float:

@@ -153,7 +153,7 @@ def _on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
     dated = all("T" in one for one in began)
     starts = [moment(one if dated else one.rpartition("T")[2]) for one in began]
     pairs = zip(recordings, starts, strict=True)
-    return [_starting(one, start - min(starts)) for one, start in pairs]
+    return [_starting(one, one.start_time + start - min(starts)) for one, start in pairs]
 
 
 def _began(recording: Recording) -> str | None:

@@ -156,7 +156,7 @@ def track(
 ) -> Tracking:
     """Track a reference with a compensator or a controller on a virtual rig or on a model.
 
-    The result is compared with a static map: pressures read from one slow rise of the same plant.
+    The result is compared with a static map: through the middle of a slow loop of the same plant.
 
     Parameters
     ----------

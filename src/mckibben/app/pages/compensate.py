@@ -66,6 +66,8 @@ async def build(state: State) -> None:
         )
         spinner = ui.spinner()
         await run.io_bound(_prepare, state)
+        if spinner.is_deleted:  # the page was left
+            return
         spinner.delete()
         page(state)
         widgets.next_step("Right on your model? Take it to your rig.", "Take away", "/takeaway")
@@ -267,7 +269,8 @@ def _compensator(state: State, name: str) -> None:
             with widgets.details(title), widgets.row():
                 forms.fields(InvertOptions, asked, values_of(state, form))
         plants = following.plants(workspace, name)
-        plant = parts.select(state, "compensate.plant", plants, "Tried on", page.refresh)
+        key = f"compensate.plant-of-{name}"
+        plant = parts.select(state, key, plants, "Tried on", page.refresh)
         fitting = following.laws(workspace, name, plant) if plant else {}
         chosen = [x for x in state.chosen.get("compensate.laws", USUAL) if x in fitting]
         state.chosen["compensate.laws"] = chosen or [*fitting][:1]
@@ -304,9 +307,12 @@ def settings_of(state: State, form: str) -> Json:
 
 async def _start(state: State, name: str) -> None:
     """Run the compensator with every controller that is chosen, each as a job."""
-    form, plant, laws = (state.chosen[f"compensate.{key}"] for key in ("form", "plant", "laws"))
+    form, plant, laws = (
+        state.chosen[f"compensate.{key}"] for key in ("form", f"plant-of-{name}", "laws")
+    )
     if not laws:
         raise DataError("there is no controller", remedy="choose one, such as Compensator alone")
+    state.model = name  # what is taken away next
     asked = {"model": name, "form": form, "settings": settings_of(state, form), "plant": plant}
     asked["options"] = forms.given(TrackOptions, values_of(state, "loop"))
     wish, reference = _wish(state), _reference(state)
@@ -456,6 +462,9 @@ def _acts(state: State, name: str) -> None:
         path.unlink(missing_ok=True)
         state.changed()
 
+    def ask() -> None:
+        widgets.sure(f"Delete {name}?", "The run and its recording are deleted.", away)
+
     with ui.element("div").classes("acts").on("click.stop", js_handler="() => {}"):
         widgets.icon_button("download", f"Download {name}", partial(widgets.download, path))
-        widgets.icon_button("delete_outline", f"Delete {name}", away)
+        widgets.icon_button("delete_outline", f"Delete {name}", ask)

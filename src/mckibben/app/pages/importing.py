@@ -101,10 +101,14 @@ class Form:
         if self.columns and [c.seen.header for c in self.columns] == [c.header for c in columns]:
             return False
         units, lines = self.reading.units, self.reading.lines
+        kept = None if self.reading.channels is None else {"time", *self.reading.channels}
         self.columns = [
             Column(one, of, units.get(of, one.unit), *lines.get(of, (1.0, 0.0)))
             for one, of in ((one, one.channel) for one in columns)
         ]
+        for column in self.columns:
+            if kept is not None and column.channel not in kept:
+                column.channel = ""
         return True
 
     def stated(self) -> Reading:
@@ -236,6 +240,8 @@ def _understood(form: Form, read_as: Callable[[Reading], Any]) -> None:
                 mark(widgets.button(choice(options), act, "auto_fix_high"), "remedy")
         return
     found = form.recordings
+    if not found:  # it is being read
+        return
     more = [f"and {len(found) - 3} more recordings"] * (len(found) > 3)
     with ui.element("div"):
         for text in [*map(summary, found[:3]), *more, *map(message_of, found[0].notes)]:

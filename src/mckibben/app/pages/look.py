@@ -15,7 +15,7 @@ from mckibben.app.pages import parts
 from mckibben.app.state import State, view
 from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
-from mckibben.channels import Channels
+from mckibben.channels import Channels, by_name
 from mckibben.diagnosis.characterization import characterize
 from mckibben.diagnosis.coupling import Coupling, coupling, unexplained
 from mckibben.diagnosis.data_gaps import data_gaps
@@ -142,7 +142,7 @@ def _coupling(state: State, found: Coupling, pair: Pair) -> None:
     mark(widgets.table(["", *found.inputs, "Explained"], rows), "coupling")
     ui.label(
         "Effect of each input over its whole range on an output, by linear regression on all inputs. "
-        "The rest, up to 100 %, is nonlinear, hysteretic or dynamic. Choose a number to see its loop."
+        "The rest, up to 100 %, is nonlinear, hysteretic or dynamic. Choose a cell to see its loop."
     ).classes("muted")
 
 
@@ -168,7 +168,9 @@ def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) ->
 def _words(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
     """Show the characterization: a few sentences, and all numbers behind a fold-out."""
     others = tuple(n for n in (*sides.inputs, *sides.further) if n != pair[0])
-    key = "characterization", state.workspace.digest(), pair, others
+    dropped = {*by_name(runs)[0]} - {*sides.inputs, *sides.further}  # no inputs, as was chosen
+    runs = [run.select([name for name in run if name not in dropped]) for run in runs]
+    key = "characterization", state.workspace.digest(), pair, others, sorted(dropped)
     make = partial(characterize, runs, *pair, scheduling=others)
     with mark(ui.element("div"), "words"):
         later(key, make, lambda found: widgets.items(results.characterization(found)), height=120)

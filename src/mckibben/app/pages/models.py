@@ -44,8 +44,8 @@ FIRST = ("chosen", "test")
 """Columns of the leaderboard; the report has all."""
 
 OTHER_DATA = (
-    "Those marked “other data” were fitted or tested on recordings that have changed since, so that "
-    "their errors do not compare: fit them again."
+    "Those marked “other data” were fitted or tested on other recordings, or on these before they were "
+    "changed: their errors do not compare."
 )
 
 Json = dict[str, Any]
@@ -223,6 +223,7 @@ def closer(state: State) -> None:
                 ui.label(_summary(row)).classes("muted")
             delete = partial(_delete, state)
             mark(widgets.icon_button("delete_outline", f"Delete {name}", delete), "delete-model")
+        parts.warn_of_other_data(state, name)
         with ui.tabs(value=tab, on_change=choose).props(
             "dense no-caps align=left active-color=primary indicator-color=primary"
         ):
@@ -253,12 +254,10 @@ def _delete(state: State) -> None:
         for kind in ("models", "results"):
             state.workspace.delete(kind, name)
         state.chosen.pop("models.picked", None)
-        sure.close()
         state.changed()
 
-    with widgets.dialog(f"Delete {name}?") as sure:
-        ui.label("The model and its results are deleted; what was exported of it stays.")
-        mark(widgets.primary("Delete", delete), "delete-sure")
+    text = "The model and its results are deleted; what was exported of it stays."
+    widgets.sure(f"Delete {name}?", text, delete)
 
 
 def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:

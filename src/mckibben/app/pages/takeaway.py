@@ -14,7 +14,7 @@ from mckibben.app.pages.compensate import settings_of
 from mckibben.app.state import State, view
 from mckibben.app.taking import THINGS, Thing
 from mckibben.app.widgets import mark
-from mckibben.errors import DataError
+from mckibben.errors import MckibbenError
 
 TITLE = "Take away"
 ICON = "inventory_2"
@@ -50,13 +50,14 @@ def page(state: State) -> None:
                 again = state.changed, page.refresh
                 changed = lambda: [do() for do in again]  # noqa: E731
                 use = parts.select(state, "takeaway.take-use", uses, "Used as", changed)
+        muscle = bool(models) and following.is_balance(state.workspace, state.model)
         rows = [
             [thing.title, thing.purpose, partial(_options, state, key, thing),
              partial(_button, state, key, thing)]
             for key, thing in THINGS.items()
             if (models or "{stem}" not in thing.file)
             and (key != "ros2" or use in following.KINDS)
-            and (key != "mjcf" or use == "model")
+            and (key != "mjcf" or (use == "model" and muscle))
         ]  # fmt: skip
         mark(widgets.table(["", "What it is for", "", ""], rows), "things")
 
@@ -100,8 +101,7 @@ def _button(state: State, key: str, thing: Thing) -> None:
         while job.active:
             await asyncio.sleep(0.1)
         if job.state != "done":
-            problem = f"{thing.title}: {job.message or job.state}"
-            raise DataError(problem, remedy="see its options")
+            raise MckibbenError(f"{thing.title}: {job.message or job.state}".rstrip("."))
         await widgets.download(path)
 
     make = widgets.primary if key == "report" else widgets.button

@@ -165,12 +165,15 @@ class CoupledEstimator(Estimator):
 
 
 def bridged(data: TrainingData) -> TrainingData:
-    """Return the runs up to their last scored output, with unscored outputs interpolated.
+    """Return the runs up to their last scored output, or of a whole period, with others interpolated.
 
     These go straight with the inputs, as those that count do, and meet them on either side.
     """
     known = [run for run in data.runs if run.counts.any()]
-    runs = [run.cut(0, int(np.flatnonzero(run.counts)[-1]) + 1) for run in known]
+    ends = [
+        None if run.source.periodic else int(np.flatnonzero(run.counts)[-1]) + 1 for run in known
+    ]
+    runs = [run.cut(0, end) for run, end in zip(known, ends, strict=True)]
     columns = [np.column_stack([run.driven, run.scheduled, np.ones(len(run.u))]) for run in runs]
     counting = [columns[i][run.counts] for i, run in enumerate(runs)]
     targets = np.concatenate([run.outputs[run.counts] for run in runs])

@@ -203,7 +203,8 @@ class StateNetworkEstimator(CoupledEstimator):
     through = True
     paired = False
     held_too = True
-    effort = 100.0
+    long = True
+    effort = 20.0
 
     n_states: Annotated[int, Interval(ge=1, le=20)] | None = None
     n_units: Annotated[int, Interval(ge=1, le=100)] = 10

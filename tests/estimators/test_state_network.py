@@ -11,6 +11,7 @@ import pytest
 from mckibben.arrays import Array
 from mckibben.blocks.derivatives import derivatives
 from mckibben.blocks.dynamics.state_network import StateNetwork
+from mckibben.comparison.planning import plan_of
 from mckibben.estimators.dynamics.state_network import (
     NetworkErrors,
     StateNetworkEstimator,
@@ -106,3 +107,25 @@ def test_several_outputs_are_learned_and_a_seed_gives_the_same_again() -> None:
     assert one.model_ == again.model_
     far = one.model_.simulate(np.tile([50.0, -400.0], (2000, 1)), sample_time=STEP)
     assert np.isfinite(far).all()
+
+
+def test_recordings_of_several_sample_times_share_a_model() -> None:
+    runs = [recording(NETWORK, 240, seed) for seed in range(2)]
+    coarse = replace(
+        runs[1],
+        channels={name: values[::2] for name, values in runs[1].channels.items()},
+        sample_time=2 * STEP,
+    )
+    settings: dict[str, Any] = {"output": ("displacement",), "n_states": 3, "n_units": 2}
+    channels: dict[str, Any] = {"input": ("pressure",), "scheduling": ("length",)}
+    one = StateNetworkEstimator(**settings, **channels, n_steps=30, n_starts=2)
+    found = one.fit([runs[0], coarse])
+    assert found.score([coarse]) > 0.95
+    assert found.score([recording(NETWORK, 240, 2)]) > 0.9
+
+
+def test_comparisons_of_all_models_leave_it_out_where_it_is_not_named() -> None:
+    run = recording(NETWORK, 240)
+    channels: dict[str, Any] = {"input": "pressure", "output": "displacement"}
+    assert "state-network" in plan_of(run, models="all", **channels).empty.left_out
+    assert [*plan_of(run, models="state-network", **channels).items] == ["state-network"]

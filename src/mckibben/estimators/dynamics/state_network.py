@@ -209,7 +209,7 @@ class StateNetworkEstimator(CoupledEstimator):
     n_states: Annotated[int, Interval(ge=1, le=20)] | None = None
     n_units: Annotated[int, Interval(ge=1, le=100)] = 10
     n_starts: Annotated[int, Interval(ge=1, le=100)] = 4
-    n_steps: Annotated[int, Interval(ge=1, le=10_000)] = 200
+    n_steps: Annotated[int, Interval(ge=1, le=10_000)] = 400
     substeps: Annotated[int, Interval(ge=1, le=MOST_SUBSTEPS)] | None = None
     initial: Start = "first_sample"
 

@@ -75,7 +75,7 @@ OF_ARM: Mapping[str, Mapping[str, Any]] = {
     "sdchm-published": SWARM,
     "tsfnn": {"n_sets": 2},
 }
-SHAKEN: Mapping[str, Any] = {"input": "force", "output": "displacement", "substeps": 1}
+SHAKEN: dict[str, Any] = {"input": "force", "output": "displacement", "substeps": 1}
 SHOWN: Mapping[tuple[str, str], Mapping[str, Mapping[str, Any]]] = {
     ("muscle", "bundled"): SINGLE,
     ("bench", "bench-rougher"): OF_FORCE,

@@ -1074,18 +1074,37 @@ def pid(block: Any, inputs: Rows, sample_time: float) -> Rows:
 
 
 def state_network(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    def rates(x: list[float], u: float) -> list[float]:
-        known = [*x, u, 1.0]
+    n, h = len(block.linear) - len(block.given), block.rate * sample_time / block.substeps
+
+    def layer(rows: slice, x: list[float], u: list[float]) -> list[float]:
+        known = [*x, *u, 1.0]
         units = [math.tanh(_sum(tuple(row), known)) for row in block.hidden]
-        pairs = zip(block.linear, block.readout, strict=True)
+        pairs = zip(block.linear[rows], block.readout[rows], strict=True)
         return [_sum(own, known) + _sum(read, units) for own, read in pairs]
 
-    given = [(u - block.input_offset) / block.input_scale for u in _column(inputs)]
-    x = [0.0] * len(block.linear)
-    for _ in range(1000):
-        x = _step(rates, x, given[0], given[0], 0.1)
-    states = _states(rates, x, given, block, block.rate * sample_time / block.substeps)
-    return _rows([block.output_offset + block.output_scale * x[0] for x in states])
+    def moved(start: list[float], rise: list[float], length: float) -> list[float]:
+        def rates(at: list[float], share: float) -> list[float]:
+            u = [a + share * b for a, b in zip(start, rise, strict=True)]
+            return layer(slice(n), at, u)
+
+        return _step(rates, x, 0.0, 1.0, length)
+
+    scales = list(zip(block.input_offset, block.input_scale, strict=True))
+    given = [[(u - a) / b for u, (a, b) in zip(row, scales, strict=True)] for row in inputs]
+    x = [0.0] * n
+    for _ in range(3000):
+        x = moved(given[0], [0.0] * len(scales), 0.1)
+    outputs = []
+    for before, now in itertools.pairwise([given[0], *given]):
+        held = block.hold == "zero"
+        rise = [0.0 if held else (b - a) / block.substeps for a, b in zip(before, now, strict=True)]
+        for s in range(block.substeps):
+            x = moved([a + s * b for a, b in zip(before, rise, strict=True)], rise, h)
+        found = zip(
+            layer(slice(n, None), x, now), block.output_offset, block.output_scale, strict=True
+        )
+        outputs.append([a + b * y for y, a, b in found])
+    return outputs
 
 
 def band(block: Any, inputs: Rows, sample_time: float) -> Rows:

@@ -124,6 +124,7 @@ PREFERRED = {
     **dict.fromkeys(("coupled-memory", "coupled-pi", "tsfnn", "sdchm", "sdchm-published"), "arm"),
     "mpi-narmax": "load",
     "air": "air",
+    "state-network": "mass",
 }
 """Tasks that show more of a model than the first that applies."""
 

@@ -422,8 +422,8 @@ class CompareOptions(ChannelOptions):
         Channel of a varying load, an input of the models.
     models : "all", "quick", str, sequence of str, or mapping
         Short names, in a text with commas between; "all" leaves out models that do not apply to the
-        channels, "quick" is a choice that takes seconds. A mapping of labels to short names or
-        estimators compares one model with several settings.
+        channels or take long, "quick" is a choice that takes seconds. A mapping of labels to short names
+        or estimators compares one model with several settings.
     settings : mapping of str to mapping
         Model name, or label, to settings of its estimator.
     jobs : int, optional

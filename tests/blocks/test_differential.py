@@ -72,8 +72,8 @@ def test_steady_state_is_what_a_force_that_repeats_leads_to() -> None:
 def test_a_response_that_never_repeats_is_refused() -> None:
     undamped = replace(
         StateNetwork.example(),
-        linear=((0.0, 1.0, 0.0, 0.0), (-1.0, 0.0, 1.0, 0.0)),
-        readout=((0.0, 0.0), (0.0, 0.0)),
+        linear=((0.0, 1.0, 0.0, 0.0), (-1.0, 0.0, 1.0, 0.0), (1.0, 0.0, 0.0, 0.0)),
+        readout=((0.0, 0.0),) * 3,
     )
     shaken = Recording({"force": np.sin(np.arange(40.0))}, STEP)
     with pytest.raises(ModelError):

@@ -29,6 +29,7 @@ from mckibben.estimators.coupled.mpi_narmax import remembered
 from mckibben.registry import load, names
 from mckibben.system.compiling import Deferred
 from tests.blocks.balances import ALONE as HARDENING
+from tests.golden.models import network
 from tests.twins import STEP_ERROR, STEPPED, TWINS
 
 pytestmark = pytest.mark.kernel
@@ -224,6 +225,7 @@ VARIANTS: dict[str, tuple[Any, float, list[float]]] = {
     },
     "held force, Bouc-Wen": (replace(BoucWenOscillator.example(), hold="zero"), 0.01, [5.0]),
     "held force, network": (replace(StateNetwork.example(), hold="zero"), 0.01, [5.0]),
+    "network of several": (network(), 0.01, [5.0, 30.0]),
 }
 
 

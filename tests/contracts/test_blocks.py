@@ -27,6 +27,7 @@ from mckibben.blocks.fields import LONGEST_DELAY, vector
 from mckibben.blocks.hysteresis.envelopes import Exponential, Tanh
 from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
 from mckibben.blocks.laws import examples
+from tests.golden.models import network
 
 EXAMPLES = examples()
 
@@ -66,6 +67,8 @@ UNUSUAL: list[Block] = [
     replace(AIR, dead_time=0.01 * LONGEST_DELAY).inverse(),
     replace(BoucWenOscillator.example(), hold="zero"),
     replace(StateNetwork.example(), hold="zero"),
+    network(),
+    replace(network(), hold="zero", initial="virgin"),
     TIMELESS,
     TIMELESS.inverse(),
 ]

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from mckibben import GPI, PI, Block, Channel, Parallel, PerChannel, Series
+from mckibben.blocks.dynamics.state_network import StateNetwork
 from mckibben.papers.paper import printed, printed_models
 from mckibben.registry import load, names
 from tests.golden.running import SAMPLE_TIME, Array
@@ -238,6 +239,7 @@ def _compositions() -> dict[str, Block]:
         "filters of several channels": _filters(),
         "air and muscle": Series((example("air"), pi)),
         "muscle behind contact": Series((example("contact"), gpi)),
+        "network of two outputs": network(),
         "SDCHM": _manipulator(),
         "MPI-NARMAX": _loaded_network(),
         "joint": _joint(),
@@ -371,6 +373,30 @@ def _of_envelopes() -> dict[str, Block]:
         rising, falling = load("envelopes", kind).examples()
         found[f"gpi {kind}"] = replace(GPI.example(), rising=rising, falling=falling)
     return found
+
+
+def network() -> StateNetwork:
+    """Return a network of two inputs, one of which schedules, and two outputs."""
+    return StateNetwork(
+        linear=(
+            (0.0, 1.0, 0.0, 0.3, 0.0, 0.0),
+            (-1.5, -0.4, 0.2, 1.0, -0.5, 0.1),
+            (0.0, 0.3, -0.6, 0.0, 0.4, 0.0),
+            (1.0, 0.0, 0.2, 0.0, 0.1, 0.0),
+            (0.0, 0.5, 1.0, 0.1, 0.0, 0.2),
+        ),
+        hidden=((1.0, 0.1, 0.0, 0.3, -0.2, 0.1), (0.2, 1.0, 0.4, 0.1, 0.5, -0.2)),
+        readout=((0.0, 0.02), (0.6, -0.2), (0.1, 0.2), (0.3, 0.0), (-0.2, 0.4)),
+        rate=15.0,
+        input_offset=(2.0, 10.0),
+        input_scale=(3.0, 20.0),
+        output_offset=(1.0, 0.0),
+        output_scale=(5.0, 40.0),
+        driven=(Channel("pressure", "bar"),),
+        scheduled=(Channel("length", "mm"),),
+        given=(Channel("displacement", "mm"), Channel("force", "N")),
+        substeps=2,
+    )
 
 
 def registered() -> dict[str, Block]:

@@ -21,6 +21,9 @@ from mckibben.signals import made_manageable
 from mckibben.signals.shared_rows import check_shared
 from mckibben.splits import Part, Split, parts_of, spans_of, split_of
 
+LONG = "it takes long, and is fitted where it is named"
+"""Why a model is left out of all."""
+
 Models = str | Sequence[str] | Mapping[str, str | Estimator]
 """Models of a comparison: "all", "quick", short names, or labels with short names or estimators."""
 
@@ -218,6 +221,9 @@ def _chosen(
         names = every if models == "all" else [name for name in every if declared(name).quick]
         items = {name: Candidate(name, seeded) for name in names}
         left_out = objections(items, recordings, channels)
+        for name, item in items.items():
+            if item.made.long:
+                left_out.setdefault(name, LONG)
         return {name: item for name, item in items.items() if name not in left_out}, left_out
     if isinstance(models, Mapping):
         found = {str(label): _item(model, seeded) for label, model in models.items()}

@@ -75,6 +75,7 @@ OF_ARM: Mapping[str, Mapping[str, Any]] = {
     "sdchm-published": SWARM,
     "tsfnn": {"n_sets": 2},
 }
+SHAKEN: dict[str, Any] = {"input": "force", "output": "displacement", "substeps": 1}
 SHOWN: Mapping[tuple[str, str], Mapping[str, Mapping[str, Any]]] = {
     ("muscle", "bundled"): SINGLE,
     ("bench", "bench-rougher"): OF_FORCE,
@@ -85,7 +86,7 @@ SHOWN: Mapping[tuple[str, str], Mapping[str, Mapping[str, Any]]] = {
         "narx-network": SENT | {"n_units": 2, "n_starts": 4},
     },
     ("shaken", "shaken-softer"): {
-        "state-network": {"substeps": 1, "n_states": 2, "n_units": 1, "n_steps": 100},
+        "state-network": SHAKEN | {"n_states": 2, "n_units": 1, "n_steps": 100},
     },
     ("lifted", "lifted-stiffer"): {
         "balance": STOPS | LOADED,

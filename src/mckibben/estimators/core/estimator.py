@@ -175,6 +175,9 @@ class Estimator(ABC):
     quick: ClassVar[bool] = False
     """Whether it is in the quick selection: established or accurate, and fitted in seconds."""
 
+    long: ClassVar[bool] = False
+    """Whether it takes long, so that a comparison of all models leaves it out where it is not named."""
+
     targets: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
     """Export format -> settings with which a model can be exported to it."""
 

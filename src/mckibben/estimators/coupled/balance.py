@@ -54,7 +54,7 @@ from mckibben.estimators.coupled.balance_prior import (
 from mckibben.estimators.coupled.balance_problem import front, problem_of
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
-from mckibben.estimators.coupled.base import CoupledEstimator, taken
+from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.muscles.scaling import resized
 from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import TRAVELS
@@ -243,7 +243,7 @@ class BalanceEstimator(CoupledEstimator):
     ) -> TrainingData:
         """Return the training data; recordings may lack a load that others have."""
         every = listed(recordings)
-        names = taken(self.resolved(every, self.input, self.output, self.scheduling))
+        names = self.taken(self.resolved(every, self.input, self.output, self.scheduling))
         data = super().data(self.completed(every, rows, names), rows)
 
         def unmeasured(run: Run) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from mckibben.blocks.runs import Run
 from mckibben.channels import PRESSURE, Channels
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData, training_data
-from mckibben.estimators.core.estimator import Estimator, resting
+from mckibben.estimators.core.estimator import Estimator, Purpose, resting
 from mckibben.numerics.tracker import Tracker
 from mckibben.recording import Recording, listed
 
@@ -42,7 +42,7 @@ class CoupledEstimator(Estimator):
         that are found.
     """
 
-    purpose = "several"
+    purpose: ClassVar[Purpose | None] = "several"
     errors_known: ClassVar[bool] = False
 
     input: str | tuple[str, ...] | None = None
@@ -66,6 +66,9 @@ class CoupledEstimator(Estimator):
     each segment starts with its own memory.
     """
 
+    held_too: ClassVar[bool] = False
+    """Whether the input may be held, and a pressure schedules then: all inputs are treated alike."""
+
     each_alone: ClassVar[bool] = False
     """Whether every muscle must move alone in some run."""
 
@@ -80,7 +83,7 @@ class CoupledEstimator(Estimator):
             return "it is of several muscles"
         if len(inputs) > cls.most_inputs:
             return "it is of one muscle under a load"
-        scheduled = taken(channels)
+        scheduled = cls.taken(channels)
         for name in scheduled:
             lacking = [recording.name for recording in recordings if name not in recording]
             if lacking and not cls.unmeasured:
@@ -96,7 +99,7 @@ class CoupledEstimator(Estimator):
             return "it is of several muscles, or of one under a measured load that changes"
         if not cls.fits(len(inputs), len(outputs)):
             return "it needs an output to every input"
-        return resting(recordings, inputs) or (
+        return resting(recordings, (*inputs, *scheduled) if cls.held_too else inputs) or (
             _never_alone(recordings, inputs) if cls.each_alone else None
         )
 
@@ -109,7 +112,7 @@ class CoupledEstimator(Estimator):
     @classmethod
     def channel_settings(cls, channels: Channels) -> dict[str, Any]:
         inputs, outputs = channels.inputs, channels.outputs
-        return {"input": inputs, "output": outputs, "scheduling": taken(channels)}
+        return {"input": inputs, "output": outputs, "scheduling": cls.taken(channels)}
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
@@ -120,7 +123,7 @@ class CoupledEstimator(Estimator):
             raise DataError("there are no recordings", remedy="give at least one")
         first = every[0]
         channels = self.resolved(every, self.input, self.output, self.scheduling)
-        inputs, outputs, scheduling = channels.inputs, channels.outputs, taken(channels)
+        inputs, outputs, scheduling = channels.inputs, channels.outputs, self.taken(channels)
         longest = max(map(len, every))
         if longest < FEWEST_IN_A_ROW:  # shorter ones beside a longer one are passed over below
             raise DataError(
@@ -144,6 +147,12 @@ class CoupledEstimator(Estimator):
             )
         return kept
 
+    @classmethod
+    def taken(cls, channels: Channels) -> tuple[str, ...]:
+        """Return the channels that schedule the model."""
+        # an offered pressure is for laws of force
+        return tuple(name for name in channels.further if cls.held_too or name != PRESSURE)
+
     @property
     def pairs(self) -> bool:
         """Whether these settings need one output per input."""
@@ -155,18 +164,16 @@ class CoupledEstimator(Estimator):
         return None
 
 
-def taken(channels: Channels) -> tuple[str, ...]:
-    """Return the channels that schedule a model; an offered pressure is for laws of force."""
-    return tuple(name for name in channels.further if name != PRESSURE)
-
-
 def bridged(data: TrainingData) -> TrainingData:
-    """Return the runs up to their last scored output, with unscored outputs interpolated.
+    """Return the runs up to their last scored output, or of a whole period, with others interpolated.
 
     These go straight with the inputs, as those that count do, and meet them on either side.
     """
     known = [run for run in data.runs if run.counts.any()]
-    runs = [run.cut(0, int(np.flatnonzero(run.counts)[-1]) + 1) for run in known]
+    ends = [
+        None if run.source.periodic else int(np.flatnonzero(run.counts)[-1]) + 1 for run in known
+    ]
+    runs = [run.cut(0, end) for run, end in zip(known, ends, strict=True)]
     columns = [np.column_stack([run.driven, run.scheduled, np.ones(len(run.u))]) for run in runs]
     counting = [columns[i][run.counts] for i, run in enumerate(runs)]
     targets = np.concatenate([run.outputs[run.counts] for run in runs])

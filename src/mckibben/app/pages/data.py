@@ -228,8 +228,8 @@ def _recordings(state: State, entries: list[Entry]) -> None:
         mark(widgets.table(heads, rows, chosen=chosen, on_choose=choose), "recordings")
     if entries and not any(one.role == "test" for one in entries):
         ui.label(
-            "None is for testing: add another recording, or split this one in two. Without, the last part "
-            "of the recordings is held out."
+            "None is for testing: add another recording, or split this one in two. Without, the last "
+            "part of the recordings is held out."
         ).classes("muted")
     if len(dict.fromkeys([*_unread(state), *(one.upload for one in entries)])) > 1:
         widgets.button("Join files", partial(_join, state), "merge")

@@ -36,8 +36,8 @@ _SYMBOLS = {"dots": "circle", "rings": "circle-open", "ticks": "line-ns-open"} |
 }
 """Separate marks, by style."""
 
-_GAP = 0.09
-"""Share of the height between stacked panels."""
+_GAP = 0.3
+"""Height between stacked panels, relative to that of a panel."""
 
 
 def plots(drawing: Drawing) -> list[Json]:
@@ -103,10 +103,10 @@ def resolved(value: Any, colours: Mapping[str, str]) -> Any:
 def _plot(panels: tuple[Panel, ...]) -> Json:
     layout: Json = {"annotations": [], "shapes": [], "showlegend": False}
     traces: list[Json] = []
-    height = (1 - _GAP * (len(panels) - 1)) / len(panels)
+    height = 1 / (len(panels) + _GAP * (len(panels) - 1))
     for row, panel in enumerate(panels):
         x, y = (f"{axis}{row + 1 if row else ''}" for axis in "xy")
-        bottom = (len(panels) - 1 - row) * (height + _GAP)
+        bottom = (len(panels) - 1 - row) * height * (1 + _GAP)
         last = row == len(panels) - 1
         layout[f"xaxis{x[1:]}"] = _axis(panel.x_label if last else "") | {
             "anchor": y,

@@ -409,7 +409,9 @@ def _plot(
         driven = [key for key in one.channels if key.startswith(DRIVEN) and key not in known]
         sent = [key for key in driven if key.startswith(COMMAND)] or driven
         commands = [
-            Curve(*over_time(one.time, one[x]), x, series_colour(k + 1), "line")
+            Curve(
+                *over_time(one.time, one[x]), x.removeprefix(COMMAND), series_colour(k + 1), "line"
+            )
             for k, x in enumerate(sent)
         ]
         if sent:

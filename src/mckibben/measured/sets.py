@@ -32,7 +32,7 @@ class _Strict(BaseModel):
 
 
 class Published(_Strict):
-    """A printed figure for the same test: its RMSE in the unit of the output, and where it is printed."""
+    """A printed figure for the same test: its RMSE in the unit of the output, and where it stands."""
 
     what: str
     rmse: float

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
+from tempfile import gettempdir
 from typing import Any
 
 import numpy as np
@@ -196,6 +197,8 @@ def neural_ode(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> S
     """
     jax, jnp = import_module("jax"), import_module("jax.numpy")
     diffrax, optax = import_module("diffrax"), import_module("optax")
+    jax.config.update("jax_compilation_cache_dir", f"{gettempdir()}/peers-jax")  # for all fits
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     positive, mass = jax.nn.softplus, how["mass"]
     k, m = runs[0][0].shape[1], runs[0][1].shape[1]
     elements = ELEMENTS * (m if mass else k)

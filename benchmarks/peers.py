@@ -165,13 +165,17 @@ def reason(error: BaseException) -> str:
 
 
 FITTED: dict[str, Simulate] = {}
-"""Models by name, settings and data: two tasks may have the same training side."""
+SEARCHED: dict[str, tuple[Settings | None, Result]] = {}
+"""Models and searches by name, settings and data: two tasks may have the same training side."""
+
+
+def digest(runs: Sequence[Run]) -> str:
+    return sha256(b"".join(np.hstack(run).tobytes() for run in runs)).hexdigest()
 
 
 def fitted(peer: Peer, runs: Sequence[Run], how: Settings, data: Data) -> Simulate:
     """Return a peer's model, fitted once."""
-    digest = sha256(b"".join(np.hstack(run).tobytes() for run in runs)).hexdigest()
-    key = f"{peer.name} {how} {digest}"
+    key = f"{peer.name} {how} {digest(runs)}"
     if key not in FITTED:
         FITTED[key] = peer.fit(runs, how, data.held)
     return FITTED[key]
@@ -261,7 +265,10 @@ def results_of(peer: Peer, data: Data, part: Part, again: str) -> list[Result]:
     row = Result(peer.name, again.partition(", seed=")[0])
     best: Settings | None = next(iter(matching), None)
     if best is None and len(peer.grid) > 1:
-        best, row = searched(peer, data, Result(peer.name))
+        key = f"{peer.name} {digest(data.train)}"
+        if key not in SEARCHED:
+            SEARCHED[key] = searched(peer, data, Result(peer.name))
+        best, row = SEARCHED[key]
     elif best is None:
         best, row = peer.grid[0], Result(peer.name, ", ".join(words(peer.grid[0])))
     of_best = seeded if peer.seeds else tested

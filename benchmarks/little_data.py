@@ -1,0 +1,121 @@
+"""How much data models need: errors over the share of the training side that they are given.
+
+    peers-env/bin/python benchmarks/little_data.py FOLDER      writes docs/measured/little-data.md
+
+FOLDER and the environment are those of benchmarks/peers.py. Every training recording is cut to its first
+part; the test is the same. Other methods have the settings that the leaderboard states, so that only
+their weights are of the little data. Takes about forty minutes.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from mckibben.measured.scoring import START, Part, parts_of
+from mckibben.measured.sets import chosen_in
+from mckibben.numerals import numeral
+from mckibben.recording import Recording
+from peers import BOARD, data_of, own_results, results_of
+from peers_libraries import LIBRARIES
+from peers_networks import NETWORKS
+
+TASKS = {
+    "cavatappi_loads": ("sample 3, 200 and 400 g", ("balance", "coupled-memory")),
+    "festo_dmsp10_levels": ("", ("balance", "cpi")),
+    "festo_dmsp10_static": ("", ("balance", "cpi")),
+    "soft_arm_three_muscles": ("", ("balance", "coupled-memory")),
+}
+"""Set -> task, and this package's models."""
+
+OTHERS = ("sysidentpy FROLS", "SIPPY ARX", "torch GRU 32", "reservoirpy ESN")
+
+SHARES = (0.125, 0.25, 0.5, 1.0)
+
+PAGE_FILE = Path(__file__).parent.parent / "docs" / "measured" / "little-data.md"
+
+PAGE = """# How much data a model needs
+
+```{{index}} little data, data efficiency, networks, when physics wins
+```
+
+Free-run errors on the test, of models that are given the first part of every training recording. The settings of other libraries
+are those of the [leaderboard](leaderboard.md), found on all of the training data; their weights, as all of this package's models,
+are of the part alone.
+
+Written by `python benchmarks/little_data.py FOLDER`, in the environment of `benchmarks/peers.txt`.
+{tables}"""
+
+
+def part_of(run: Recording, share: float) -> Recording:
+    """Return the first part of a recording."""
+    return run.slice(0, max(round(share * len(run)), 3 * START))
+
+
+def little(part: Part, share: float) -> Part:
+    """Return a task with the first part of every training recording."""
+    train = tuple(part_of(run, share) for run in part.split.train)
+    return replace(part, split=replace(part.split, train=train))
+
+
+def rmse(part: Part, found: Sequence[np.ndarray]) -> float:
+    """Return the error of predictions on the rows that are scored, of several outputs the mean."""
+    outputs = part.channels.outputs
+    each = zip(found, part.split.test, part.rows, strict=True)
+    missed = np.vstack([(y - run.matrix(outputs))[rows] for y, run, rows in each])
+    return float(np.sqrt((missed**2).mean(axis=0)).mean())
+
+
+def errors(part: Part, name: str, models: Sequence[str], how: dict[str, str]) -> Iterator[tuple]:
+    """Yield model, seconds of training and error."""
+    for share in SHARES:
+        given = little(part, share)
+        seconds = sum(run.duration or 0.0 for run in given.split.train)
+        for result in own_results(given, [f"mckibben {model}" for model in models]):
+            yield result.name, seconds, rmse(given, result.found) if result.found else np.nan
+        data = data_of(given)
+        for peer in (one for one in (*LIBRARIES, *NETWORKS) if one.name in OTHERS):
+            best = results_of(replace(peer, defaults=False), data, given, how.get(peer.name, ""))[0]
+            yield peer.name, seconds, rmse(given, best.found) if best.found else np.nan
+
+
+def table(rows: pd.DataFrame, unit: str) -> str:
+    """Return a table of errors, a column for every amount of data."""
+    wide = rows.pivot_table(index="model", columns="seconds", values="error", dropna=False)
+    heads = [f"{numeral(seconds, 3)} s" for seconds in wide.columns]
+    lines = [f"| model | {' | '.join(heads)} |", f"|---|{'---:|' * len(heads)}"]
+    for model, values in wide.sort_values(wide.columns[-1]).iterrows():
+        lines.append(f"| {model} | {' | '.join(numeral(float(x), 3) for x in values)} |")
+    return f"RMSE [{unit}]:\n\n" + "\n".join(lines)
+
+
+def main() -> None:
+    """Measure, and write the page."""
+    warnings.simplefilter("ignore")
+    (folder,) = map(Path, sys.argv[1:])
+    board = pd.read_csv(BOARD).fillna({"task": "", "how": ""})
+    tables = []
+    for one in chosen_in(folder, list(TASKS)):
+        task, models = TASKS[one.name]
+        (part,) = (each for each in parts_of(one, one.recordings()) if each.task.name == task)
+        lines = board[(board["set"] == one.name) & (board["task"] == task)]
+        how = dict(zip(lines["model"], lines["how"], strict=True))
+        rows = []
+        for row in errors(part, one.name, models, how):
+            print(one.name, *row, flush=True)
+            rows.append(row)
+        frame = pd.DataFrame(rows, columns=["model", "seconds", "error"])
+        heading = ": ".join(filter(None, [one.title, task]))
+        unit = part.split.test[0].units[part.channels.outputs[0]]
+        tables.append(f"\n## {heading}\n\n{table(frame, unit)}\n")
+    PAGE_FILE.write_text(PAGE.format(tables="".join(tables)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

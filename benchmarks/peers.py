@@ -1,4 +1,4 @@
-"""Other libraries and a GRU beside this package's models: their lines of the leaderboard.
+"""Other libraries and networks beside this package's models: their lines of the leaderboard.
 
 Their environment: python3 -m venv peers-env && peers-env/bin/pip install . -r benchmarks/peers.txt
 Run: peers-env/bin/python benchmarks/peers.py FOLDER ENTRIES [--only SET] [--models NAME] [--again]
@@ -24,6 +24,7 @@ import time
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -35,8 +36,10 @@ from mckibben import compare
 from mckibben.errors import MckibbenError
 from mckibben.measured.scoring import START, Part, entries, parts_of
 from mckibben.measured.sets import Set, chosen_in
+from mckibben.numerals import numeral
 from mckibben.recording import Recording
-from peers_libraries import PEERS, Array, Peer, Run, Settings, Trial
+from peers_libraries import LIBRARIES, Array, Peer, Run, Settings, Simulate, Trial
+from peers_networks import NETWORKS
 
 OURS = (
     *("balance", "balance-force", "gpi", "cpi", "preisach", "coupled-memory", "force-chou"),
@@ -45,6 +48,9 @@ OURS = (
 
 BUDGET = 30.0
 """Seconds of processor time that a search may take."""
+
+TRY, SECONDS = 5.0, 25.0
+"""Seconds of processor time that a training may take in a search, and after it."""
 
 HELD_BACK = 4
 """One of so many recordings is held back of the training side; of fewer, each one's last such part."""
@@ -82,6 +88,7 @@ class Result:
     name: str
     how: str = ""
     validation: float = np.inf
+    error: float = np.inf
     found: Sequence[Array] = ()
     reason: str = ""
 
@@ -157,30 +164,68 @@ def reason(error: BaseException) -> str:
     return f"{type(error).__name__}: {words[0]}"[:200]
 
 
+FITTED: dict[str, Simulate] = {}
+SEARCHED: dict[str, tuple[Settings | None, Result]] = {}
+"""Models and searches by name, settings and data: two tasks may have the same training side."""
+
+
+def digest(runs: Sequence[Run]) -> str:
+    return sha256(b"".join(np.hstack(run).tobytes() for run in runs)).hexdigest()
+
+
+def fitted(peer: Peer, runs: Sequence[Run], how: Settings, data: Data) -> Simulate:
+    """Return a peer's model, fitted once."""
+    key = f"{peer.name} {how} {digest(runs)}"
+    if key not in FITTED:
+        FITTED[key] = peer.fit(runs, how, data.held)
+    return FITTED[key]
+
+
+def validated(peer: Peer, how: Settings, data: Data) -> float:
+    """Return the error on what is held back of a peer fitted to the rest."""
+    simulate = fitted(peer, data.fitted, how, data)
+    return rms(data.held, [one.run(simulate) for one in data.held], data.scale)
+
+
 def tested(peer: Peer, how: Settings, data: Data, part: Part, row: Result) -> Result:
     """Return the result of a peer with these settings, fitted to the whole training side."""
+    how = how | {"seconds": SECONDS} if peer.stops_early else how
     try:
-        with limited(peer.seconds or 4 * BUDGET):
-            simulate = peer.fit(data.fitted if peer.stops_early else data.train, how, data.held)
+        with limited(peer.seconds):
+            if peer.seeds and not peer.stops_early:
+                row = replace(row, validation=validated(peer, how, data))
+            runs = data.fitted if peer.stops_early else data.train
+            simulate = fitted(peer, runs, how, data)
             if peer.stops_early:
                 held = rms(data.held, [one.run(simulate) for one in data.held], data.scale)
                 row = replace(row, validation=held)
             found = [one.run(simulate) for one in data.tests]
     except (Exception, SystemExit) as error:  # a peer may fail in ways of its own
         return replace(row, reason=reason(error))
-    if not np.isfinite(rms(data.tests, found, data.scale)):
+    missed = rms(data.tests, found, data.scale)
+    if not np.isfinite(missed):
         return replace(row, reason="its free run on the test runs away")
     lengths = [len(run) for run in part.split.test]
     own = [y[len(y) - n :] for y, n in zip(found, lengths, strict=True)]
-    return replace(row, found=[y * data.scale + data.offset for y in own])
+    return replace(row, found=[y * data.scale + data.offset for y in own], error=missed)
 
 
-def searched(peer: Peer, data: Data, part: Part, row: Result) -> Result:
-    """Return the result of a peer with the settings that do best on what is held back, in the budget.
+def seeded(peer: Peer, how: Settings, data: Data, part: Part, row: Result) -> Result:
+    """Return the result of the seed whose validation error is the median, and all seeds' errors."""
+    tries = [tested(peer, how | {"seed": seed}, data, part, row) for seed in range(peer.seeds)]
+    order = sorted(range(peer.seeds), key=lambda seed: tries[seed].validation)
+    seed = order[peer.seeds // 2]
+    errors = sorted(one.error for one in tries)
+    spread = f"seed={seed} of {peer.seeds} with {numeral(errors[0], 3)} to {numeral(errors[-1], 3)}"
+    return replace(tries[seed], how=", ".join(filter(None, [row.how, spread])))
+
+
+def searched(peer: Peer, data: Data, row: Result) -> tuple[Settings | None, Result]:
+    """Return the settings that do best on what is held back, in the budget; none if all fail.
 
     One that takes a quarter of the budget is given up, so that others get their turn.
     """
-    best: Settings = {}
+    best: Settings | None = None
     best_error, tries, why = float("inf"), 0, "none of its settings runs free"
     started = time.process_time()
     for how in peer.grid:
@@ -190,8 +235,10 @@ def searched(peer: Peer, data: Data, part: Part, row: Result) -> Result:
         tries += 1
         try:
             with limited(min(left, BUDGET / 4)):
-                simulate = peer.fit(data.fitted, how, data.held)
-                error = rms(data.held, [one.run(simulate) for one in data.held], data.scale)
+                given = how | {"seed": 0} if peer.seeds else how
+                error = validated(
+                    peer, given | {"seconds": TRY} if peer.stops_early else given, data
+                )
         except (Exception, SystemExit) as failed:
             why = reason(failed)
             continue
@@ -199,8 +246,9 @@ def searched(peer: Peer, data: Data, part: Part, row: Result) -> Result:
             best, best_error = how, error
     there = len(peer.grid)
     count = f"the best of {tries}" + (f" in time, of {there}" if tries < there else "")
-    row = replace(row, how=", ".join([*words(best), count]), validation=best_error)
-    return tested(peer, best, data, part, row) if best else replace(row, reason=why)
+    if best is None:
+        return None, replace(row, reason=why)
+    return best, replace(row, how=", ".join([*words(best), count]), validation=best_error)
 
 
 def words(how: Settings) -> list[str]:
@@ -208,23 +256,24 @@ def words(how: Settings) -> list[str]:
 
 
 def results_of(peer: Peer, data: Data, part: Part, again: str) -> list[Result]:
-    """Return the results of a peer: by its defaults and by a search, or of the median of its seeds.
+    """Return the results of a peer: by a search, and by its defaults if it has any.
 
-    ``again`` has the settings found before, which are then neither searched for nor tried beside others.
+    ``again`` has the settings found before, which are then not searched for.
     """
-    row = Result(peer.name, again)
-    matching = [how for how in peer.grid if again and {*words(how)} <= {*again.split(", ")}]
-    if before := next(iter(matching), None):
-        found = [tested(peer, before, data, part, row)]
-    elif peer.seconds:
-        tries = [
-            tested(peer, how, data, part, replace(row, how=", ".join(words(how))))
-            for how in peer.grid
-        ]
-        found = [sorted(tries, key=lambda one: one.validation)[len(tries) // 2]]
-    else:
-        found = [searched(peer, data, part, row)]
-    if not peer.seconds:
+    before = {*again.split(", ")}
+    matching = [how for how in peer.grid if again and {*words(how)} <= before]
+    row = Result(peer.name, again.partition(", seed=")[0])
+    best: Settings | None = next(iter(matching), None)
+    if best is None and len(peer.grid) > 1:
+        key = f"{peer.name} {digest(data.train)}"
+        if key not in SEARCHED:
+            SEARCHED[key] = searched(peer, data, Result(peer.name))
+        best, row = SEARCHED[key]
+    elif best is None:
+        best, row = peer.grid[0], Result(peer.name, ", ".join(words(peer.grid[0])))
+    of_best = seeded if peer.seeds else tested
+    found = [row if best is None else of_best(peer, best, data, part, row)]
+    if peer.defaults:
         found.append(tested(peer, {}, data, part, Result(f"{row.name} defaults")))
     return found
 
@@ -282,7 +331,7 @@ def main() -> None:
     parser.add_argument("--again", action="store_true")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
-    peers = [one for one in PEERS if one.name in given.models or not given.models]
+    peers = [one for one in (*LIBRARIES, *NETWORKS) if one.name in given.models or not given.models]
     for one in chosen_in(given.folder, given.only):
         board = pd.read_csv(BOARD).fillna({"task": "", "how": ""}) if BOARD.exists() else None
         lines = [] if board is None else [board]

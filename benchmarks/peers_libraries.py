@@ -1,4 +1,4 @@
-"""Other libraries that identify models from recordings, each called as its documentation does.
+"""Other libraries than networks that identify models, each called as its documentation does.
 
 None is in this project's environment: they are imported when they are used, and typed as anything.
 """
@@ -6,11 +6,10 @@ None is in this project's environment: they are imported when they are used, and
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from itertools import product
+from itertools import combinations_with_replacement, product
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ Run = tuple[Array, Array]
 Simulate = Callable[[Array, Array], Array]
 """From inputs (n, k) and the first p measured outputs (p, m) to outputs (n, m), free from p on."""
 
-Settings = Mapping[str, Any]
+Settings = dict[str, Any]
 
 MOST_KNOWN = 200
 """Known outputs, the last ones, that the state of a linear model is found from."""
@@ -33,9 +32,8 @@ MOST_KNOWN = 200
 MOST_TERMS = 30
 """Terms that FROLS may select where its settings are searched for."""
 
-UNITS, RATE, CHUNK, EPOCHS, PATIENCE, SECONDS = 32, 5e-3, 100, 400, 60, 25.0
-"""Of the network: units, Adam's rate, samples after which gradients are cut, most epochs, epochs without
-a lower error on the trials after which training stops, and most seconds of processor time."""
+MOST_LIFTED = 300
+"""Monomials that a Koopman model may have."""
 
 
 @dataclass(frozen=True)
@@ -57,15 +55,18 @@ class Peer:
     """A way to identify a model, and the settings to search among, cheapest first.
 
     From training runs, settings (none: the library's defaults), and trials to stop a training early by,
-    `fit` makes a model. With `seconds`, for one fit, the grid is not searched: the median is taken.
-    `sets` are those that it is for, where it is not for all.
+    `fit` makes a model. `defaults` are those of a library that has some. With `seeds`, a model is fitted
+    by so many at the settings found, and the median taken; one that `stops_early` does so on what is
+    held back. `sets` are those that it is for, where it is not for all; `seconds` the most for one fit.
     """
 
     name: str
     fit: Callable[[Sequence[Run], Settings, Sequence[Trial]], Simulate]
     grid: Sequence[Settings]
-    seconds: float = 0.0
+    seconds: float = 120.0
+    seeds: int = 0
     stops_early: bool = False
+    defaults: bool = False
     sets: tuple[str, ...] = ()
 
 
@@ -171,107 +172,52 @@ def n4sid(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simula
     return simulate
 
 
-def gru(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
-    """Train torch's GRU on runs at once; return it with the weights that do best on the trials.
-
-    It is trained free-running, by truncated back-propagation through time.
-    """
-    torch = import_module("torch")
-    torch.set_num_threads(1)  # so small a network is slower on several
-    torch.manual_seed(how["seed"])
-    inputs, outputs = runs[0][0].shape[1], runs[0][1].shape[1]
-    nn = torch.nn
-    parts = nn.ModuleDict(
-        {
-            "start": nn.Linear(inputs + outputs, UNITS),
-            "memory": nn.GRU(inputs, UNITS, batch_first=True),
-            "output": nn.Linear(UNITS, outputs),
-        }
-    )
-    optimiser = torch.optim.Adam(parts.parameters(), lr=RATE)
-
-    def tensor(values: Array) -> Any:
-        return torch.as_tensor(np.ascontiguousarray(values), dtype=torch.float32)
-
-    def simulate(u: Array, known: Array) -> Array:
-        with torch.no_grad():
-            begun = torch.tanh(parts["start"](tensor(np.concatenate([u[0], known[0]]))))
-            states, _ = parts["memory"](tensor(u)[None], begun[None, None])
-            return np.asarray(parts["output"](states)[0].numpy(), dtype=float)
-
-    def batch(columns: Sequence[Array]) -> Any:
-        padded = [np.pad(one, ((0, longest - len(one)), (0, 0))) for one in columns]
-        return torch.stack([tensor(one) for one in padded])
-
-    longest = max(len(u) for u, _ in runs)
-    given, wanted = batch([u for u, _ in runs]), batch([y for _, y in runs])
-    counted = batch([np.ones((len(u), 1)) for u, _ in runs])
-    best, best_error, best_epoch = parts.state_dict(), math.inf, 0
-    ends = time.process_time() + SECONDS
-    for epoch in range(EPOCHS):
-        state = torch.tanh(parts["start"](torch.cat([given[:, 0], wanted[:, 0]], dim=1)))[None]
-        for first in range(0, longest, CHUNK):
-            piece = slice(first, first + CHUNK)
-            states, state = parts["memory"](given[:, piece], state)
-            missed = (parts["output"](states) - wanted[:, piece]) * counted[:, piece]
-            loss = missed.square().sum() / counted[:, piece].sum().clamp(min=1.0)
-            optimiser.zero_grad()
-            loss.backward()
-            nn.utils.clip_grad_norm_(parts.parameters(), 1.0)
-            optimiser.step()
-            state = state.detach()
-        missing = [(one.run(simulate) - one.outputs)[one.known :] for one in trials]
-        error = sum(float(np.sum(one**2)) for one in missing)
-        if error < best_error:
-            best = {name: value.clone() for name, value in parts.state_dict().items()}
-            best_error, best_epoch = error, epoch
-        if epoch - best_epoch > PATIENCE or time.process_time() > ends:
-            break
-    parts.load_state_dict(best)
-    return simulate
+def lifted(values: Array, degree: int) -> Array:
+    """Return all monomials (n, k) of columns up to a degree, the constant first."""
+    columns = [np.ones(len(values))]
+    for power in range(1, degree + 1):
+        for chosen in combinations_with_replacement(values.T, power):
+            columns.append(np.prod(chosen, axis=0))
+    return np.column_stack(columns)
 
 
-def jax_rnn(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
-    """Fit jax-sysid's recurrent network as its authors' script for the Bouc-Wen benchmark does.
+def koopman(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
+    """Fit PyDMD's DMDc to monomials of delayed outputs and inputs: EDMD with control.
 
-    Three states and 16 hidden units each for state and output, beside a linear model that starts it;
-    200 epochs of Adam, then L-BFGS. The test's start is learned from its known outputs alone.
+    What is lifted evolves linearly, driven by the powers of each input; runs are joined.
     """
     del trials
-    jax, models = import_module("jax"), import_module("jax_sysid.models")
-    jax.config.update("jax_enable_x64", True)
-    gelu, states, hidden = jax.nn.gelu, 3, 16
-    inputs, outputs = runs[0][0].shape[1], runs[0][1].shape[1]
-    u, y = [u for u, _ in runs], [y for _, y in runs]
+    delays, degree = how["delays"], how["degree"]
 
-    def step(x: Any, u: Any, params: Any) -> Any:
-        p = params
-        return p[0] @ x + p[1] @ u + p[5] @ gelu(p[3] @ x + p[4] @ u + p[6]) + p[7]
+    def states(u: Array, y: Array) -> Array:
+        """Return what is lifted of the samples from `delays` on."""
+        n = len(y)
+        past = [y[lag : n - delays + lag] for lag in range(delays, -1, -1)]
+        past += [u[lag : n - delays + lag] for lag in range(delays - 1, -1, -1)]
+        count = math.comb(sum(one.shape[1] for one in past) + degree, degree)
+        if count > MOST_LIFTED:
+            raise ValueError(f"{count} monomials are more than {MOST_LIFTED}")
+        return lifted(np.hstack(past), degree)
 
-    def output(x: Any, u: Any, params: Any) -> Any:
-        del u
-        p = params
-        return p[2] @ x + p[9] @ gelu(p[8] @ x + p[10]) + p[11]
+    def driving(u: Array) -> Array:
+        return np.hstack([u**power for power in range(1, degree + 1)])
 
-    linear = models.LinearModel(states, outputs, inputs, feedthrough=False)
-    linear.loss(rho_x0=1e-3, rho_th=1e-2)
-    linear.optimization(adam_epochs=0, lbfgs_epochs=1000, iprint=-1)
-    linear.fit(y, u)
-    rng = np.random.default_rng(how["seed"])
-    shapes: list[Any] = [(hidden, states), (hidden, inputs), (states, hidden), hidden, states]
-    shapes += [(hidden, states), (outputs, hidden), hidden, outputs]
-    small = [
-        0.1 * rng.standard_normal(n) if isinstance(n, tuple) else np.zeros((n,)) for n in shapes
-    ]
-    model = models.Model(states, outputs, inputs, state_fcn=step, output_fcn=output)
-    model.init([*linear.params, *small])
-    model.loss(rho_x0=1e-8, rho_th=1e-12)
-    model.optimization(adam_epochs=200, lbfgs_epochs=how["epochs"], iprint=-1)
-    model.fit(y, u)
+    u, y = joined(runs)
+    given = ahead(u, how)
+    model = import_module("pydmd").DMDc(svd_rank=how["rank"], svd_rank_omega=how["rank"])
+    model.fit(states(given, y).T, driving(given)[delays:-1].T)
+    basis = np.real(model.basis)
+    a = basis @ np.real(model.operator.as_numpy_array) @ basis.T
+    b = np.real(model.B)
 
     def simulate(u: Array, known: Array) -> Array:
-        start = model.learn_x0(u[: len(known)], known, RTS_epochs=10, verbosity=False)
-        return np.asarray(model.predict(start, u)[0])
+        given, first, m = ahead(u, how), len(known), known.shape[1]
+        state = states(given[:first], known)[-1]
+        found = []
+        for push in driving(given)[first - 1 : -1] @ b.T:
+            state = a @ state + push
+            found.append(state[1 : 1 + m])
+        return np.vstack([known, found])
 
     return simulate
 
@@ -350,27 +296,29 @@ def mujoco_sysid(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) ->
     return simulate
 
 
-PEERS = (
-    Peer("SIPPY ARX", arx, grid(present=[False, True], poles=[1, 2, 3, 5], zeros=[1, 2, 4])),
+LIBRARIES = (
+    Peer(
+        "SIPPY ARX",
+        arx,
+        grid(present=[False, True], poles=[1, 2, 3, 5], zeros=[1, 2, 4]),
+        defaults=True,
+    ),
     Peer(
         "SIPPY N4SID",
         n4sid,
         grid(SS_f=[10, 20], SS_D_required=[False, True], SS_fixed_order=[1, 2, 3, 4, 6, 8]),
+        defaults=True,
     ),
     Peer(
         "sysidentpy FROLS",
         frols,
         grid(lags=[1, 2, 3, 5], degree=[1, 2, 3], present=[True, False]),
-    ),
-    Peer(f"torch GRU {UNITS}", gru, grid(seed=[0, 1, 2]), seconds=4 * SECONDS, stops_early=True),
-    Peer(
-        "jax-sysid RNN",
-        jax_rnn,
-        grid(seed=[3], epochs=[500]),
-        seconds=1200.0,
-        sets=("bouc_wen_benchmark",),
+        defaults=True,
     ),
     Peer(
-        "MuJoCo sysid", mujoco_sysid, grid(seed=[0]), seconds=300.0, sets=("festo_isometric_20mm",)
+        "PyDMD Koopman",
+        koopman,
+        grid(degree=[1, 2, 3], delays=[1, 2, 4, 8, 16], present=[True, False], rank=[-1, 0]),
     ),
+    Peer("MuJoCo sysid", mujoco_sysid, [{}], seconds=300.0, sets=("festo_isometric_20mm",)),
 )

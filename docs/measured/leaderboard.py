@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
 
-from mckibben.measured.sets import KNOWN, split_of
+from mckibben.measured.sets import KNOWN, Published, split_of
 from mckibben.numerals import numeral
 
 HERE = Path(__file__).parent
@@ -16,18 +17,23 @@ TABLES = "<!-- tables -->\n"
 """End of the page's introduction."""
 
 
-def table(lines: pd.DataFrame) -> str:
-    """Return the table of a task, sorted by error."""
+def table(lines: pd.DataFrame, published: Sequence[Published]) -> str:
+    """Return the table of a task, sorted by error, with published figures in their place."""
     unit = lines["unit"].iloc[0]
     rows = [
         f"| model | free-run error [{unit}] | of range [%] | width reproduced [%] | settings |",
         "|---|---:|---:|---:|---|",
     ]
-    for line in lines.sort_values("rmse").itertuples():
-        cells = [numeral(value, 3) for value in (line.rmse, line.percent)]
-        width = numeral(line.width, 3)
-        rows.append(f"| {line.model} | {' | '.join(cells)} | {width} | {line.how} |")
-    return "\n".join(rows)
+    found = []
+    for line in lines.itertuples():
+        cells = [numeral(value, 3) for value in (line.rmse, line.percent, line.width)]
+        found.append((line.rmse, f"| {line.model} | {' | '.join(cells)} | {line.how} |"))
+    for figure in published:
+        source = f"[published]({figure.link})" if figure.link else "published"
+        found.append(
+            (figure.rmse, f"| *{figure.what}* | {numeral(figure.rmse, 3)} | | | {source} |")
+        )
+    return "\n".join([*rows, *(row for _, row in sorted(found))])
 
 
 def main() -> None:
@@ -41,9 +47,8 @@ def main() -> None:
         for task in split.tasks:
             of_task = own[own["task"] == task.name]
             if not of_task.empty:
-                parts.append(
-                    f"### {task.name}\n\n{table(of_task)}" if task.name else table(of_task)
-                )
+                rows = table(of_task, task.published)
+                parts.append(f"### {task.name}\n\n{rows}" if task.name else rows)
     page.write_text("\n\n".join(part.strip() for part in parts) + "\n", encoding="utf-8")
 
 

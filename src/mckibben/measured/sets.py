@@ -32,10 +32,11 @@ class _Strict(BaseModel):
 
 
 class Published(_Strict):
-    """A printed figure for the same test: its source, and its RMSE in the unit of the output."""
+    """A printed figure for the same test: its RMSE in the unit of the output, and where it stands."""
 
     what: str
     rmse: float
+    link: str = ""
 
 
 class Task(_Strict):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,9 +45,9 @@ PAGE = """# How much data a model needs
 ```{{index}} little data, data efficiency, networks, when physics wins
 ```
 
-Free-run errors on the test, of models that are given the first part of every training recording. The settings of other libraries
-are those of the [leaderboard](leaderboard.md), found on all of the training data; their weights, as all of this package's models,
-are of the part alone.
+Free-run errors on the test, of models that are given the first part of every training recording. The
+settings of other libraries are those of the [leaderboard](leaderboard.md), found on all of the training
+data; their weights, as all of this package's models, are of the part alone.
 
 Written by `python benchmarks/little_data.py FOLDER`, in the environment of `benchmarks/peers.txt`.
 {tables}"""
@@ -72,7 +72,9 @@ def rmse(part: Part, found: Sequence[np.ndarray]) -> float:
     return float(np.sqrt((missed**2).mean(axis=0)).mean())
 
 
-def errors(part: Part, name: str, models: Sequence[str], how: dict[str, str]) -> Iterator[tuple]:
+def errors(
+    part: Part, models: Sequence[str], how: Mapping[str, str]
+) -> Iterator[tuple[str, float, float]]:
     """Yield model, seconds of training and error."""
     for share in SHARES:
         given = little(part, share)
@@ -88,7 +90,7 @@ def errors(part: Part, name: str, models: Sequence[str], how: dict[str, str]) ->
 def table(rows: pd.DataFrame, unit: str) -> str:
     """Return a table of errors, a column for every amount of data."""
     wide = rows.pivot_table(index="model", columns="seconds", values="error", dropna=False)
-    heads = [f"{numeral(seconds, 3)} s" for seconds in wide.columns]
+    heads = [f"{numeral(float(str(seconds)), 3)} s" for seconds in wide.columns]
     lines = [f"| model | {' | '.join(heads)} |", f"|---|{'---:|' * len(heads)}"]
     for model, values in wide.sort_values(wide.columns[-1]).iterrows():
         lines.append(f"| {model} | {' | '.join(numeral(float(x), 3) for x in values)} |")
@@ -107,7 +109,7 @@ def main() -> None:
         lines = board[(board["set"] == one.name) & (board["task"] == task)]
         how = dict(zip(lines["model"], lines["how"], strict=True))
         rows = []
-        for row in errors(part, one.name, models, how):
+        for row in errors(part, models, how):
             print(one.name, *row, flush=True)
             rows.append(row)
         frame = pd.DataFrame(rows, columns=["model", "seconds", "error"])

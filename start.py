@@ -1,4 +1,4 @@
-"""Set up everything in this clone, and do a job: ``python3 start.py study`` or ``python3 start.py test``.
+"""Set up this clone, and do a job: ``python3 start.py study`` or ``python3 start.py test``.
 
 Needs Python 3.11 to 3.14 alone. What is set up is in ``.venv``; a second time takes a moment.
 """

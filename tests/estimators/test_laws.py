@@ -96,7 +96,7 @@ def test_pickled_it_has_its_numbers_and_not_the_recordings(name: str) -> None:
 
 OF_ANY_RATES = (
     *("balance", "coupled-memory", "coupled-pi", "play-ridge"),
-    *("sdchm", "sdchm-published", "tsfnn"),
+    *("sdchm", "sdchm-published", "state-network", "tsfnn"),
 )
 
 

@@ -137,16 +137,6 @@ def test_loggers_with_clocks_side_by_side(gauge_at: str, laser_at: str, tmp_path
         several([gauge, laser], join=True, columns={"force": "F"})  # type: ignore[arg-type]
 
 
-def test_loggers_are_joined_by_the_start_that_their_notes_state(tmp_path: Path) -> None:
-    gauge = put(tmp_path / "gauge.csv", "# started 14:02:11.250\ntime_s,pressure_bar", T, P)
-    late = "# Start time: 2026-03-01 14:02:11.750\ntime_s,displacement_mm"
-    laser = put(tmp_path / "laser.csv", late, T[:2500], np.interp(T[:2500] + 0.5, T, Y))
-    (joint,) = several([gauge, laser], join=True)  # type: ignore[arg-type]
-    assert joint["pressure"] == pytest.approx(
-        pressure(0.5 + STEP * np.arange(len(joint))), abs=1e-3
-    )
-
-
 def test_the_clock_of_one_of_two_loggers_is_shifted_by_hand(tmp_path: Path) -> None:
     laser = put(tmp_path / "b.csv", "time_s,displacement_mm", T[:2500], Y[:2500])
     shifted = one(laser, calibration={"time": (1.0, 0.5)})

@@ -454,7 +454,7 @@ def plants(workspace: Workspace, name: str) -> dict[str, str]:
     found |= {f"model {x}": another(x) for x in models if x in stale and x != name}
     key = f"plants {models} {workspace.channels()}"
     fitting = of_model(workspace, name, key, lambda: [*filter(fits, found)])
-    return {plant: found[plant] for plant in fitting}
+    return {plant: words for plant, words in found.items() if plant in fitting}
 
 
 def laws(workspace: Workspace, name: str, plant: str) -> dict[str, str]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.channels import by_name, channels_of, loop_of
+from mckibben.diagnosis.coupling import FOLLOWS
 from mckibben.diagnosis.excitation import extremes
 from mckibben.diagnosis.loops import (
     FIGURES,
@@ -225,12 +226,16 @@ def characterize(
     if not others:
         return _measured(runs, given, wanted)
     levels = _levels(runs, given, wanted, others)
-    if not levels and {*others} <= {*channels_of(runs, given, wanted).further}:
-        together = f"{', '.join(others)} moves with the input, and its effect is in the loop"
-        return replace(_measured(runs, given, wanted), notes=(together,))
+    if not levels:
+        following = [name for name in others if _follows(runs, name, wanted)]
+        rest = [name for name in others if name not in following]
+        if following and not rest:
+            together = f"{', '.join(following)} moves with {wanted}, and its effect is in the loop"
+            return replace(_measured(runs, given, wanted), notes=(together,))
+        levels = _levels(runs, given, wanted, rest) if following else []
     if not levels:
         raise DataError(
-            f"it moves only together with {', '.join(others)}: its effect alone cannot be identified",
+            f"it never moves while {', '.join(others)} stay constant: its effect is not identifiable",
             file=runs[0].source,
             channel=given,
             remedy="record one in which it moves alone; models of several inputs need no such recording",
@@ -246,6 +251,14 @@ def characterize(
         levels=tuple(levels) if len(levels) > 1 else (),
         **_counts(runs, given, wanted),
     )
+
+
+def _follows(runs: Sequence[Recording], load: str, wanted: str) -> bool:
+    """Return whether a load follows from the output, as that of a spring."""
+    if load in by_name(runs)[0]:  # a drive
+        return False
+    moved = np.concatenate([run.matrix([load, wanted]) for run in runs])
+    return bool(np.corrcoef(moved.T)[0, 1] ** 2 > FOLLOWS)
 
 
 def _levels(

@@ -25,6 +25,7 @@ from mckibben.files.instants import may_be_instant
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.table import Column, Table
+from mckibben.files.timebase import MOST_WITHOUT_TIME
 from mckibben.files.units import find, weight
 from mckibben.recording import COMMAND, REFERENCE, REST_LENGTH, conversion
 from mckibben.system.atomic import Numbers
@@ -244,6 +245,7 @@ def _only_time(named: Mapping[str, Column], source: Source) -> Column | None:
         for column in named.values()
         if column.values is not None
         and (_target(column) == "s" or time_unit(column.label))
+        and np.isfinite(column.values).mean() > 1 - MOST_WITHOUT_TIME
         and np.all(np.diff(column.values[np.isfinite(column.values)]) > 0)
     ]
     dates = [

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -93,7 +92,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         "calibration": {name: one.calibration for name, one in each if one.calibration},
         "assumed_units": [name for name, one in each if one.assumed and one.unit],
         "sampled": sampled,
-        "began": _began(times, source),
+        "began": None if times is None else times.began,
     }
     assumed = ["time in s"] if times is not None and times.assumed else []
     assumed += [f"{name} in {one.unit}" for name, one in each if one.assumed and one.unit]
@@ -108,16 +107,6 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         source.warn(f"not read: {listed(reasons)}")
     signals |= {name: _derived(name, of, signals[of], source) for name, of in derived.items()}
     return signals, times, {name: found for name, found in meta.items() if found}
-
-
-def _began(times: Times | None, source: Source) -> str | None:
-    """Return the instant of the first sample, by its time or else by what the file tells of it."""
-    told = source.table.meta.get("began")
-    if (times is not None and times.began) or not isinstance(told, str):
-        return None if times is None else times.began
-    with suppress(DataError):
-        return instants.seconds([told], source)[1]
-    return None
 
 
 def _derived(channel: str, of: str, signal: Signal, source: Source) -> Signal:
@@ -152,15 +141,21 @@ def _with_clocks(source: Source) -> Source:
         return source
     groups[:2] = [groups[0] + groups[1]]  # what is before the first clock has that one
     columns, times = [], [times_of(clock, source) for clock in clocks]
-    dated = [instants.moment(one.began) for one in times if one.began]
-    for one, group in zip(times, groups, strict=True):
-        late = instants.moment(one.began) - min(dated) if one.began else 0.0
+    for one, late, group in zip(times, starts_of(times, source), groups, strict=True):
         seconds = late + convert(one.values, one.unit, "s")
         known = np.isfinite(seconds)
         for column in group:
             values = None if column.values is None else column.values[known]
             columns.append(replace(column, values=values, times=seconds[known]))
     return replace(source, table=replace(table, columns=tuple(columns), lines=None))
+
+
+def starts_of(times: Sequence[Times], source: Source) -> list[float]:
+    """Return when clocks begin, from the first of them [s]; with a note where that is not known."""
+    found = timebase.begun([instants.moment(one.began) if one.began else None for one in times])
+    if found is None:
+        source.warn(timebase.AT_ONE_MOMENT)
+    return found or [0.0] * len(times)
 
 
 def _clock(columns: dict[str, Column], left_out: dict[str, str], source: Source) -> Times | None:
@@ -242,7 +237,8 @@ def _is_stated(channel: str, column: Column, source: Source) -> bool:
     request = source.request
     given = request.described.time if channel == "time" else request.described.channels.get(channel)
     described = given is not None and given.unit is not None and _describes(given, column)
-    return channel in request.units or described or bool(_calibration(channel, column, source))
+    calibrated = channel != "time" and bool(_calibration(channel, column, source))
+    return channel in request.units or described or calibrated
 
 
 def _numbers(channel: str, column: Column, source: Source) -> Array:

@@ -38,7 +38,8 @@ def pieces(
     Parameters
     ----------
     channels : dict
-        Samples, NaN where they are missing; those that are not needed are then left out.
+        Samples, NaN where they are missing; those that are not needed are left out where that is not
+        bridged.
     times : Times or None
         None where ``step`` is stated or there is no time.
     step, start : float
@@ -52,7 +53,8 @@ def pieces(
         long enough; or if steps are so long that the unit of the times is in doubt.
     """
     missing = _missing(channels, source)
-    holes = np.logical_or.reduce(list(missing.values()))
+    needed = [mask for name, mask in missing.items() if source.request.needs(name)]
+    holes = np.logical_or.reduce(needed or list(missing.values()))
     time = np.arange(holes.size, dtype=float) if times is None else times.values
     split = source.request.gaps == "split"
     inside = ~holes if split else _enclosed(missing, source)

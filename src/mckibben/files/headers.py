@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from mckibben.channels import QUANTITIES
-from mckibben.files.names import AMBIGUOUS, CHANNELS, MEASURED, PLACES, ROLES, UNITS, words_of
+from mckibben.files.names import AMBIGUOUS, CHANNELS, MEASURED, MUSCLES, ROLES, UNITS, words_of
 from mckibben.files.units import COUNTS, GAUGE, find, find_listed, weight
 from mckibben.recording import base_name, standard_unit
 
@@ -18,8 +18,8 @@ LONGEST = 256
 """Characters of a header."""
 
 _ROLES, _CHANNELS, _UNITS = words_of(ROLES), words_of(CHANNELS), words_of(UNITS)
-_MEASURED, _PLACES = words_of(MEASURED), words_of(PLACES)
-_BEFORE = sorted({*_ROLES, *_PLACES}, key=len, reverse=True)
+_MEASURED, _MUSCLES = words_of(MEASURED), words_of(MUSCLES)
+_BEFORE = sorted({*_ROLES, *_MUSCLES}, key=len, reverse=True)
 _ATTACHED = re.compile("|".join(word for word in _BEFORE if word > "\u3000"))
 """Words that languages without blanks put before the channel: 目標圧力."""
 _ABOUT = {"variance", "var", "covariance", "std", "stddev", "status", "valid", "flag", "count"}
@@ -77,7 +77,7 @@ def parse(text: str) -> Header:
         inner = parse(last)
         return Header(" ".join([*path, inner.name]), inner.unit)
     bracketed = _BRACKETED.fullmatch(text)
-    if bracketed and bracketed["name"] and _PLACES.keys().isdisjoint(_words(bracketed["unit"])):
+    if bracketed and bracketed["name"] and _MUSCLES.keys().isdisjoint(_words(bracketed["unit"])):
         name, unit = bracketed["name"], bracketed["unit"].strip()
         if GAUGE.fullmatch(f"{_last(name)} {unit}"):  # Pressure kPa(a)
             return Header(name.removesuffix(_last(name)).rstrip(" _,"), f"{_last(name)} {unit}")
@@ -275,7 +275,7 @@ def unknown_ending(text: str) -> str:
     >>> unknown_ending("pressure_qux"), unknown_ending("Inlet pressure 2"), unknown_ending("data")
     ('qux', '', '')
     """
-    known = {part for word in (*_CHANNELS, *_ROLES) for part in word.split("_")} | {*_PLACES}
+    known = {part for word in (*_CHANNELS, *_ROLES) for part in word.split("_")} | {*_MUSCLES}
     words = re.findall(r"[^\W\d_]+", snake_case(text.rpartition("/")[2]))  # not of a topic
     named = next((k for k, word in enumerate(words) if word in known), len(words))
     return next((word for word in words[named:] if word not in known), "")
@@ -297,10 +297,11 @@ def _apart(name: str) -> list[str]:
 
 def _standard(name: str) -> str | None:
     words = _apart(name)
-    places = {_PLACES[word] for word in words if word in _PLACES}
-    others = "_".join(word for word in words if word not in _PLACES)
-    if len(places) == 1 and _CHANNELS.get(re.sub(r"_?\d*$", "", others)) == "pressure":
-        return f"pressure_{places.pop()}"
+    places = {_MUSCLES[word] for word in words if word in _MUSCLES}
+    others = "_".join(word for word in words if word not in _MUSCLES)
+    pressure, number = _numbered(others)
+    if len(places) == 1 and _CHANNELS.get(pressure) == "pressure":
+        return "_".join(["pressure", *places, *filter(None, [number.lstrip("0")])])
     alias, number = _numbered(name)
     if name in _CHANNELS or not number:
         return _CHANNELS.get(name)

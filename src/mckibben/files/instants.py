@@ -17,7 +17,7 @@ _FORM = (
     r"(?P<clock>\d{1,2}:\d{2})?(?::(?P<whole>\d{2})(?:[.,:](?P<part>\d{1,9}))?)?"
     r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)? ?(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2})?$"
 )
-_MINUTES = re.compile(r"(\d{1,3}):(\d{2}[.,]\d+)", re.ASCII)
+_MINUTES = re.compile(r"(\d{1,2}):(\d{2}[.,]\d+)", re.ASCII)
 """Minutes and seconds of a stopwatch, ``12:58.000``."""
 _BEGINNING = re.compile(
     r"\d{4}\D?\d\d|\d{1,2}[./-](?:\d{1,2}|[A-Za-z]{3})[./-]\d{2}|\d{1,2}:\d\d", re.ASCII

@@ -19,6 +19,7 @@ from mckibben.files.instants import moment
 from mckibben.files.notices import listed, warn
 from mckibben.files.request import GAPS_BRIDGED, Request, Source
 from mckibben.files.table import Column, Table
+from mckibben.files.timebase import AT_ONE_MOMENT, YEARS_2001_TO_2049, begun
 from mckibben.recording import SAME_TIME, Recording
 
 MEETS = 0.02
@@ -72,8 +73,8 @@ def _joined(recordings: Sequence[Recording], request: Request) -> Recording:
         remedy = "join pieces with the same channels, or loggers with different ones"
         raise DataError(problem, file=recordings[0].source, channel=shared[0], remedy=remedy)
     own = [one.select([name for name in one if name not in twice]) for one in recordings]
-    if any(_began(one) is None for one in own):
-        warn(_path(own), "clocks are taken to begin at one moment, as not all files have dates")
+    if any(_moment(one) is None for one in own):
+        warn(_path(own), AT_ONE_MOMENT)
     return _side_by_side(_on_one_clock(own), request)
 
 
@@ -143,23 +144,21 @@ def _follows(before: Recording, after: Recording) -> bool:
 
 
 def _on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
-    """Return recordings whose start times are from one moment, if all are known to be.
-
-    Where some have no date, times of day are compared.
-    """
-    began = [began for one in recordings if (began := _began(one)) is not None]
-    if len(began) < len(recordings):
+    """Return recordings whose start times are from one moment, if all are known to be."""
+    found = begun([_moment(one) for one in recordings])
+    if found is None:
         return list(recordings)
-    dated = all("T" in one for one in began)
-    starts = [moment(one if dated else one.rpartition("T")[2]) for one in began]
-    pairs = zip(recordings, starts, strict=True)
-    return [_starting(one, one.start_time + start - min(starts)) for one, start in pairs]
+    unknown = all(_moment(one) is None for one in recordings)
+    pairs = zip(recordings, found, strict=True)
+    return list(recordings) if unknown else [_starting(one, start) for one, start in pairs]
 
 
-def _began(recording: Recording) -> str | None:
-    """Return when a recording began, as ISO 8601 or a time of day; None if unknown."""
-    began = recording.meta.get("began")
-    return began if isinstance(began, str) else None
+def _moment(recording: Recording) -> float | None:
+    """Return when a recording began [s], since 1970 or, without a date, midnight; None if unknown."""
+    began, start = recording.meta.get("began"), recording.start_time
+    if isinstance(began, str):
+        return moment(began) + start
+    return start if start > YEARS_2001_TO_2049[0] else None
 
 
 def _starting(recording: Recording, start: float) -> Recording:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Mask, Rows
 from mckibben.errors import DataError
-from mckibben.files.headers import is_time, parse, time_unit
+from mckibben.files.headers import is_time, parse
 from mckibben.files.instants import may_be_instant
 from mckibben.files.notices import warn
 from mckibben.files.sniffing import Layout
@@ -154,5 +154,4 @@ def _is_timed(rows: Sequence[bytes], layout: Layout) -> bool:
     cells = layout.dialect.split(rows[layout.first].decode("utf-8", "replace"))
     seconds = any(unit is not None and unit.target == "s" for unit in found)
     instants = (may_be_instant(cell) and not layout.dialect.form(cell)[1] for cell in cells)
-    named = any(is_time(header) or time_unit(header) for header in layout.headers)
-    return seconds or named or any(instants)
+    return seconds or any(map(is_time, layout.headers)) or any(instants)

@@ -76,7 +76,7 @@ ROLES: dict[str, dict[str, str]] = {
 }  # fmt: skip
 """References and commands of a loop -> words for them, used with or instead of a channel's name."""
 
-PLACES: dict[str, dict[str, str]] = {
+MUSCLES: dict[str, dict[str, str]] = {
     "extensor": {
         "en": "extensor ext", "de": "strecker", "fr": "extenseur", "it": "estensore", "ja": "伸筋",
         "zh": "伸肌", "ko": "신근"},

@@ -47,7 +47,9 @@ def offering(error: DataError, request: Request, before: Named, attempt: Attempt
     found = list(_outcomes(error, request, works, STEPS))
     successes = [options for options, end in found if end is None]
     offered = copy.copy(error)
-    led = successes or [options for options, _ in found]
+    led: list[Mapping[str, Any]] = []
+    for options in successes or [options for options, _ in found]:
+        led += [options] if options not in led else []
     kept = [options for options in led if None not in options.values()]  # what was stated stays
     offered.options = tuple(kept or led)
     return offered

@@ -45,21 +45,13 @@ _STATED = {
 }
 """Decimal mark -> a rate or sample time: ``Sample Interval,4e-4``, ``sampling rate [kHz]: 2``."""
 
-_BEGAN = re.compile(
-    r"(?:start(?:ed|[ _]?time|zeit)?|beg[au]n|beginn?|messbeginn|début|inizio|inicio|開始(?:時刻)?"
-    r"|开始时间)"
-    r"(?: at| um)?[\s\",;:=|]+(?P<at>(?:\d[\d./-]+\d[ T]+)?\d{1,2}:\d{2}:\d{2}[.,]\d+)",
-    re.IGNORECASE,
-)
-"""When a logger began, told with fractions of a second, so that loggers can be joined by it."""
-
 
 @dataclass(frozen=True)
 class Layout:
     """First line of samples, counted from 0, the first below them, and the column names.
 
     A line of samples has at least ``least`` cells. ``rates`` are rates and sample times that the lines
-    above state, and ``began`` is the instant of the first sample that they state.
+    above state.
     """
 
     dialect: Dialect
@@ -70,7 +62,6 @@ class Layout:
     stop: int | None = None
     rates: Mapping[str, float] = field(default_factory=dict)
     start_time: float = 0.0
-    began: str = ""
 
 
 @dataclass(frozen=True)
@@ -175,8 +166,7 @@ def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
         units = [metric[1] if "Position" in h else u for h, u in zip(headers, units, strict=True)]
     least = head.width if any(headers[head.used : head.width]) else head.used
     least = len(headers) if names.at < 0 else least
-    notes = unicodedata.normalize("NFKC", text)
-    stated, began = _STATED[head.dialect.decimal].finditer(notes), _BEGAN.search(notes)
+    stated = _STATED[head.dialect.decimal].finditer(unicodedata.normalize("NFKC", text))
     return Layout(
         head.dialect,
         headers,
@@ -185,7 +175,6 @@ def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
         least,
         rates=dict(filter(None, map(_stated, stated))),
         start_time=head.dialect.value(head.dialect.form(start)[1]) if start else 0.0,
-        began=began["at"] if began else "",
     )
 
 

@@ -17,7 +17,7 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files import formats, timebase
 from mckibben.files.channels import NAME, described
-from mckibben.files.converting import times_of
+from mckibben.files.converting import starts_of, times_of
 from mckibben.files.headers import is_standard, is_time, parse
 from mckibben.files.own import description
 from mckibben.files.request import Request, Source
@@ -222,19 +222,26 @@ def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Re
     )
     if not apart:
         return together
-    seconds: list[Array] = []
-    for at, (path, table) in enumerate(each):
-        if timed:
-            source = Source(table, request, path)
-            clock = timebase.increasing(times_of(clocks[at], source), source)
-            seconds.append(convert(clock.values, clock.unit, "s"))
-        else:
-            samples = np.arange(table.n_samples, dtype=np.float64)
-            seconds.append(table.start_time + (table.sample_time or 0.0) * samples)
+    if timed:
+        sources = [Source(table, request, path) for path, table in each]
+        read = [times_of(clock, source) for clock, source in zip(clocks, sources, strict=True)]
+        pairs = zip(read, starts_of(read, sources[0]), sources, strict=True)
+        seconds = [late + _elapsed(clock, source) for clock, late, source in pairs]
+    else:
+        seconds = [
+            table.start_time + (table.sample_time or 0.0) * np.arange(table.n_samples, dtype=float)
+            for table in tables.values()
+        ]
     if timed and all(np.array_equal(times, seconds[0]) for times in seconds):
         return together
     columns = (replace(one, times=times) for one, times in zip(signals, seconds, strict=True))
     return replace(together, columns=tuple(columns), lines=None)
+
+
+def _elapsed(clock: timebase.Times, source: Source) -> Array:
+    """Return increasing times [s]."""
+    clock = timebase.increasing(clock, source)
+    return convert(clock.values, clock.unit, "s")
 
 
 def _split(table: Table, stamp: str | None) -> tuple[list[Column], list[Column]]:

@@ -155,8 +155,7 @@ def _in_columns(
         if each.values is None and not may_be_instant(first):
             unread[each.header] = f"text, such as {first[:40]!r}" if first else "no number in it"
     start, rates = layout.start_time, layout.rates
-    meta = {"began": layout.began} if layout.began else {}
-    return Table(tuple(columns), np.array(numbers), None, start, meta, rates=rates, unread=unread)
+    return Table(tuple(columns), np.array(numbers), None, start, rates=rates, unread=unread)
 
 
 def _frames(body: bytes, layout: Layout) -> tuple[Any, Any, bool]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -40,8 +40,13 @@ _PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 MOST_WITHOUT_TIME = 0.05
 """Largest share of rows without a time that are left out."""
 
-YEARS_2001_TO_2103 = (1e9, 4.2e9)
+YEARS_2001_TO_2049 = (1e9, 2.5e9)
 """Seconds since 1970."""
+
+DAY = 86_400.0
+"""Seconds."""
+
+AT_ONE_MOMENT = "clocks are taken to begin at one moment, as not all of them have dates"
 
 
 @dataclass(frozen=True)
@@ -67,12 +72,32 @@ def since_first(times: Times) -> Times:
     """Return times since the first where they are counted since 1970, else as they are."""
     known = times.values[np.isfinite(times.values)]
     first = float(known[0]) if known.size else 0.0
-    low, high = YEARS_2001_TO_2103
+    low, high = YEARS_2001_TO_2049
     if not low < times.seconds(first) < high:
         return times
     digits = -math.ceil(math.log10(2.0 * np.spacing(first)))  # what a number of that size can hold
     values = np.round(times.values - first, digits)
     return replace(times, values=values, began=instant(times.seconds(first)))
+
+
+def begun(moments: Sequence[float | None]) -> list[float] | None:
+    """Return when clocks begin, from the first of them [s].
+
+    Moments are seconds since 1970, or since midnight where there is no date: such a clock begins on the
+    day that is nearest to a dated one. None is an unknown moment: then so are all starts, unless all are
+    unknown, and the clocks begin together.
+
+    >>> begun([1_769_860_800.0, 43_200.5]), begun([5.0, 7.0]), begun([5.0, None]), begun([None])
+    ([0.0, 0.5], [0.0, 2.0], None, [0.0])
+    """
+    known = [moment for moment in moments if moment is not None]
+    if len(known) < len(moments):
+        return None if known else [0.0] * len(moments)
+    dated = next((one for one in known if one > YEARS_2001_TO_2049[0]), None)
+    if dated is not None:
+        late = [0.0 if one > YEARS_2001_TO_2049[0] else round((dated - one) / DAY) for one in known]
+        known = [one + DAY * days for one, days in zip(known, late, strict=True)]
+    return [one - min(known) for one in known]
 
 
 class Step(NamedTuple):
@@ -232,7 +257,7 @@ def unit_by_size(time: Array, source: Source) -> str | None:
             "spreadsheets count them, or seconds"
         )
         raise source.error(problem, "", "time", 0, _time_units("day", "s"))
-    first, last = YEARS_2001_TO_2103
+    first, last = YEARS_2001_TO_2049
     for unit, per_second in _PER_SECOND.items():
         within = first <= low / per_second and high / per_second < last
         if within and unit in plausible_units(time):

@@ -168,7 +168,8 @@ def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) ->
 def _words(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
     """Show the characterization: a few sentences, and all numbers behind a fold-out."""
     others = tuple(n for n in (*sides.inputs, *sides.further) if n != pair[0])
-    dropped = {*by_name(runs)[0]} - {*sides.inputs, *sides.further}  # no inputs, as was chosen
+    modelled = {*sides.inputs, *sides.outputs, *sides.further}
+    dropped = {*by_name(runs)[0]} - modelled  # no inputs, as was chosen
     runs = [run.select([name for name in run if name not in dropped]) for run in runs]
     key = "characterization", state.workspace.digest(), pair, others, sorted(dropped)
     make = partial(characterize, runs, *pair, scheduling=others)

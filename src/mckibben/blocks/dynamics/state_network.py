@@ -279,10 +279,9 @@ class StateNetwork(Block):
     steady_state = steady_state
     parameters = ("linear", "hidden", "readout")
     formulas = (
-        r"\dot{x} = \lambda \left(L_x v + R_x \tanh(H v)\right),\quad v = \left(x,\, "
-        r"\frac{u_i - u_{0i}}{u_{si}},\, \ldots,\, 1\right)",
-        r"y_k = y_{0k} + y_{sk} \left(L_y v + R_y \tanh(H v)\right)_k,\quad L = (L_x;\, L_y),\; "
-        r"R = (R_x;\, R_y)",
+        r"z_i = \sum_j L_{ij} v_j + \sum_j R_{ij} \tanh\left(\sum_k H_{jk} v_k\right),\quad "
+        r"v = \left(x,\, \frac{u_i - u_{0i}}{u_{si}},\, \ldots,\, 1\right)",
+        r"\dot{x}_i = \lambda z_i,\quad y_k = y_{0k} + y_{sk} z_{n+k}",
     )
 
     linear: Annotated[fields.Rows, "L_{ij}"]

@@ -21,6 +21,7 @@ TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 NOTEBOOKS = runpy.run_path(str(ROOT / "docs" / "notebooks.py"))
 
 SETTING_UP = (
+    "python3 start.py",
     "python3 -m venv .venv",
     ". .venv/bin/activate",
     "pip install",

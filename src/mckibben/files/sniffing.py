@@ -150,7 +150,7 @@ RULES: tuple[Callable[[Head], Names | None], ...] = (units_alone, named, markers
 def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) -> Layout:
     """Return the layout of a table; raise a `DataError` for comments and blanks only.
 
-    Names behind those of the columns are settings of the device, ``X,CH1,Start,Increment`` of a Rigol
+    Names behind those of the columns are settings of the device, as ``X,CH1,Start,Increment`` of a
     scope, with their values in the row of units.
     """
     head, first_sample = _head(lines, path, separators)

@@ -44,22 +44,23 @@ def pid_step(
     whether references are late, kp, ki, kd]; inputs are references, measurements, bases.
     """
     n = outputs.size
-    step, share = coefficients[0], coefficients[1]
+    step, filter_share = coefficients[0], coefficients[1]
     lowest, highest = coefficients[2], coefficients[3]
-    based, late = coefficients[4] > 0.0, coefficients[5] > 0.0
+    has_base, late = coefficients[4] > 0.0, coefficients[5] > 0.0
     kp, ki, kd = coefficients[6 : 6 + n], coefficients[6 + n : 6 + 2 * n], coefficients[6 + 2 * n :]
     for k in range(n):
         reference, measured = inputs[k], inputs[n + k]
         error = (state[3 * n + k] if late else reference) - measured
-        state[n + k] += share * ((measured - state[2 * n + k]) / step - state[n + k])
+        state[n + k] += filter_share * ((measured - state[2 * n + k]) / step - state[n + k])
         state[2 * n + k], state[3 * n + k] = measured, reference
-        base = inputs[2 * n + k] if based else 0.0
-        wanted = base + kp[k] * error + state[k] - kd[k] * state[n + k]
-        way = ki[k] * error
-        further = (wanted > highest and way > 0.0) or (wanted < lowest and way < 0.0)
-        if not further:
+
+        base = inputs[2 * n + k] if has_base else 0.0
+        output = base + kp[k] * error + state[k] - kd[k] * state[n + k]
+        direction = ki[k] * error
+        winding_up = (output > highest and direction > 0.0) or (output < lowest and direction < 0.0)
+        if not winding_up:
             state[k] = accumulate(state[k], ki[k] * step * error, scratch, k)
-        outputs[k] = min(max(wanted, lowest), highest)
+        outputs[k] = min(max(output, lowest), highest)
 
 
 @kernel
@@ -289,10 +290,10 @@ class FeedforwardFeedback(Composition):
 
     def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         wires = dict(zip(self.inputs, taken, strict=True))
-        bases = self.compensator.wired(board, [wires[one] for one in self.compensator.inputs])
+        bases = self.compensator.wired(board, [wires[c] for c in self.compensator.inputs])
         wires |= dict(zip(_called(self.outputs, BASE), bases, strict=True))
-        found = self.feedback.wired(board, [wires[channel] for channel in self.feedback.inputs])
-        return [found[self.feedback.given.index(channel)] for channel in self.outputs]
+        results = self.feedback.wired(board, [wires[channel] for channel in self.feedback.inputs])
+        return [results[self.feedback.given.index(channel)] for channel in self.outputs]
 
     def joined(self, parts: Sequence[str]) -> str:
         return f"p = {parts[0]}[r] + {parts[1]}[r, y]"

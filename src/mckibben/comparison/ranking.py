@@ -297,59 +297,90 @@ def ranked(
 ) -> Generator[Ranking]:
     """Yield the ranking after every model; the last ranking is complete.
 
-    In one process fast models are first, in several the slow ones, so that none is left for the end.
-    ``watch`` is called, while a model is fitted, with its name, the share done of its fit, and the
-    least cost so far.
+    Models that the folder has rows of are not fitted again. In one process fast models are first, in
+    several the slow ones, so that none is left for the end. ``watch`` is called, while a model is
+    fitted, with its name, the share done of its fit, and the least cost so far.
     """
     checked(jobs)
-    data, table, kept = plan.data, _Table(plan), Checkpoints(folder, plan.data)
+    data, table, checkpoints = plan.data, _Table(plan), Checkpoints(folder, plan.data)
     keys = {name: (item, source(item.made)) for name, item in plan.items.items()}
     for name, reason in plan.refused.items():
         table.add(Row(name, reason=reason), ())
     for name in plan.items.keys() - plan.refused.keys():
-        row = kept.get(name, Row, *keys[name])
-        if row is not None and row.model == name and row.sound and row.block is not None:
-            table.add(row, outputs_of(row.block, data))
+        stored = checkpoints.get(name, Row, *keys[name])
+        if (
+            stored is not None
+            and stored.model == name
+            and stored.sound
+            and stored.block is not None
+        ):
+            table.add(stored, outputs_of(stored.block, data))
+
     remaining = {name: item for name, item in plan.items.items() if name not in table.rows}
     efforts = {name: effort_of(item, data) for name, item in remaining.items()}
     workers = jobs or (cores() if sum(efforts.values()) > WORTH_A_PROCESS else 1)
     tasks = sorted(remaining.items(), key=lambda task: -efforts[task[0]] if workers > 1 else 0.0)
-    begun: list[str] = []
-    started = time.monotonic()
+    work = _Work(plan, table, efforts, workers, progress)
 
-    def tell() -> None:
-        if progress is not None:
-            waiting = [name for name in remaining if name not in table.rows]
-            working = tuple(name for name in begun if name in waiting)
-            best = table.board(table.sorted()).best
-            rest = sum(efforts[name] for name in waiting)
-            done = sum(efforts.values()) - rest
-            spent = time.monotonic() - started
-            pace = spent / done if done > SURE * (done + rest) else 1 / workers
-            counts = len(table.rows), len(plan.items)
-            progress(Standing(*counts, working, best, plan.empty.unit, rest * pace))
-
-    def report(index: int, *what: float) -> None:
+    def report(index: int, *fit_progress: float) -> None:
         name, _ = tasks[index]
-        if not what and name not in begun:
-            begun.append(name)
-            tell()
-        if what and watch is not None:
-            watch(name, *what)
+        if not fit_progress:
+            work.begin(name)
+        elif watch is not None:
+            watch(name, *fit_progress)
 
-    tell()
+    work.tell()
     if table.rows:
         yield table.ranking()
     for outcome in outcomes(fit, data, tasks, workers, report, executor):
-        name, found = tasks[outcome.index][0], outcome.value
-        if not isinstance(found, FitResult):
-            found = FitResult(reason=str(outcome.error or "its process gave no result"))
-        row = _row(plan, name, found, table)
+        name, result = tasks[outcome.index][0], outcome.value
+        if not isinstance(result, FitResult):
+            result = FitResult(reason=str(outcome.error or "its process gave no result"))
+        row = _row(plan, name, result, table)
         if row.sound:  # a failure may be the machine's, not the model's
-            kept.put(name, row, *keys[name])
-        table.add(row, found.outputs)
-        tell()
+            checkpoints.put(name, row, *keys[name])
+        table.add(row, result.outputs)
+        work.tell()
         yield table.ranking()
+
+
+@dataclass
+class _Work:
+    """Models that remain to be fitted when it begins, by their ``efforts`` [s], and their progress."""
+
+    plan: Plan
+    table: _Table
+    efforts: Mapping[str, float]
+    workers: int
+    progress: Callable[[Standing], None] | None
+    begun: list[str] = field(default_factory=list)
+    started: float = field(default_factory=time.monotonic)
+
+    def begin(self, name: str) -> None:
+        """Note that a model is being fitted."""
+        if name not in self.begun:
+            self.begun.append(name)
+            self.tell()
+
+    def tell(self) -> None:
+        """Call ``progress`` with what is done, and how long the rest takes at the pace so far."""
+        if self.progress is None:
+            return
+        waiting = [name for name in self.efforts if name not in self.table.rows]
+        rest = sum(self.efforts[name] for name in waiting)
+        done = sum(self.efforts.values()) - rest
+        spent = time.monotonic() - self.started
+        pace = spent / done if done > SURE * (done + rest) else 1 / self.workers
+        self.progress(
+            Standing(
+                done=len(self.table.rows),
+                total=len(self.plan.items),
+                fitting=tuple(name for name in self.begun if name in waiting),
+                best=self.table.board(self.table.sorted()).best,
+                unit=self.plan.empty.unit,
+                seconds=rest * pace,
+            )
+        )
 
 
 def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
@@ -479,49 +510,66 @@ def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed
     """Return the row of a model: all scores, and its skill over the constant of `squares_of`."""
     if found.reason is not None:
         return Row(name, reason=found.reason)
-    names, block, n_train = data.channels.outputs, found.block, len(data.split.train)
-    rows = [*(~run.bridged for run in data.split.train), *data.split.test_rows]
-    measured = [run.matrix(names)[kept] for run, kept in zip(data.recordings, rows, strict=True)]
-    modelled = [given[kept] for given, kept in zip(found.outputs, rows, strict=True)]
-
-    def scores(part: slice) -> dict[str, Scores]:
-        columns = (np.concatenate(some[part]).T for some in (measured, modelled))
-        return {name: score(*pair) for name, *pair in zip(names, *columns, strict=True)}
-
-    on_train, on_test = scores(slice(n_train)), scores(slice(n_train, None))
-    errors = part_errors(data, found.predictions)
-    invalid, by_output, parts, skill, least = None, {}, (), None, None
-    if not all(np.isfinite(error).all() for error in errors):
-        invalid = "its outputs diverged without a part of the data"
-    elif errors:
-        by_part = np.sqrt([(error**2).mean(axis=0) for error in errors])
-        pooled = np.sqrt((np.concatenate(errors) ** 2).mean(axis=0))
-        least_error = np.maximum(LEAST_SHARE * pooled, np.finfo(float).tiny)
-        means = np.exp(np.log(np.maximum(by_part, least_error)).mean(axis=0))
-        by_output = dict(zip(names, means.tolist(), strict=True))
-        parts = tuple(by_part.mean(axis=1).tolist())
-        if constant is not None:
-            skill, least = skill_of(squares_of(errors).sum(axis=1), constant.sum(axis=1), seed)
+    on_train, on_test = _scores(data, found.outputs)
+    validation = _validation(data, found.predictions, constant, seed)
     return Row(
         model=name,
-        n_parameters=found.diagnostics.get("n_free", len(names)),
+        n_parameters=found.diagnostics.get("n_free", len(data.channels.outputs)),
         fit_seconds=found.seconds,
         step_ns=found.step_ns,
         train=mean_scores(list(on_train.values())),
         test=mean_scores(list(on_test.values())),
         outputs=on_test,
-        validation_rmse=float(np.mean(list(by_output.values()))) if by_output else None,
-        validation_by_output=by_output,
-        validation_by_part=parts,
-        validation_failed=invalid,
         validated=found.validated,
         caution=found.caution,
-        skill=skill,
-        skill_least=least,
         memory=found.memory,
-        block=block,
+        block=found.block,
         diagnostics=found.diagnostics,
+        **validation,
     )
+
+
+def _scores(data: Data, outputs: Sequence[Array]) -> tuple[dict[str, Scores], dict[str, Scores]]:
+    """Return the scores of every output on the training and on the test recordings."""
+    names, n_train = data.channels.outputs, len(data.split.train)
+    rows = [*(~run.bridged for run in data.split.train), *data.split.test_rows]
+    measured = [run.matrix(names)[part] for run, part in zip(data.recordings, rows, strict=True)]
+    modelled = [table[part] for table, part in zip(outputs, rows, strict=True)]
+
+    def scores(part: slice) -> dict[str, Scores]:
+        columns = (np.concatenate(tables[part]).T for tables in (measured, modelled))
+        return {name: score(*pair) for name, *pair in zip(names, *columns, strict=True)}
+
+    return scores(slice(n_train)), scores(slice(n_train, None))
+
+
+def _validation(
+    data: Data, predictions: Sequence[Array], constant: Array | None, seed: int
+) -> dict[str, Any]:
+    """Return the fields of a row of held-out predictions: RMSE by output and part, and skill.
+
+    The RMSE of an output is the geometric mean over parts, each of at least a share of the RMSE of all.
+    """
+    errors = part_errors(data, predictions)
+    if not all(np.isfinite(error).all() for error in errors):
+        return {"validation_failed": "its outputs diverged without a part of the data"}
+    if not errors:
+        return {}
+    by_part = np.sqrt([(error**2).mean(axis=0) for error in errors])
+    pooled = np.sqrt((np.concatenate(errors) ** 2).mean(axis=0))
+    least_error = np.maximum(LEAST_SHARE * pooled, np.finfo(float).tiny)
+    means = np.exp(np.log(np.maximum(by_part, least_error)).mean(axis=0))
+    by_output = dict(zip(data.channels.outputs, means.tolist(), strict=True))
+    skill, least = None, None
+    if constant is not None:
+        skill, least = skill_of(squares_of(errors).sum(axis=1), constant.sum(axis=1), seed)
+    return {
+        "validation_rmse": float(np.mean(list(by_output.values()))),
+        "validation_by_output": by_output,
+        "validation_by_part": tuple(by_part.mean(axis=1).tolist()),
+        "skill": skill,
+        "skill_least": least,
+    }
 
 
 def squares_of(errors: Sequence[Array]) -> Array:

@@ -42,10 +42,11 @@ Unit = Literal["auto", "run", "block"]
 Unknown = Literal["blocks", "branches", "narrow", "wide"]
 """Why a band is not known; see `TestedBand`."""
 
-LEVEL, LEVELS = 0.9, np.linspace(0.0, 1.0, 1001)
-"""Default level of a band, reduced to the highest that the number of units allows; levels in the
-table of half widths.
-"""
+LEVEL = 0.9
+"""Default level of a band, reduced to the highest that the number of units allows."""
+
+LEVELS = np.linspace(0.0, 1.0, 1001)
+"""Levels in the table of half widths."""
 
 FEWEST_UNITS = 9
 """Smallest number of units for a level of 0.9: with fewer runs, blocks of runs are the exchangeable
@@ -55,15 +56,16 @@ units.
 SHORTEST_BLOCK = 2.0
 """Shortest block, in correlation lengths of the errors."""
 
-WIDENINGS, FOLDS = (0.0, 0.3, 1.0, 3.0, 10.0), 5
-"""Candidate increases of the width at mean speed, relative to that at rest, and number of
-cross-validation folds that choose among them.
-"""
+WIDENINGS = (0.0, 0.3, 1.0, 3.0, 10.0)
+"""Candidate increases of the width at mean speed, relative to that at rest."""
 
 AT_SPEED = (1.0,)
 """The same for motion of another kind than in training, where the narrowest band of these data is no
 better than another: half of the mean width grows with speed.
 """
+
+FOLDS = 5
+"""Number of cross-validation folds that choose among them."""
 
 MARGIN = 0.05
 """Share of a range by which samples may exceed it and count as inside, and by which turning points of
@@ -188,7 +190,7 @@ def calibrate(
     inputs, outputs = ([c.name for c in channels] for channels in (model.inputs, model.outputs))
     check_shared({"fit": fitted, "calibrate": recordings}, inputs, outputs)
     with telling(progress, "calibrating") as tell:
-        runs = [free_run(model, one) for one in one_by_one(recordings, tell)]
+        runs = [free_run(model, recording) for recording in one_by_one(recordings, tell)]
     # the first sample, a start, is not scored
     held = [replace(run, counts=np.arange(len(run)) > 0) for run in runs]
     return replace(find_band(model, held, exchangeable), fitted_known=bool(fitted))
@@ -203,30 +205,27 @@ def find_band(
     """Return the band of a model from its errors on held-out runs; needs two units."""
     runs = [run for run in runs if run.counts.any()]
     errors = [run.errors for run in runs]
-    memory = max(correlation_length(one) for one in zip(*(e.T for e in errors), strict=True))
+    memory = max(correlation_length(x) for x in zip(*(e.T for e in errors), strict=True))
     by_run = unit == "run" or (unit == "auto" and len(runs) >= FEWEST_UNITS)
     which: Literal["run", "block"] = "run" if by_run else "block"
-    units: list[NDArray[np.intp]] = []
-    n = 0
-    for length in map(len, errors):
-        block = max(block_length(length, memory), SHORTEST_BLOCK * memory)
-        pieces = 1 if by_run else max(int(length / block), 1)
-        units.append(n + np.arange(length) * pieces // length)
-        n += pieces
+    units = _units([len(e) for e in errors], None if by_run else memory)
+    n = int(units[-1]) + 1
     if n < 2:
         raise DataError(
             f"errors are correlated over {numeral(memory, 3)} samples, so {sum(map(len, errors))} of "
             f"them are one {which}, which is too few for a band",
             remedy="calibrate on more, or longer, recordings",
         )
+
     level = min(LEVEL, n / (n + 1))
     widenings = widenings if all(run.sample_time for run in runs) else WIDENINGS[:1]
-    of, speeds = np.concatenate(units), np.concatenate([run.speeds for run in runs])
-    found = [
-        _narrowest(np.abs(e), v, of, level, widenings)
-        for e, v in zip(np.concatenate(errors).T, speeds.T, strict=True)
+    speeds = np.concatenate([run.speeds for run in runs])
+    of_outputs = [
+        _narrowest(np.abs(error), speed, units, level, widenings)
+        for error, speed in zip(np.concatenate(errors).T, speeds.T, strict=True)
     ]
-    widening, scores, widths, ratios = zip(*found, strict=True)
+    widening, scores, widths, ratios = zip(*of_outputs, strict=True)
+
     samples = np.concatenate([np.hstack([run.inputs, run.modelled]) for run in runs])
     band = Band(
         driving=model.inputs,
@@ -242,35 +241,64 @@ def find_band(
     return Calibration(Banded(model, band), band, len(runs), memory, widths, ratios)
 
 
+def _units(lengths: Sequence[int], memory: float | None) -> NDArray[np.intp]:
+    """Return the number of the exchangeable unit of every sample of runs of these lengths.
+
+    Units are runs, or with ``memory``, a correlation length [samples], blocks that are long against it.
+    """
+    units: list[NDArray[np.intp]] = []
+    n = 0
+    for length in lengths:
+        pieces = 1
+        if memory is not None:
+            block = max(block_length(length, memory), SHORTEST_BLOCK * memory)
+            pieces = max(int(length / block), 1)
+        units.append(n + np.arange(length) * pieces // length)
+        n += pieces
+    return np.concatenate(units)
+
+
+def _half_widths(
+    errors: Array, relative_width: Array, units: NDArray[np.intp], levels: Array, n: int
+) -> Array:
+    """Return the quantiles of |error| / width at levels, as split conformal prediction has them.
+
+    Units weigh the same. With n of them, the quantile of a level is that of level (n + 1) / n.
+    """
+    scores = errors / relative_width
+    order = np.argsort(scores)
+    _, place, sizes = np.unique(units, return_inverse=True, return_counts=True)
+    shares = np.cumsum(1.0 / sizes[place[order]]) / sizes.size
+    needed = np.minimum(levels * (n + 1) / n, 1.0) - 1e-9
+    return np.asarray(scores[order][np.searchsorted(shares, needed).clip(max=scores.size - 1)])
+
+
 def _narrowest(
-    errors: Array, speeds: Array, of: NDArray[np.intp], level: float, widenings: Sequence[float]
+    errors: Array,
+    speeds: Array,
+    units: NDArray[np.intp],
+    level: float,
+    widenings: Sequence[float],
 ) -> tuple[float, Array, float, float]:
     """Return widening, half widths at all levels, mean width, and its ratio to a constant band's.
 
-    Units, by ``of``, weigh the same; widths are those on units left out of the quantile.
+    Widths are those on units that are left out of the quantile.
     """
-    mean, n = float(speeds.mean()) or 1.0, int(of[-1]) + 1
-    fold = of * min(FOLDS, n) // n
-
-    def half_widths(widening: float, some: NDArray[np.bool_], levels: Array) -> Array:
-        scores = errors[some] / (1.0 + widening * speeds[some])
-        order = np.argsort(scores)
-        _, place, sizes = np.unique(of[some], return_inverse=True, return_counts=True)
-        reached = np.cumsum(1.0 / sizes[place[order]]) / sizes.size
-        wanted = np.minimum(levels * (n + 1) / n, 1.0) - 1e-9
-        return np.asarray(scores[order][np.searchsorted(reached, wanted).clip(max=scores.size - 1)])
+    mean, n = float(speeds.mean()) or 1.0, int(units[-1]) + 1
+    fold = units * min(FOLDS, n) // n
 
     def width(widening: float) -> float:
-        total = 0.0
+        total, relative = 0.0, 1.0 + widening * speeds
         for out in (fold == k for k in range(int(fold[-1]) + 1)):
-            half = half_widths(widening, ~out, np.array(level))
-            total += 2.0 * float(half) * float((1.0 + widening * speeds[out]).sum())
+            inside = ~out
+            half = _half_widths(errors[inside], relative[inside], units[inside], np.array(level), n)
+            total += 2.0 * float(half) * float(relative[out].sum())
         return total / errors.size
 
-    tried = [(width(share / mean), share / mean) for share in widenings]
-    narrowest, widening = min(tried)
-    scores = half_widths(widening, np.ones(errors.size, dtype=bool), LEVELS)
-    constant = tried[0][0]
+    candidates = [(width(share / mean), share / mean) for share in widenings]
+    narrowest, widening = min(candidates)
+    scores = _half_widths(errors, 1.0 + widening * speeds, units, LEVELS, n)
+    constant = candidates[0][0]
     return widening, scores, narrowest, narrowest / constant if constant > 0 else 1.0
 
 
@@ -291,15 +319,15 @@ def n_branches(tables: Sequence[Array]) -> int:
 
     Tables are outputs, shape (n, k). A motion that is repeated adds none.
     """
-    every = np.concatenate(tables)
-    low, span = every.min(axis=0), np.maximum(np.ptp(every, axis=0), np.finfo(float).tiny)
+    whole = np.concatenate(tables)
+    low, span = whole.min(axis=0), np.maximum(np.ptp(whole, axis=0), np.finfo(float).tiny)
     counts = []
     for runs in zip(*(((table - low) / span).T for table in tables), strict=True):
         turns = [run[reversals(run, MARGIN)] for run in runs]
-        left = np.concatenate([np.column_stack([ends[:-1], ends[1:]]) for ends in turns])
+        branches = np.concatenate([np.column_stack([ends[:-1], ends[1:]]) for ends in turns])
         count = 0
-        while len(left):
-            left = left[np.abs(left - left[0]).max(axis=1) > MARGIN]
+        while len(branches):  # those like the first one are one branch
+            branches = branches[np.abs(branches - branches[0]).max(axis=1) > MARGIN]
             count += 1
         counts.append(count)
     return max(counts)
@@ -352,29 +380,17 @@ def tested_band(
     ``outputs``, shape (n, k) each, free-running on every training recording, then on every test
     recording.
     """
-    names = [channel.name for channel in block.outputs]
     if not held:
         return None
     try:
         band = find_band(block, held, "block", AT_SPEED).band
     except DataError:
         return None
-    covered, width = [], []
-    tested = zip(split.test, outputs[len(split.train) :], split.test_rows, strict=True)
-    for recording, modelled, kept in tested:
-        if not kept.any():
-            continue
-        ends = band.simulate(modelled, sample_time=recording.sample_time)
-        _, lower, upper = np.moveaxis(ends.reshape(len(ends), -1, 3)[kept], -1, 0)
-        measured = recording.matrix(names)[kept]
-        covered.append((lower <= measured) & (measured <= upper))
-        width.append(upper - lower)
-    shares, widths = (
-        dict(zip(names, np.concatenate(each).mean(axis=0).tolist(), strict=True))
-        for each in (covered, width)
-    )
-    by_run = np.array([inside.mean(axis=0) for inside in covered])
-    lowest, highest = float(by_run.min()), float(by_run.max())
+
+    names = [channel.name for channel in block.outputs]
+    inside, widths = _coverage(band, names, outputs[len(split.train) :], split)
+    by_recording = np.array([samples.mean(axis=0) for samples in inside])
+    lowest, highest = float(by_recording.min()), float(by_recording.max())
     branches = n_branches([run.outputs for run in held])
     reasons: dict[Unknown, bool] = {
         "blocks": band.units < FEWEST_UNITS,
@@ -382,14 +398,34 @@ def tested_band(
         "narrow": lowest < SHARES[0],
         "wide": highest > SHARES[1],
     }
+    coverage, width = (
+        dict(zip(names, np.concatenate(tables).mean(axis=0).tolist(), strict=True))
+        for tables in (inside, widths)
+    )
     return Banded(block, band), TestedBand(
         unknown=next((reason for reason, holds in reasons.items() if holds), None),
         level=band.level,
         units=band.units,
         branches=branches,
         unit_of_width=block.outputs[0].unit,
-        coverage=shares,
-        width=widths,
+        coverage=coverage,
+        width=width,
         lowest=lowest,
         highest=highest,
     )
+
+
+def _coverage(
+    band: Band, names: Sequence[str], outputs: Sequence[Array], split: Split
+) -> tuple[list[NDArray[np.bool_]], list[Array]]:
+    """Return which scored samples of every test recording are inside the band, and its widths."""
+    inside, widths = [], []
+    for recording, modelled, scored in zip(split.test, outputs, split.test_rows, strict=True):
+        if not scored.any():
+            continue
+        ends = band.simulate(modelled, sample_time=recording.sample_time)
+        _, lower, upper = np.moveaxis(ends.reshape(len(ends), -1, 3)[scored], -1, 0)
+        measured = recording.matrix(names)[scored]
+        inside.append((lower <= measured) & (measured <= upper))
+        widths.append(upper - lower)
+    return inside, widths

@@ -14,8 +14,12 @@ from mckibben.diagnosis.coupling import FOLLOWS
 from mckibben.diagnosis.excitation import extremes
 from mckibben.diagnosis.loops import (
     FIGURES,
+    Branches,
     Cycle,
+    Loop,
     Range,
+    Scale,
+    Track,
     branches_of,
     creep,
     dead_zones,
@@ -35,16 +39,20 @@ from mckibben.signals.holds import STILL, holds, moves
 from mckibben.signals.reversals import whole_cycles
 from mckibben.system.showing import Result
 
-LEVEL, NO_GAP = 0.01, 0.01
-"""Significance level of the loop test; mean gap between branches, relative to the output range,
-below which there is no loop.
-"""
+LEVEL = 0.01
+"""Significance level of the loop test."""
+
+NO_GAP = 0.01
+"""Mean gap between branches, relative to the output range, below which there is no loop."""
 
 EXPLAINED = 0.5
 """Smallest share of the variance explained by branches for their shape to be measured."""
 
 REPEATS = 3
 """Smallest number of values for an interval."""
+
+MEDIAN_ERROR = 1.2533
+"""Standard error of the median of normal values, relative to that of their mean."""
 
 SHAPE = {
     *("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid"),
@@ -54,6 +62,18 @@ SHAPE = {
 
 OTHERS = {"gain", "drift", "creep", "creep_time"}
 """Further quantities without meaning if input and direction explain little of the output."""
+
+SAME_LEVEL = 0.02
+"""Share of another input's range within which its levels are equal."""
+
+LEAST_COVERED = 0.5
+"""Share of the input range that a segment must cover."""
+
+MOST_SAMPLES = 2000
+"""Largest number of samples of a recording from which its zero offset is found."""
+
+KNOTS = 12
+"""Number of knots of the curve over the input to which outputs are shifted."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +177,7 @@ class Characterization(Result):
         """Return the cycles as a data frame: extremes, mean speed, and width [%]."""
         import pandas as pd
 
-        return pd.DataFrame([vars(one) for one in self.cycles])
+        return pd.DataFrame([vars(cycle) for cycle in self.cycles])
 
     @property
     def output_span(self) -> float:
@@ -221,73 +241,77 @@ def characterize(
     (2, 1.0)
     """
     runs = listed(recordings)
-    given, wanted = loop_of(runs, input, output)
-    others = others_of(runs, given, wanted, scheduling) if runs else []
+    drive, response = loop_of(runs, input, output)
+    others = others_of(runs, drive, response, scheduling) if runs else []
     if not others:
-        return _measured(runs, given, wanted)
-    levels = _levels(runs, given, wanted, others)
+        return _measured(runs, drive, response)
+
+    levels = _levels(runs, drive, response, others)
     if not levels:
-        following = [name for name in others if _follows(runs, name, wanted)]
+        following = [name for name in others if _follows(runs, name, response)]
         rest = [name for name in others if name not in following]
         if following and not rest:
-            together = f"{', '.join(following)} moves with {wanted}, and its effect is in the loop"
-            return replace(_measured(runs, given, wanted), notes=(together,))
-        levels = _levels(runs, given, wanted, rest) if following else []
+            together = (
+                f"{', '.join(following)} moves with {response}, and its effect is in the loop"
+            )
+            return replace(_measured(runs, drive, response), notes=(together,))
+        levels = _levels(runs, drive, response, rest) if following else []
     if not levels:
         raise DataError(
             f"it never moves while {', '.join(others)} stay constant: its effect is not identifiable",
             file=runs[0].source,
-            channel=given,
+            channel=drive,
             remedy="record one in which it moves alone; models of several inputs need no such recording",
         )
-    found = max(
+
+    largest = max(
         (level.found for level in levels),
-        key=lambda one: (one.loop_width is not None, one.output_span),
+        key=lambda result: (result.loop_width is not None, result.output_span),
     )
     return replace(
-        found,
+        largest,
         cycles=tuple(cycle for level in levels for cycle in level.found.cycles),
         n_stretches=sum(level.found.n_recordings for level in levels),
         levels=tuple(levels) if len(levels) > 1 else (),
-        **_counts(runs, given, wanted),
+        **_counts(runs, drive, response),
     )
 
 
-def _follows(runs: Sequence[Recording], load: str, wanted: str) -> bool:
+def _follows(runs: Sequence[Recording], load: str, response: str) -> bool:
     """Return whether a load follows from the output, as that of a spring."""
     if load in by_name(runs)[0]:  # a drive
         return False
-    moved = np.concatenate([run.matrix([load, wanted]) for run in runs])
-    return bool(np.corrcoef(moved.T)[0, 1] ** 2 > FOLLOWS)
+    table = np.concatenate([run.matrix([load, response]) for run in runs])
+    return bool(np.corrcoef(table.T)[0, 1] ** 2 > FOLLOWS)
 
 
 def _levels(
-    runs: Sequence[Recording], given: str, wanted: str, others: Sequence[str]
+    runs: Sequence[Recording], drive: str, response: str, others: Sequence[str]
 ) -> list[Level]:
     """Return the results at every level of other inputs that shows a loop, or a data gap."""
     levels = []
-    low, high = extremes(runs, given)
-    span = high - low
-    for at, parts in constant_segments(runs, given, others):
-        stretches = [part for _, part in parts]
-        if all(np.ptp(part[wanted]) == 0 for part in stretches):
+    low, high = extremes(runs, drive)
+    for values, parts in constant_segments(runs, drive, others):
+        segments = [segment for _, segment in parts]
+        if all(np.ptp(segment[response]) == 0 for segment in segments):
             continue
-        found = _measured(stretches, given, wanted)
-        if all(cycle.amplitude < COVERS * span for cycle in found.cycles):
-            found = _blanked(found, SHAPE)  # of small cycles
-        if found.loop_width is not None or found.branch_gap is not None:
-            held = tuple((name, x, runs[0].units[name]) for name, x in zip(others, at, strict=True))
-            cycles = tuple(replace(c, recording=parts[c.recording][0]) for c in found.cycles)
-            levels.append(Level(held, replace(found, cycles=cycles)))
+        result = _measured(segments, drive, response)
+        if all(cycle.amplitude < LEAST_COVERED * (high - low) for cycle in result.cycles):
+            result = _blanked(result, SHAPE)  # of small cycles
+        if result.loop_width is not None or result.branch_gap is not None:
+            units = [runs[0].units[name] for name in others]
+            held = tuple(zip(others, values, units, strict=True))
+            cycles = tuple(replace(c, recording=parts[c.recording][0]) for c in result.cycles)
+            levels.append(Level(held, replace(result, cycles=cycles)))
     return levels
 
 
-def _counts(runs: Sequence[Recording], given: str, wanted: str) -> dict[str, Any]:
+def _counts(runs: Sequence[Recording], drive: str, response: str) -> dict[str, Any]:
     """Return counts and ranges of recordings."""
     durations, steps = [run.duration for run in runs], {run.sample_time for run in runs}
     return {
-        "input_range": extremes(runs, given),
-        "output_range": extremes(runs, wanted),
+        "input_range": extremes(runs, drive),
+        "output_range": extremes(runs, response),
         "n_recordings": len(runs),
         "n_samples": sum(map(len, runs)),
         "duration": None if None in durations else float(sum(d or 0.0 for d in durations)),
@@ -295,38 +319,23 @@ def _counts(runs: Sequence[Recording], given: str, wanted: str) -> dict[str, Any
     }
 
 
-def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characterization:
+def _measured(runs: Sequence[Recording], drive: str, response: str) -> Characterization:
     """Return the results of recordings in which other inputs are constant, with any zero offsets."""
-    several = len(runs) > 1 and all(given in run and wanted in run for run in runs)
-    scale, tracks = prepare(levelled(runs, given, wanted) if several else runs, given, wanted)
+    several = len(runs) > 1 and all(drive in run and response in run for run in runs)
+    scale, tracks = prepare(levelled(runs, drive, response) if several else runs, drive, response)
     loops, branches = loops_of(tracks, scale), branches_of(tracks, scale)
-    largest = largest_of(loops)
-    gap, gap_limits, p_loop = gap_of(branches, scale.sign)
-    growth, growth_limits, speeds = rate_dependence(loops) or (None, None, None)
-    crept = creep(runs, given, wanted, scale)
-    upper, lower = dead_zones(tracks, scale)
-    repeated: dict[str, Sequence[float | None]] = {
-        **{name: [loop.figures[name] for loop in largest] for name in FIGURES},
-        "gain": gains_of(branches, largest, scale),
-        "dead_zone_upper": upper,
-        "dead_zone_lower": lower,
-        "creep": [moved for _, moved in crept],
-        "creep_time": [time for time, _ in crept],
-        "drift": drift(loops),
-    }
-    known = {name: [x for x in each if x is not None] for name, each in repeated.items()}
-    limits = {name: _interval(each) for name, each in known.items() if name != "creep_time"}
-    limits |= {"branch_gap": gap_limits, "rate_dependence": growth_limits}
-    figures: dict[str, Any] = {
-        name: float(np.median(each)) if each else None for name, each in known.items()
-    }
+
+    figures, intervals = _repeated(runs, drive, response, scale, tracks, loops, branches)
+    gap, gap_interval, p_loop = gap_of(branches, scale.sign)
+    growth, growth_interval, speeds = rate_dependence(loops) or (None, None, None)
+    intervals |= {"branch_gap": gap_interval, "rate_dependence": growth_interval}
     share = explained(tracks)
-    found = Characterization(
-        input=given,
-        output=wanted,
-        input_unit=_unit(runs, given),
-        output_unit=_unit(runs, wanted),
-        **_counts(runs, given, wanted),
+    result = Characterization(
+        input=drive,
+        output=response,
+        input_unit=_unit(runs, drive),
+        output_unit=_unit(runs, response),
+        **_counts(runs, drive, response),
         n_cycles=sum(len(whole_cycles(track.u, track.major_turns)) for track in tracks),
         n_reversals=sum(track.turns.size - 2 for track in tracks),
         input_noise=None if np.isnan(scale.u.noise) else scale.u.noise,
@@ -339,21 +348,50 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
         speeds=speeds,
         loop_share=share,
         falls=scale.sign < 0,
-        intervals={name: found for name, found in limits.items() if found is not None},
+        intervals={name: ends for name, ends in intervals.items() if ends is not None},
     )
+
     absent = set() if share >= EXPLAINED else SHAPE | OTHERS
-    low, high = gap_limits or (1.0, 1.0)
-    if found.has_loop is False or low <= 0 <= high:
+    low, high = gap_interval or (1.0, 1.0)
+    if result.has_loop is False or low <= 0 <= high:
         absent |= SHAPE
-    return _blanked(found, absent)
+    return _blanked(result, absent)
 
 
-def _blanked(found: Characterization, absent: Collection[str]) -> Characterization:
+def _repeated(
+    runs: Sequence[Recording],
+    drive: str,
+    response: str,
+    scale: Scale,
+    tracks: Sequence[Track],
+    loops: Sequence[Loop],
+    branches: Branches,
+) -> tuple[dict[str, Any], dict[str, Range | None]]:
+    """Return the medians over repeats of what is measured repeatedly, and their intervals."""
+    largest = largest_of(loops)
+    crept = creep(runs, drive, response, scale)
+    upper, lower = dead_zones(tracks, scale)
+    repeats: dict[str, Sequence[float | None]] = {
+        **{name: [loop.figures[name] for loop in largest] for name in FIGURES},
+        "gain": gains_of(branches, largest, scale),
+        "dead_zone_upper": upper,
+        "dead_zone_lower": lower,
+        "creep": [change for _, change in crept],
+        "creep_time": [time for time, _ in crept],
+        "drift": drift(loops),
+    }
+    known = {name: [x for x in values if x is not None] for name, values in repeats.items()}
+    medians = {name: float(np.median(xs)) if xs else None for name, xs in known.items()}
+    intervals = {name: _interval(xs) for name, xs in known.items() if name != "creep_time"}
+    return medians, intervals
+
+
+def _blanked(result: Characterization, absent: Collection[str]) -> Characterization:
     """Return results without some of their quantities."""
-    cycles = () if "loop_width" in absent else found.cycles
-    kept = {name: limits for name, limits in found.intervals.items() if name not in absent}
+    cycles = () if "loop_width" in absent else result.cycles
+    intervals = {name: ends for name, ends in result.intervals.items() if name not in absent}
     blank: dict[str, Any] = dict.fromkeys(absent)
-    return replace(found, cycles=cycles, intervals=kept, **blank)
+    return replace(result, cycles=cycles, intervals=intervals, **blank)
 
 
 def _interval(values: Sequence[float]) -> Range | None:
@@ -363,8 +401,7 @@ def _interval(values: Sequence[float]) -> Range | None:
     """
     if len(values) < REPEATS:
         return None
-    # the standard error of a median of normal values is 1.2533 times that of their mean
-    half = 1.2533 * half_interval(np.array(values), 0.95)
+    half = MEDIAN_ERROR * half_interval(np.array(values), 0.95)
     low, high = float(np.median(values)) - half, float(np.median(values)) + half
     return max(low, 0.0) if min(values) >= 0 else low, min(high, 0.0) if max(values) <= 0 else high
 
@@ -380,77 +417,71 @@ def _unit(runs: Sequence[Recording], channel: str) -> str:
     return units.pop()
 
 
-ALIKE, COVERS = 0.02, 0.5
-"""Share of another input's range within which its levels are equal, and share of the input range
-that a segment must cover.
-"""
-
-MOST, KNOTS = 2000, 12
-"""Largest number of samples per recording for offsets, and number of knots of the input's curve."""
-
-
 def others_of(
-    recordings: Sequence[Recording], given: str, wanted: str, asked: Sequence[str]
+    recordings: Sequence[Recording], drive: str, response: str, scheduling: Sequence[str]
 ) -> list[str]:
     """Return other inputs that vary within or between recordings.
 
-    Those asked for, what drives beside the input, what schedules models, and channels that every
-    recording holds.
+    Those asked for by ``scheduling``, other drives, what schedules models, and channels that are
+    constant in every recording.
     """
-    seen = [name for name in recordings[0].channels if all(name in one for one in recordings)]
-    driving = by_name(recordings)[0]
-    further = channels_of(recordings, given, wanted).further
+    common = [name for name in recordings[0].channels if all(name in run for run in recordings)]
+    drives = by_name(recordings)[0]
+    further = channels_of(recordings, drive, response).further
     candidates = [
-        *asked,
-        *(n for n in driving if given in driving and n in seen),
-        *(n for n in further if n in seen),
-        *(n for n in seen if all(np.ptp(one[n]) == 0 for one in recordings)),
+        *scheduling,
+        *(name for name in drives if drive in drives and name in common),
+        *(name for name in further if name in common),
+        *(name for name in common if all(np.ptp(run[name]) == 0 for run in recordings)),
     ]
-    named = [n for n in dict.fromkeys(candidates) if n not in (given, wanted)]
-    return [n for n in named if moves([one[n] for one in recordings])]
+    others = [name for name in dict.fromkeys(candidates) if name not in (drive, response)]
+    return [name for name in others if moves([run[name] for run in recordings])]
 
 
 Group = tuple[tuple[float, ...], list[tuple[int, Recording]]]
-"""Levels at which the other inputs are constant, with the recordings and segments in which they
-are.
-"""
+"""Levels of the other inputs, and the segments that have them, each with its recording's number."""
 
 
 def constant_segments(
-    recordings: Sequence[Recording], given: str, others: Sequence[str]
+    recordings: Sequence[Recording], drive: str, others: Sequence[str]
 ) -> list[Group]:
     """Return segments in which all other inputs are constant and the input moves, by level."""
-    span = max(float(np.ptp(one[given])) for one in recordings)
-    ranges = np.ptp(np.concatenate([one.matrix(others) for one in recordings]), axis=0)
-    found: list[tuple[Array, int, Recording]] = []
-    for place, one in enumerate(recordings):
-        columns = one.matrix(others)
+    span = max(float(np.ptp(run[drive])) for run in recordings)
+    ranges = np.ptp(np.concatenate([run.matrix(others) for run in recordings]), axis=0)
+
+    segments: list[tuple[Array, int, Recording]] = []
+    for number, run in enumerate(recordings):
+        columns = run.matrix(others)
         whole = bool(np.all(np.ptp(columns, axis=0) <= STILL * ranges))
-        for hold in (
-            [slice(0, len(one))] if whole else holds(columns, ranges.tolist(), FEWEST_SAMPLES)
-        ):
-            part = one.slice(hold.start, hold.stop)
-            if np.ptp(part[given]) > COVERS * span:
-                found.append((columns[hold].mean(axis=0), place, part))
+        parts = [slice(0, len(run))] if whole else holds(columns, ranges.tolist(), FEWEST_SAMPLES)
+        for part in parts:
+            segment = run.slice(part.start, part.stop)
+            if np.ptp(segment[drive]) > LEAST_COVERED * span:
+                segments.append((columns[part].mean(axis=0), number, segment))
+
     groups: list[Group] = []
-    for level, place, part in sorted(found, key=lambda each: tuple(each[0])):
-        for at, parts in groups:
-            if np.all(np.abs(level - at) <= ALIKE * ranges):
-                parts.append((place, part))
+    for level, number, segment in sorted(segments, key=lambda entry: tuple(entry[0])):
+        for values, members in groups:
+            if np.all(np.abs(level - values) <= SAME_LEVEL * ranges):
+                members.append((number, segment))
                 break
         else:
-            groups.append((tuple(level.tolist()), [(place, part)]))
+            groups.append((tuple(level.tolist()), [(number, segment)]))
     return groups
 
 
-def levelled(recordings: Sequence[Recording], given: str, wanted: str) -> list[Recording]:
-    """Return recordings whose outputs are shifted onto one curve of the input."""
-    seen = [one.matrix((given, wanted))[:: -(-len(one) // MOST)] for one in recordings]
-    own = np.repeat(np.eye(len(seen)), [len(part) for part in seen], axis=0)
-    x, y = np.concatenate(seen).T
-    offsets = np.linalg.lstsq(np.column_stack([own, hats(x, KNOTS)]), y, rcond=None)[0][: len(seen)]
-    offsets -= offsets @ own.mean(axis=0)
+def levelled(recordings: Sequence[Recording], drive: str, response: str) -> list[Recording]:
+    """Return recordings whose outputs are shifted onto one curve of the input.
+
+    Least squares of an offset of every recording, and a piecewise-linear curve that they share.
+    """
+    tables = [run.matrix((drive, response))[:: -(-len(run) // MOST_SAMPLES)] for run in recordings]
+    members = np.repeat(np.eye(len(tables)), [len(table) for table in tables], axis=0)
+    x, y = np.concatenate(tables).T
+    columns = np.column_stack([members, hats(x, KNOTS)])
+    offsets = np.linalg.lstsq(columns, y, rcond=None)[0][: len(tables)]
+    offsets -= offsets @ members.mean(axis=0)
     return [
-        one.with_channels({wanted: one.units[wanted]}, **{wanted: one[wanted] - offset})
-        for one, offset in zip(recordings, offsets.tolist(), strict=True)
+        run.with_channels({response: run.units[response]}, **{response: run[response] - offset})
+        for run, offset in zip(recordings, offsets.tolist(), strict=True)
     ]

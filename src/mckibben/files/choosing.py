@@ -95,35 +95,51 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
     DataError
         If a channel asked for is missing, or two columns are one channel.
     """
-    request, own, clocks = source.request, source.table.own, source.table.has_clocks
-    fixed: dict[str, Column] = {}
-    for channel, given in request.columns.items():
-        if not (channel == "time" and clocks):
+    table = source.table
+    requested = _requested(source)
+    source, of_other_length = _of_one_length(source, requested)
+    named, left_out = _by_header(source, _described(source) | requested)
+    left_out = of_other_length | left_out
+
+    places = {id(column): place for place, column in enumerate(source.table.columns)}
+    named = dict(sorted(named.items(), key=lambda item: places.get(id(item[1]), len(places))))
+    if not table.own:
+        time = None if "time" in named or table.has_clocks else _only_time(named, source)
+        if time is not None:
+            left_out.pop(time.header, None)
+            others = {name: column for name, column in named.items() if column is not time}
+            named = {"time": time} | others
+        named = _by_unit(source, named)
+
+    _require(named, source)
+    return named, left_out | dict(table.unread)
+
+
+def _requested(source: Source) -> dict[str, Column]:
+    """Return the columns that the request names."""
+    request, columns = source.request, dict[str, Column]()
+    for channel, wanted in request.columns.items():
+        if not (channel == "time" and source.table.has_clocks):
             try:
-                fixed[channel] = find_column(given, channel, source)
+                columns[channel] = find_column(wanted, channel, source)
             except DataError:
                 if not request.join:  # where another file may have it
                     raise
-    source, left_out = _of_one_length(source, fixed)
-    fixed = _described(source) | fixed
+    return columns
+
+
+def _by_header(
+    source: Source, fixed: Mapping[str, Column]
+) -> tuple[dict[str, Column], dict[str, str]]:
+    """Return ``fixed`` columns and those that their headers name, and why others are left out."""
+    named, left_out = dict(fixed), dict[str, str]()
     taken = {id(column) for column in fixed.values()}
-    named = dict(fixed)
     for column in sorted(source.table.columns, key=lambda column: column.values is None):
         if id(column) in taken:
             continue
-        header = parse(column.label)
-        channel = column.header if own else channel_of(header)
-        named_alone = channel_of(replace(header, unit=None))
-        if not own and named_alone in request.units:  # whatever the header says of its unit
-            channel = named_alone
-        if (channel in fixed and not own) or (
-            channel in named and channel.startswith((REFERENCE, COMMAND))
-        ):
-            channel = snake_case(header.name)  # the first of several references is the loop's
-        if channel in named and channel not in fixed and not request.needs(channel):
-            channel = snake_case(column.header)
-        wanted = channel not in named and (channel == "time" or request.asks_for(channel))
-        if column.values is None and not wanted:
+        channel = _channel(column, source, fixed, named)
+        wanted = channel == "time" or source.request.asks_for(channel)
+        if column.values is None and (channel in named or not wanted):
             left_out[column.header] = "text"
         elif channel in fixed:
             left_out[column.header] = f"{channel} is read from another column"
@@ -134,26 +150,45 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
             raise source.error(problem, "give them different headers", channel, options=options)
         else:
             named[channel] = column
-    places = {id(column): place for place, column in enumerate(source.table.columns)}
-    named = dict(sorted(named.items(), key=lambda item: places.get(id(item[1]), len(places))))
-    if "time" not in named and not own and not clocks and (time := _only_time(named, source)):
-        left_out.pop(time.header, None)
-        named = {"time": time} | {name: c for name, c in named.items() if c is not time}
-    if not own:
-        used = {*request.columns, *request.units, *request.calibration, *(request.channels or ())}
-        used |= request.described.channels.keys()
-        units = {name: "" if name in used else _target(column) for name, column in named.items()}
-        renamed = by_words(units)
-        renamed |= by_units({renamed.get(name, name): unit for name, unit in units.items()})
-        notes = [f"{named[name].header!r} as {channel}" for name, channel in renamed.items()]
-        named = {renamed.get(name, name): column for name, column in named.items()}
-        if notes:
-            source.warn(
-                f"these columns are read by their units, or by a word in their names: {listed(notes)}; "
-                "use `columns[CHANNEL]=COLUMN` where that is wrong"
-            )
-    _require(named, source)
-    return named, left_out | dict(source.table.unread)
+    return named, left_out
+
+
+def _channel(
+    column: Column, source: Source, fixed: Mapping[str, Column], named: Mapping[str, Column]
+) -> str:
+    """Return the channel that a header names; its own name where the channel has a column already.
+
+    That is for references and commands, of which the first is the loop's, and for channels that nobody
+    asks for.
+    """
+    request, own, header = source.request, source.table.own, parse(column.label)
+    channel = column.header if own else channel_of(header)
+    without_unit = channel_of(replace(header, unit=None))
+    if not own and without_unit in request.units:  # whatever the header says of its unit
+        channel = without_unit
+    of_loop = channel.startswith((REFERENCE, COMMAND))
+    if (channel in fixed and not own) or (channel in named and of_loop):
+        channel = snake_case(header.name)
+    if channel in named and channel not in fixed and not request.needs(channel):
+        channel = snake_case(column.header)
+    return channel
+
+
+def _by_unit(source: Source, named: Mapping[str, Column]) -> dict[str, Column]:
+    """Return columns by the channels of their units and words, but for those that options name."""
+    request = source.request
+    stated = {*request.columns, *request.units, *request.calibration, *(request.channels or ())}
+    stated |= request.described.channels.keys()
+    units = {name: "" if name in stated else _target(column) for name, column in named.items()}
+    renamed = by_words(units)
+    renamed |= by_units({renamed.get(name, name): unit for name, unit in units.items()})
+    notes = [f"{named[name].header!r} as {channel}" for name, channel in renamed.items()]
+    if notes:
+        source.warn(
+            f"these columns are read by their units, or by a word in their names: {listed(notes)}; "
+            "use `columns[CHANNEL]=COLUMN` where that is wrong"
+        )
+    return {renamed.get(name, name): column for name, column in named.items()}
 
 
 def find_column(wanted: str, channel: str, source: Source) -> Column:

@@ -148,34 +148,58 @@ RULES: tuple[Callable[[Head], Names | None], ...] = (units_alone, named, markers
 
 
 def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) -> Layout:
-    """Return the layout of a table; raise a `DataError` for comments and blanks only."""
-    head, first = _head(lines, path, separators)
-    names = next(found for rule in RULES if (found := rule(head)) is not None)
+    """Return the layout of a table; raise a `DataError` for comments and blanks only.
+
+    Names behind those of the columns are settings of the device, as ``X,CH1,Start,Increment`` of a
+    scope, with their values in the row of units.
+    """
+    head, first_sample = _head(lines, path, separators)
+    names = next(names for rule in RULES if (names := rule(head)) is not None)
     if names.headers == _numbered(head.width) and not any(names.units):
         warn(path, f"no line of names: the columns are called column_1 to column_{head.width}")
-    for at, row in reversed(head.above):  # damaged samples
-        fits = names.last >= 0 or len(row) == head.width
-        if at > names.last and fits and any(map(head.dialect.is_value, row)):
-            first = at
+
+    first = _with_damaged(head, names, first_sample)
     headers = _merged(names, head)
-    beyond = [*zip(headers, names.units, strict=True)][head.used :]
-    text = "\n".join([*lines[:first], *(f"x {name} {cell}" for name, cell in beyond if cell)])
-    start = dict(beyond).get("Start", "")
-    units = [_bare(cell) or None for cell in names.units]
-    if metric := re.search(r"Length Units\W+(\w+)", text):  # of Motive
-        units = [metric[1] if "Position" in h else u for h, u in zip(headers, units, strict=True)]
-    least = head.width if any(headers[head.used : head.width]) else head.used
-    least = len(headers) if names.at < 0 else least
+    settings = [*zip(headers, names.units, strict=True)][head.used :]
+    text = "\n".join([*lines[:first], *(f"x {name} {cell}" for name, cell in settings if cell)])
+
     stated = _STATED[head.dialect.decimal].finditer(unicodedata.normalize("NFKC", text))
+    start = dict(settings).get("Start", "")
     return Layout(
         head.dialect,
         headers,
-        units,
+        _units(names, headers, text),
         first,
-        least,
+        _least_cells(head, names, headers),
         rates=dict(filter(None, map(_stated, stated))),
         start_time=head.dialect.value(head.dialect.form(start)[1]) if start else 0.0,
     )
+
+
+def _with_damaged(head: Head, names: Names, first: int) -> int:
+    """Return the first line of samples, with those above it that have any value: damaged samples."""
+    for at, row in reversed(head.above):
+        fits = names.last >= 0 or len(row) == head.width
+        if at > names.last and fits and any(map(head.dialect.is_value, row)):
+            first = at
+    return first
+
+
+def _units(names: Names, headers: Sequence[str], text: str) -> list[str | None]:
+    """Return the units of columns; positions of Motive have that stated above the table."""
+    units = [_bare(cell) or None for cell in names.units]
+    stated = re.search(r"Length Units\W+(\w+)", text)
+    if stated is None:
+        return units
+    pairs = zip(headers, units, strict=True)
+    return [stated[1] if "Position" in header else unit for header, unit in pairs]
+
+
+def _least_cells(head: Head, names: Names, headers: Sequence[str]) -> int:
+    """Return the smallest number of cells of a line of samples."""
+    if names.at < 0:
+        return len(headers)
+    return head.width if any(headers[head.used : head.width]) else head.used
 
 
 def _head(lines: Sequence[str], path: Path, separators: Sequence[str | None]) -> tuple[Head, int]:

@@ -10,12 +10,16 @@ from mckibben.report.builder import Code, Item, Table, Text, cell
 
 
 def lines(items: Sequence[Item]) -> Iterator[str]:
-    """Return texts and tables as lines; notes begin with ``Note: ``."""
-    joined = True
+    """Return texts and tables as lines; notes begin with ``Note: ``.
+
+    A blank line is before every lead, and before a table that does not follow one.
+    """
+    after_lead = True
     for item in filter(None, items):
         lead = isinstance(item, Text) and item.style == "lead"
-        yield from [""] * (lead or (isinstance(item, Table) and not joined))
-        joined = lead
+        if lead or (isinstance(item, Table) and not after_lead):
+            yield ""
+        after_lead = lead
         if isinstance(item, Text):
             start = "Note: " if item.style == "note" else "- " if item.listed else ""
             yield from (f"{start}{sentence}" for sentence in item.sentences)
@@ -25,24 +29,24 @@ def lines(items: Sequence[Item]) -> Iterator[str]:
             yield f"{item.what}: {item.text}"
 
 
-def shown(found: Any) -> Iterator[str]:
+def shown(result: Any) -> Iterator[str]:
     """Return the lines of a result, by its ``face``, and its notes."""
     from mckibben.report.results import FACES
 
-    yield from lines(FACES[found.face](found))
+    yield from lines(FACES[result.face](result))
 
 
-def table(one: Table) -> str:
+def table(content: Table) -> str:
     """Return a table of the terminal's width; numbers are aligned right, text left."""
     from rich.console import Console
     from rich.table import Table as Grid
     from rich.text import Text as Verbatim
 
     grid = Grid(box=None, pad_edge=False, header_style="bold")
-    for place, heading in enumerate(one.headings):
-        side: Any = "right" if place in one.figures else "left"
+    for place, heading in enumerate(content.headings):
+        side: Any = "right" if place in content.figures else "left"
         grid.add_column(Verbatim(heading), justify=side, overflow="fold")
-    for row in one.rows:
+    for row in content.rows:
         grid.add_row(*(Verbatim(cell(value, 4)) for value in row))
     console = Console() if sys.stdout is not None and sys.stdout.isatty() else Console(width=200)
     with console.capture() as printed:

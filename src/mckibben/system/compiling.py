@@ -38,6 +38,7 @@ _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """No entry for C: it would hold all the code again, and nothing calls it."""
 
 _lock = threading.Lock()
+"""Held while a function is compiled."""
 
 
 @cache
@@ -59,6 +60,7 @@ def cache_folder() -> Path | None:
 
 @cache
 def _note(text: str) -> None:
+    """Warn once of a problem with the cache."""
     warnings.warn(text, CacheWarning, stacklevel=2)
 
 
@@ -117,10 +119,12 @@ class Deferred:
 
 
 def _named(module: str, name: str, _: str) -> Any:
+    """Return what a module has of a name: a pickled function."""
     return getattr(import_module(module), name)
 
 
 def _again(function: Callable[..., Any], options: dict[str, Any], _: str) -> Deferred:
+    """Return a pickled function that its module has uncompiled."""
     return Deferred(function, options)
 
 
@@ -247,6 +251,10 @@ def _parts(value: Any, seen: dict[int, int]) -> Iterator[str]:
 
 
 def _code_parts(code: CodeType, known: dict[str, Any], seen: dict[int, int]) -> Iterator[str]:
+    """Yield the parts of a function's code: instructions, constants, and what its names refer to.
+
+    ``known`` are the names of its module; a name may be a member of any module that it reaches.
+    """
     yield code.co_code.hex()
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
@@ -272,6 +280,7 @@ def resolved(function: Function) -> Function:
 
 
 _entries: dict[tuple[Any, ...], Callable[..., None]] = {}
+"""Compiled code by function and types of its arguments."""
 
 
 def bound(function: Callable[..., None], *arrays: Any) -> Callable[[], None]:

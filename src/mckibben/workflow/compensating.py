@@ -52,7 +52,8 @@ from mckibben.workflow.operation import (
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
-    from mckibben.control import Learned
+    from mckibben.control import Controller, Learned
+    from mckibben.control.connecting import Plant
     from mckibben.workflow.operation import Model
 
 
@@ -167,19 +168,9 @@ def track(
         See `mckibben.workflow`; options are those of `mckibben.options.TrackOptions`.
     """
     from mckibben.blocks.base import Block
-    from mckibben.blocks.feedback import FeedforwardFeedback
-    from mckibben.blocks.fields import drives
-    from mckibben.control import (
-        BlockController,
-        before,
-        control_law,
-        learn,
-        preview_time,
-        tune_pid,
-    )
-    from mckibben.control import track as close
+    from mckibben.control import BlockController, before
+    from mckibben.control import track as close_loop
     from mckibben.control.connecting import asked, flatters_feedback, kind_of, offered
-    from mckibben.control.controller import samples_ahead
     from mckibben.files import write
     from mckibben.studying.recorded_inputs import beyond_known
 
@@ -187,57 +178,28 @@ def track(
     read = paths(compensator, reference, chosen.rig, chosen.plant)
     file = claimed(out, read, force, recording=True)
     controller_file = claimed(chosen.controller_out, [*read, *paths(out)], force)
+
     block, plant = saved(compensator, chosen.fields), _plant(chosen, reading)
-    if not any(drives(channel) or channel.name.startswith(COMMAND) for channel in block.outputs):
-        gives = ", ".join(channel.name for channel in block.outputs)
-        raise ModelError(
-            f"its outputs are {gives}, but a compensator's are pressures or commands",
-            parameter="compensator",
-            remedy="give the result of `invert()`",
-        )
-    run = only(read_files(reference, None, reading))
-    wanted = asked(plant, run, block)
-    BlockController(block).connect(offered(plant, wanted))  # before anything is tuned
-    step = sample_time_of(wanted, "be a reference")
-    held = {name: float(wanted[name][0]) for name in plant.inputs if name in wanted}
-    # commands are no pressures to be compared with what is measured
-    commanded = any(channel.name.startswith(COMMAND) for channel in block.outputs)
-    copied = ("approach", "settle", "noise", "delay", "slew", "seed")
-    arguments: dict[str, Any] = {name: getattr(chosen, name) for name in copied}
-    arguments["pressure_loop"] = chosen.pressure_loop and not commanded
-    ahead = preview_time(block) if chosen.preview is None else chosen.preview
+    _require_compensator(block)
+    desired = asked(plant, only(read_files(reference, None, reading)), block)
+    BlockController(block).connect(offered(plant, desired))  # before anything is tuned
+    make_law, settings = _law_of(block, plant, desired, chosen), _loop_settings(block, chosen)
+
     with telling(progress, f"{chosen.controller} on {plant.name}") as tell:
         taught = None
-        tuned = cache(
-            lambda: tune_pid(plant, sample_time=step, scheduled=held, references=block.inputs)
-        )
         if chosen.repetitions:
-            numbers = count(chosen.seed)  # noise differs between repetitions
-
-            def repeat(corrected: Block) -> Recording:
-                law = control_law(chosen.controller, corrected, tuned)
-                again = arguments | {"seed": next(numbers)}
-                return close(law, plant, wanted, preview=chosen.preview, **again).recording
-
-            taught = learn(
-                block,
-                repeat,
-                chosen.repetitions,
-                ahead=max(samples_ahead(ahead, step), 1) + block.samples_ahead,
-                settle=round(chosen.approach / step) + round(chosen.settle / step),
-            )
-        law = control_law(chosen.controller, taught.best if taught else block, tuned)
+            taught = _taught(block, plant, desired, make_law, chosen, settings)
+        law = make_law(taught.best if taught else block)
         if controller_file is not None:
-            further = ahead + block.samples_ahead * step > step
-            if not isinstance(law, Block) or (isinstance(law, FeedforwardFeedback) and further):
-                raise ModelError(
-                    f"{chosen.controller!r} cannot be saved as one block",
-                    parameter="controller_out",
-                    remedy="leave it out; or use feedforward or pid, or both with `preview=0`",
-                )
-        halves = [_half(tell, start) for start in (0.0, 0.5)]
-        tracked = close(law, plant, wanted, preview=chosen.preview, progress=halves[0], **arguments)
-        without = before(block, plant, wanted, progress=halves[1], **arguments)
+            _require_one_block(law, block, desired, chosen)
+
+        loop = settings | {"seed": chosen.seed}
+        first_half, second_half = (_half(tell, start) for start in (0.0, 0.5))
+        tracked = close_loop(
+            law, plant, desired, preview=chosen.preview, progress=first_half, **loop
+        )
+        without = before(block, plant, desired, progress=second_half, **loop)
+
     if file is not None:
         write(without.beside(tracked.recording), file)
     if controller_file is not None and isinstance(law, Block):
@@ -251,12 +213,108 @@ def track(
         law=chosen.controller,
         seed=chosen.seed,
         controller=law,
-        reference=wanted,
-        notes=(*beyond_known(block, wanted), *without.notes),
+        reference=desired,
+        notes=(*beyond_known(block, desired), *without.notes),
         file=file,
         controller_file=controller_file,
         learned=taught,
     )
+
+
+def _require_compensator(block: Block) -> None:
+    """Raise an error if a block does not drive a plant."""
+    from mckibben.blocks.fields import drives
+
+    if not any(drives(channel) for channel in block.outputs) and not _commands(block):
+        outputs = ", ".join(channel.name for channel in block.outputs)
+        raise ModelError(
+            f"its outputs are {outputs}, but a compensator's are pressures or commands",
+            parameter="compensator",
+            remedy="give the result of `invert()`",
+        )
+
+
+def _commands(block: Block) -> bool:
+    """Return whether a compensator's outputs are commands to a regulator, not pressures."""
+    return any(channel.name.startswith(COMMAND) for channel in block.outputs)
+
+
+def _loop_settings(block: Block, chosen: TrackOptions) -> dict[str, Any]:
+    """Return the arguments of `mckibben.control.track` that options state, but for the seed.
+
+    Commands are no pressures, which a pressure loop could compare with measured ones.
+    """
+    names = ("approach", "settle", "noise", "delay", "slew")
+    settings: dict[str, Any] = {name: getattr(chosen, name) for name in names}
+    return settings | {"pressure_loop": chosen.pressure_loop and not _commands(block)}
+
+
+def _law_of(
+    block: Block, plant: Plant, desired: Recording, chosen: TrackOptions
+) -> Callable[[Block], Block | Controller]:
+    """Return what makes the control law of a compensator; a PID is tuned once, when it is needed."""
+    from mckibben.control import control_law, tune_pid
+
+    step = sample_time_of(desired, "be a reference")
+    scheduled = {name: float(desired[name][0]) for name in plant.inputs if name in desired}
+
+    @cache
+    def tuned() -> Any:
+        return tune_pid(plant, sample_time=step, scheduled=scheduled, references=block.inputs)
+
+    return lambda compensator: control_law(chosen.controller, compensator, tuned)
+
+
+def _preview(block: Block, chosen: TrackOptions) -> float:
+    """Return how far ahead a compensator is given the reference [s]."""
+    from mckibben.control import preview_time
+
+    return preview_time(block) if chosen.preview is None else chosen.preview
+
+
+def _taught(
+    block: Block,
+    plant: Plant,
+    desired: Recording,
+    make_law: Callable[[Block], Block | Controller],
+    chosen: TrackOptions,
+    settings: dict[str, Any],
+) -> Learned:
+    """Return the compensator that is learned from repetitions, each with other noise."""
+    from mckibben.control import learn as repeat_and_learn
+    from mckibben.control import track as close_loop
+    from mckibben.control.controller import samples_ahead
+
+    step, seeds = sample_time_of(desired, "be a reference"), count(chosen.seed)
+
+    def repetition(corrected: Block) -> Recording:
+        law, loop = make_law(corrected), settings | {"seed": next(seeds)}
+        return close_loop(law, plant, desired, preview=chosen.preview, **loop).recording
+
+    return repeat_and_learn(
+        block,
+        repetition,
+        chosen.repetitions,
+        ahead=max(samples_ahead(_preview(block, chosen), step), 1) + block.samples_ahead,
+        settle=round(chosen.approach / step) + round(chosen.settle / step),
+    )
+
+
+def _require_one_block(
+    law: Block | Controller, block: Block, desired: Recording, chosen: TrackOptions
+) -> None:
+    """Raise an error if a law cannot be saved: it is no block, or feedback needs a later reference."""
+    from mckibben.blocks.base import Block
+    from mckibben.blocks.feedback import FeedforwardFeedback
+
+    step = sample_time_of(desired, "be a reference")
+    later = _preview(block, chosen) + block.samples_ahead * step > step
+    if not isinstance(law, Block) or (isinstance(law, FeedforwardFeedback) and later):
+        raise ModelError(
+            f"{chosen.controller!r} cannot be saved as one block",
+            parameter="controller_out",
+            remedy="leave it out; or use feedforward or pid, or both with `preview=0`",
+        )
 
 
 @operation(

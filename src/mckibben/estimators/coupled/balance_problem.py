@@ -43,8 +43,17 @@ STRAIGHT = 0.01
 RIDGE = 1e-7
 """Ridge of least squares, relative to each coefficient's own effect."""
 
-LEAST_AT_REST, PASSES = 0.1, 3
-"""Smallest area at rest, relative to the mean over samples; number of reweightings of forces."""
+LEAST_AT_REST = 0.1
+"""Smallest area at rest, relative to the mean over samples."""
+
+PASSES = 3
+"""Number of reweightings of forces."""
+
+STICKING = 0.3
+"""Share of the stiffness of stops that counts while they mostly slide."""
+
+LEAST_SHARE = 0.1
+"""Smallest stiffness by which forces are weighed, relative to the median over samples."""
 
 MOST_CUTS = 8
 """Maximum number of added stiffness constraints."""
@@ -112,18 +121,18 @@ class Problem:
 
     def acting(self, run: Run, structure: Structure, values: Array) -> Array:
         """Return the pressures acting on muscles, shape (n, muscles)."""
-        shape = tuple(values[structure.at["filling"][0] :].tolist())
-        if not (shape[0] or shape[2] or shape[3]):
+        filling, ratio, dead, contact = values[structure.at["filling"][0] :].tolist()
+        if not (filling or dead or contact):
             return run.driven
-        key = (run.place, *shape)
+        key = (run.place, filling, ratio, dead, contact)
         if key not in self._fronts:
             if len(self._fronts) > 4 * len(self.data.runs):
                 self._fronts.clear()
             driven = run.driven
             for block in front(structure, values, Channel("pressure", "bar")):
                 columns = np.ascontiguousarray(driven.T)[..., np.newaxis]
-                acting = [run_many([block], p, sample_time=run.sample_time) for p in columns]
-                driven = np.column_stack([one[0] for one in acting])
+                answers = [run_many([block], p, sample_time=run.sample_time) for p in columns]
+                driven = np.column_stack([answer[0] for answer in answers])
             self._fronts[key] = driven
         return self._fronts[key]
 
@@ -165,11 +174,11 @@ class Problem:
                 c[coordinate_at(c, j)] += load
             driven = self.acting(run, structure, values)
             by_air = self._by_air(structure, z, run, air) if air else None
-            found, slopes = simulate(
+            results, slopes = simulate(
                 c, driven, run.outputs, run.scheduled, by_air,
                 held=run.place in held, every=self.every, sloped=sloped,
             )  # fmt: skip
-            yield run, found, slopes
+            yield run, results, slopes
 
     def errors(
         self, structure: Structure, z: Array, wanted: Mask | None = None
@@ -180,21 +189,23 @@ class Problem:
         lacking, over that of the highest pressure at rest. Derivatives are computed only if some are
         ``wanted``. Those by parameters of the front are finite differences of the acting pressures.
         """
-        errors, slopes, bench = list[Array](), [np.zeros((0, z.size))], structure.bench
+        errors, table, bench = list[Array](), [np.zeros((0, z.size))], structure.bench
         sloped = wanted is not None
         first, last = structure.positions("filling").start, len(structure.terms)
         air = [place for place in range(first, last) if wanted is not None and wanted[place]]
-        shape = [*range(structure.mix.shape[1], first), *air]
-        for run, found, by in self.simulated(structure, z, self.still, sloped=sloped, air=air):
+        nonlinear = [*range(structure.mix.shape[1], first), *air]
+
+        for run, result, slopes in self.simulated(structure, z, self.still, sloped=sloped, air=air):
             still, counts = run.place in self.still, self.counting(run)[:, np.newaxis]
             scale = counts / (bench.highest * bench.unit if still else bench.travel)
             target = 0.0 if still else run.outputs[self.places(run)]
-            errors.append(((found - target) * scale).ravel())
+            errors.append(((result - target) * scale).ravel())
             if sloped:
-                by = by * scale[..., np.newaxis]
-                slopes.append(self._by_unknowns(structure, run, by))
-                slopes[-1][:, shape] = by.reshape(-1, by.shape[2])[:, structure.n_linear :]
-        return errors, np.concatenate(slopes)
+                scaled = slopes * scale[..., np.newaxis]
+                table.append(self._by_unknowns(structure, run, scaled))
+                flat = scaled.reshape(-1, scaled.shape[2])
+                table[-1][:, nonlinear] = flat[:, structure.n_linear :]
+        return errors, np.concatenate(table)
 
     def _by_unknowns(self, structure: Structure, run: Run, slopes: Array) -> Array:
         """Return derivatives by all unknowns, shape (k m, unknowns), from those by coefficients.
@@ -202,10 +213,10 @@ class Problem:
         Those by nonlinear parameters are 0.
         """
         loads, flat = self.loads_at(structure, run), slopes.reshape(-1, slopes.shape[-1])
-        found = np.zeros((len(flat), self.size(structure)))
-        found[:, : structure.mix.shape[1]] = flat[:, : structure.n_linear] @ structure.mix
-        found[:, loads] = flat[:, structure.springs[: loads.stop - loads.start, 0, 0]]
-        return found
+        table = np.zeros((len(flat), self.size(structure)))
+        table[:, : structure.mix.shape[1]] = flat[:, : structure.n_linear] @ structure.mix
+        table[:, loads] = flat[:, structure.springs[: loads.stop - loads.start, 0, 0]]
+        return table
 
     def _by_air(self, structure: Structure, z: Array, run: Run, places: Sequence[int]) -> Array:
         """Return derivatives of acting pressures by front parameters, shape (t, muscles, places)."""
@@ -221,19 +232,20 @@ class Problem:
     def all_at_rest(self) -> bool:
         """Whether all runs with motion begin near the lowest pressures, and without earlier memory."""
         low, most = self.data.lowest, RESTING * (self.data.highest - self.data.lowest)
-        begun = (run.driven[0] for run in self.data.runs if run.place not in self.still)
-        return all(bool((p - np.minimum(low, 0.0) <= most).all()) for p in begun)
+        first = (run.driven[0] for run in self.data.runs if run.place not in self.still)
+        return all(bool((p - np.minimum(low, 0.0) <= most).all()) for p in first)
 
     def resisted(self, structure: Structure, z: Array) -> tuple[float, float]:
         """Return the least and largest resistance of any muscle at measured positions."""
-        values, found = structure.expanded(z), list[Array]()
+        values, resistances = structure.expanded(z), list[Array]()
         springs, shares = values[structure.springs], values[structure.at["loads"]]
         for run in self.data.runs:
             x, loads = np.split(run.scheduled, [len(structure.bench.scheduled)], axis=1)
-            around = np.column_stack([np.ones(len(x)), run.outputs])
-            pulled = np.einsum("tji,ti->tj", springs_at(springs, x.T, structure.degree), around)
-            found.append(-(pulled + loads @ shares.T))
-        whole = np.concatenate(found)
+            positions = np.column_stack([np.ones(len(x)), run.outputs])
+            stiffness = springs_at(springs, x.T, structure.degree)
+            spring_force = np.einsum("tji,ti->tj", stiffness, positions)
+            resistances.append(-(spring_force + loads @ shares.T))
+        whole = np.concatenate(resistances)
         return float(whole.min()), float(whole.max())
 
     # -- the linear stage ------------------------------------------------------------------------
@@ -241,97 +253,150 @@ class Problem:
     def balanced(self, structure: Structure, z: Array, active: Mask) -> Array:
         """Return the linear parameters of the force balance at measured positions.
 
-        Forces are weighed by stiffness, so that errors are of displacement. Sizes of areas
-        at rest are not determined: those of muscles with a coordinate each are 1 at the mean of samples.
+        Forces are weighed by stiffness, so that errors are of displacement: least squares of growing
+        stiffness, then once more within physics.
         """
-        n, n_terms = structure.mix.shape[1], len(structure.terms)
-        terms, of_force = structure.terms[:n], structure.bench.of_force
-        fixed = [not of_force and term[:2] == ("areas", 0) for term in terms]
-        chosen = np.flatnonzero(active[:n] & ~np.array(fixed))
-        narrowing = np.flatnonzero([terms[i].kind == "areas" and not of_force for i in chosen])
+        stage = self._linear_stage(structure, z, active)
+        weights = np.ones(stage.table.shape[:2])
+        for _ in range(PASSES):
+            rows = stage.weighted(weights)
+            products = (rows.T @ rows)[np.newaxis]
+            bounded = stage.bounded
+            stage.set(solve_products(products, bounded.size, RIDGE, bounded=bounded)[0, :, 0])
+            if not structure.bench.of_force:
+                weights = 1.0 / (self.stiffness(structure, stage.z) * structure.bench.travel)
+
+        triangle: Array = np.linalg.qr(stage.weighted(weights), mode="r")  # type: ignore[assignment]
+        solve = partial(solve_constrained, triangle[:, :-1], triangle[:, -1], ridge=RIDGE)
+        physics = stage.constraints(*structure.constraints(structure.expanded(stage.z)))
+        solve_stiff(structure, solve, physics, stage.constraints, stage.set)
+        return stage.z
+
+    def _linear_stage(self, structure: Structure, z: Array, active: Mask) -> LinearStage:
+        """Return the least-squares problem of the active linear terms, and of recordings' loads.
+
+        Sizes of areas at rest are not determined: those of muscles with a coordinate each are fixed.
+        """
+        n, of_force = structure.mix.shape[1], structure.bench.of_force
+        linear = structure.terms[:n]
+        fixed = np.array([not of_force and term[:2] == ("areas", 0) for term in linear])
+        chosen = np.flatnonzero(active[:n] & ~fixed)
+        narrowing = np.flatnonzero([linear[i].kind == "areas" and not of_force for i in chosen])
         start = z.copy()
         start[:n] = 0.0
-        whole, target = self._forces(structure, start, chosen)
-        bounded = np.append(structure.bounded[chosen], np.zeros(z.size - n_terms, dtype=bool))
-        means = np.einsum("tjc,tj->c", whole[..., narrowing], target) / float((target**2).sum())
-        whole[..., narrowing] -= means * target[..., np.newaxis]
-        table = np.concatenate([whole, target[..., np.newaxis]], axis=2)
-        weight = np.ones_like(target)
 
-        def put(least: Array) -> Array:
-            """Set the parameters in the unit in which the area is 1; return the coefficients."""
-            at_rest = max(1.0 + float(means @ least[narrowing]), LEAST_AT_REST)
-            start[chosen] = least[: chosen.size] / at_rest
-            start[n_terms:] = least[chosen.size :] / at_rest
-            return structure.base + structure.mix @ start[:n]
-
-        for _ in range(PASSES):
-            flat = (table * weight[..., np.newaxis]).reshape(-1, table.shape[2])
-            products = (flat.T @ flat)[np.newaxis]
-            put(solve_products(products, bounded.size, RIDGE, bounded=bounded)[0, :, 0])
-            if not of_force:
-                weight = 1.0 / (self.stiffness(structure, start) * structure.bench.travel)
-        # the same within physics, in the unit in which the area is 1 on average
-        flat = (table * weight[..., np.newaxis]).reshape(-1, table.shape[2])
-        triangle: Array = np.linalg.qr(flat, mode="r")  # type: ignore[assignment]
-        scaling = np.zeros(chosen.size)
-        scaling[narrowing] = means
-        mix = structure.mix[:, chosen] + np.outer(structure.base, scaling)
-
-        def asked(sides: Array, bounds: Array) -> tuple[Array, Array]:
-            on = np.zeros((len(sides), bounded.size))
-            on[:, : chosen.size] = sides @ mix - np.outer(bounds, scaling)
-            return on, bounds - sides @ structure.base
-
-        solve = partial(solve_constrained, triangle[:, :-1], triangle[:, -1], ridge=RIDGE)
-        physics = asked(*structure.constraints(structure.expanded(start)))
-        solve_stiff(structure, solve, physics, asked, put)
-        return start
+        columns, target = self._forces(structure, start, chosen)
+        means = np.einsum("tjc,tj->c", columns[..., narrowing], target)
+        means = means / float((target**2).sum())
+        columns[..., narrowing] -= means * target[..., np.newaxis]
+        table = np.concatenate([columns, target[..., np.newaxis]], axis=2)
+        return LinearStage(structure, chosen, narrowing, means, table, start)
 
     def _forces(self, structure: Structure, start: Array, chosen: Indices) -> tuple[Array, Array]:
-        """Return derivatives of forces by linear terms and recordings' loads, and their target."""
-        rows, targets = [], []
+        """Return derivatives of forces by linear terms and recordings' loads, and the lacking forces.
+
+        Shapes (k, m, unknowns) and (k, m).
+        """
+        columns, targets = [], []
         linear = np.append(chosen, np.arange(len(structure.terms), self.size(structure)))
-        for run, lacking, slopes in self.simulated(
-            structure, start, [run.place for run in self.data.runs]
-        ):
+        every_run = [run.place for run in self.data.runs]
+        for run, lacking, slopes in self.simulated(structure, start, every_run):
             counts = self.counting(run)[:, np.newaxis]
             targets.append(-lacking * counts)
-            found = self._by_unknowns(structure, run, slopes * counts[..., np.newaxis])[:, linear]
-            rows.append(found.reshape(*lacking.shape, -1))
-        return np.concatenate(rows), np.concatenate(targets)
+            by_unknowns = self._by_unknowns(structure, run, slopes * counts[..., np.newaxis])
+            columns.append(by_unknowns[:, linear].reshape(*lacking.shape, -1))
+        return np.concatenate(columns), np.concatenate(targets)
 
     def stiffness(self, structure: Structure, z: Array) -> Array:
         """Return the stiffness of every coordinate with stops mostly sliding, shape (k, m)."""
-        values, found = structure.expanded(z), []
+        values, scale = structure.expanded(z), structure.bench.scale
+        table = []
         for run in self.data.runs:
             places = self.places(run)
             q, p = run.outputs[places], self.acting(run, structure, values)[places]
             x = run.scheduled[places, : len(structure.bench.scheduled)].T
             springs = springs_at(values[structure.springs], x, structure.degree)
-            own, scale = springs[..., 1:].diagonal(axis1=1, axis2=2).copy(), structure.bench.scale
-            for k, way in enumerate(structure.bench.directions):
-                u = q @ way / scale
+            stiffness = springs[..., 1:].diagonal(axis1=1, axis2=2).copy()
+            for k, direction in enumerate(structure.bench.directions):
+                u = q @ direction / scale
                 elastic = polynomial.polyder([0.0, 0.0, *values[structure.at["elasticity"][k]]])
                 narrowing = polynomial.polyder(values[structure.at["areas"][k]])
-                stiff = polynomial.polyval(u, elastic) / scale
-                stiff -= p[:, k] * polynomial.polyval(u, narrowing) / scale
-                stiff += float(values[structure.at["bladders"][k]].sum())
-                stiff += 0.3 * float(values[structure.at["friction"][k]].sum())
-                own += np.outer(stiff, way**2)
-            found.append(own)
-        whole = np.concatenate(found)
-        return np.maximum(whole, 0.1 * np.median(np.abs(whole), axis=0))
+                of_muscle = polynomial.polyval(u, elastic) / scale
+                of_muscle -= p[:, k] * polynomial.polyval(u, narrowing) / scale
+                of_muscle += float(values[structure.at["bladders"][k]].sum())
+                of_muscle += STICKING * float(values[structure.at["friction"][k]].sum())
+                stiffness += np.outer(of_muscle, direction**2)
+            table.append(stiffness)
+        whole = np.concatenate(table)
+        return np.maximum(whole, LEAST_SHARE * np.median(np.abs(whole), axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class LinearStage:
+    """Least squares of the force balance by linear terms, in the unit in which the mean area is 1.
+
+    In that unit, the constant area of 1 at rest is replaced by one over all samples, so that no fit can
+    make forces small by small areas. `set` returns to the unit in which the area at rest is 1.
+
+    Parameters
+    ----------
+    structure : Structure
+    chosen : array of int
+        Linear terms that are found; loads of recordings follow.
+    narrowing : array of int
+        Which of these are of the area.
+    means : array
+        Projection of their columns on the target.
+    table : array, shape (k, m, unknowns + 1)
+        Forces by the unknowns at every sample and coordinate, and in the last column their target.
+    z : array
+        All free parameters, as last `set`.
+    """
+
+    structure: Structure
+    chosen: Indices
+    narrowing: Indices
+    means: Array
+    table: Array
+    z: Array
+
+    @property
+    def bounded(self) -> Mask:
+        """Which of the unknowns are not negative."""
+        n_loads = self.table.shape[2] - 1 - self.chosen.size
+        return np.append(self.structure.bounded[self.chosen], np.zeros(n_loads, dtype=bool))
+
+    def weighted(self, weights: Array) -> Array:
+        """Return the table with weighted rows, shape (k m, unknowns + 1)."""
+        return (self.table * weights[..., np.newaxis]).reshape(-1, self.table.shape[2])
+
+    def set(self, solution: Array) -> Array:
+        """Set the parameters to a solution; return the linear coefficients."""
+        structure, count = self.structure, self.chosen.size
+        at_rest = max(1.0 + float(self.means @ solution[self.narrowing]), LEAST_AT_REST)
+        self.z[self.chosen] = solution[:count] / at_rest
+        self.z[len(structure.terms) :] = solution[count:] / at_rest
+        return structure.base + structure.mix @ self.z[: structure.mix.shape[1]]
+
+    def constraints(self, sides: Array, bounds: Array) -> tuple[Array, Array]:
+        """Return constraints of the unknowns from those of coefficients, ``sides @ c >= bounds``."""
+        structure, count = self.structure, self.chosen.size
+        scaling = np.zeros(count)
+        scaling[self.narrowing] = self.means
+        mix = structure.mix[:, self.chosen] + np.outer(structure.base, scaling)
+        of_unknowns = np.zeros((len(sides), self.table.shape[2] - 1))
+        of_unknowns[:, :count] = sides @ mix - np.outer(bounds, scaling)
+        return of_unknowns, bounds - sides @ structure.base
 
 
 def solve_stiff(
     structure: Structure,
     solve: Callable[[Array, Array], Array],
     physics: tuple[Array, Array],
-    asked: Callable[[Array, Array], tuple[Array, Array]],
-    put: Callable[[Array], Array],
+    constraints: Callable[[Array, Array], tuple[Array, Array]],
+    update: Callable[[Array], Array],
 ) -> None:
-    """Solve least squares within physics; springs are made stiff where they were found soft.
+    """Solve least squares within physics; where springs are soft, constrain them and solve again.
 
     Parameters
     ----------
@@ -339,18 +404,18 @@ def solve_stiff(
         Returns the solution within constraints, ``sides @ solution >= bounds``.
     physics : (array, array)
         Constraints to begin with.
-    asked : callable
-        Returns those of linear coefficients as such.
-    put : callable
-        Sets the solution, and returns the linear coefficients.
+    constraints : callable
+        Returns constraints of the solution from those of linear coefficients.
+    update : callable
+        Sets the parameters to a solution, and returns the linear coefficients.
     """
     sides, bounds = physics
     for _ in range(MOST_CUTS):
-        side, softest = structure.softest(put(solve(sides, bounds)))
-        if softest >= 0.5 * structure.least_stiffness:
+        side, stiffness = structure.softest(update(solve(sides, bounds)))
+        if stiffness >= 0.5 * structure.least_stiffness:
             break
-        more = asked(side[np.newaxis], np.array([structure.least_stiffness]))
-        sides, bounds = np.vstack([sides, more[0]]), np.append(bounds, more[1])
+        cut, bound = constraints(side[np.newaxis], np.array([structure.least_stiffness]))
+        sides, bounds = np.vstack([sides, cut]), np.append(bounds, bound)
 
 
 def problem_of(data: TrainingData, samples: int, most: int, *, of_force: bool) -> Problem:

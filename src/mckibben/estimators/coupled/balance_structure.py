@@ -44,6 +44,12 @@ Item = TypeVar("Item")
 POSITIVE_AREA = 1e-9
 """Smallest area at rest, relative to a muscle's typical area."""
 
+LEAST_LINE = 1e-12
+"""Smallest resistance of a line during identification, relative to its natural size."""
+
+LEAST_AT_REST = 0.1
+"""Smallest area at rest, relative to a muscle's typical area."""
+
 LEAST_STIFF = 1e-3
 """Smallest stiffness, relative to the force at the highest pressure over the stroke."""
 
@@ -225,14 +231,14 @@ class Structure:
         """Indices of the values: of linear ones a row a coordinate or muscle, of others a vector."""
         places = layout(self.sizes)
         first = places.head[at.COORDINATES]
-        found = {name: index - first for name, index in places.at.items()}
+        indices = {name: index - first for name, index in places.at.items()}
         end = places.size - first
         for name in NONLINEAR:
             kind = TABLE[name]
             count = 1 if kind.alike else self.sizes.of(kind.of)
-            found[name] = end + np.arange(count * self.sizes.number(kind.width))
-            end += found[name].size
-        return found
+            indices[name] = end + np.arange(count * self.sizes.number(kind.width))
+            end += indices[name].size
+        return indices
 
     @cached_property
     def springs(self) -> Indices:
@@ -358,24 +364,45 @@ class Structure:
     @cached_property
     def keys(self) -> list[tuple[str, object, int | None]]:
         """Keys of the terms across structures: limits, lags and obstacles by their initial values."""
-        by: dict[str, Sequence[object]] = {"friction": self.limits, "relaxation": self.lags}
-        powers = [
-            (s, d) for s in range(len(self.bench.scheduled)) for d in range(1, self.degree + 1)
-        ]
-        by |= {"springs": [(0, 0), *powers]}
-        by |= {"lags": self.lags, "obstacles": self.obstacles, "places": self.m * self.obstacles}
+        schedules, degrees = range(len(self.bench.scheduled)), range(1, self.degree + 1)
+        initial: dict[str, Sequence[object]] = {
+            "friction": self.limits,
+            "relaxation": self.lags,
+            "lags": self.lags,
+            "obstacles": self.obstacles,
+            "places": self.m * self.obstacles,
+            "springs": [(0, 0), *product(schedules, degrees)],
+        }
         return [
-            (kind, by[kind][which] if kind in by else which, muscle)
+            (kind, initial[kind][which] if kind in initial else which, muscle)
             for kind, which, muscle in self.terms
         ]
 
     @cached_property
     def _ranges(self) -> Array:
         """Lower and upper bounds of all values, and their scales, shape (3, values)."""
+        bench, natural = self.bench, self._natural_sizes()
+        ranges = np.zeros((3, self.size))
+        lower, upper, scales = ranges
+        lower[:] = -np.inf
+        for kind in TABLE.values():
+            for row, share in zip(ranges, (kind.least, kind.most, kind.scale), strict=True):
+                row[self.at[kind.name]] = share * natural[kind.name]
+
+        if self.lags:  # each within its part of the range, so that none takes another's place
+            between = np.sqrt(np.multiply(self.lags[1:], self.lags[:-1]))
+            shortest, longest = bench.lag_range
+            lower[self.at["lags"]] = np.log([shortest, *between])
+            upper[self.at["lags"]] = np.log([*between, longest])
+        scales[self.at["filling"]] = max(4.0 * bench.step, 1e-9)
+        return ranges
+
+    def _natural_sizes(self) -> dict[str, Any]:
+        """Return the natural sizes of all kinds of terms: numbers, or arrays as of `at`."""
         bench = self.bench
-        powers = 1.0 / powers_of(bench.largest, self.degree)
         springs = [bench.natural(unit) for unit in TABLE["springs"].units(self.sizes)]
-        own: dict[str, Any] = {
+        powers = 1.0 / powers_of(bench.largest, self.degree)
+        return {name: bench.natural(kind.unit) for name, kind in TABLE.items()} | {
             "loads": bench.natural("N") / bench.heaviest,
             "springs": powers.repeat(1 + self.m) * springs,
             "friction_slopes": 1.0 / bench.largest,
@@ -383,18 +410,6 @@ class Structure:
             # of the force at which a stop breaks away
             "friction": bench.natural("N") / np.array(self.limits),
         }
-        found = np.zeros((3, self.size))
-        found[0] = -np.inf
-        for kind in TABLE.values():
-            for row, share in zip(found, (kind.least, kind.most, kind.scale), strict=True):
-                row[self.at[kind.name]] = share * own.get(kind.name, bench.natural(kind.unit))
-        if self.lags:  # each within its part of the range, so that none takes another's place
-            between = np.sqrt(np.multiply(self.lags[1:], self.lags[:-1]))
-            shortest, longest = bench.lag_range
-            found[0, self.at["lags"]] = np.log([shortest, *between])
-            found[1, self.at["lags"]] = np.log([*between, longest])
-        found[2, self.at["filling"]] = max(4.0 * bench.step, 1e-9)
-        return found
 
     @property
     def nonlinear_ranges(self) -> Array:
@@ -418,13 +433,13 @@ class Structure:
         may be anything.
         """
         doubts = 1.0 / self.scales()
-        for place, term in enumerate(self.terms):
+        for index, term in enumerate(self.terms):
             kind = TABLE[term.kind]
             always = term.which == 0 and kind.name in ("springs", "areas")
             if term.muscle is not None:
-                doubts[place] /= DIFFERENCE
+                doubts[index] /= DIFFERENCE
             elif always or (known and kind.prior) or not kind.doubtful:
-                doubts[place] = 0.0
+                doubts[index] = 0.0
         return doubts
 
     # -- block -----------------------------------------------------------------------------------
@@ -436,31 +451,14 @@ class Structure:
         are added to those of their coordinates; others are not checked.
         """
         bench, n = self.bench, self.n
-        given = {name: values[self.at[name]] for name in (*LINEAR["muscle"], "springs", "loads")}
-        for name in LINEAR["muscle"]:
-            if TABLE[name].least == 0.0:
-                given[name] = np.maximum(given[name], 0.0)
-        if bench.step and not final:  # so that what lines add is known where there are none
-            given["lines"] = np.maximum(given["lines"], 1e-12 * bench.natural("N s/mm"))
-        given["areas"][:, 0] = np.maximum(given["areas"][:, 0], POSITIVE_AREA * bench.unit)
         shape = {name: self.nonlinear_values(values, name) for name in NONLINEAR}
-        taut, ratio = bool((shape["pushes"] >= NEVER).all()), float(shape["asymmetry"][0])
-        merged = final and taut and not bench.directed
-        if merged:
-            own = np.arange(self.m)
-            given["springs"][own, 1 + own] += given["bladders"][:, 0]
-        left_out = {
-            "lines": final and not given["lines"].any(),
-            "mass": (final and not given["mass"].any()) or not bench.step or not taut,
-            "bladders": merged,
-        }
-        fields = fields_of(given)
-        fields |= {name: () for name, out in left_out.items() if out}
-        slopes, made = shape["friction_slopes"], Balance if final else Balance.unchecked
-        return made(
-            **fields,
+        never_slack = bool((shape["pushes"] >= NEVER).all())
+        ratio, slopes = float(shape["asymmetry"][0]), shape["friction_slopes"]
+        make = Balance if final else Balance.unchecked
+        return make(
+            **self._linear_fields(values, final=final, never_slack=never_slack),
             walls=vector(np.full(n, shape["walls"][0])),
-            pushes=() if taut else vector(shape["pushes"]),
+            pushes=() if never_slack else vector(shape["pushes"]),
             limits=self.limits,
             friction_growth=float(shape["friction_growth"][0]),
             highest_pressure=bench.highest,
@@ -480,6 +478,32 @@ class Structure:
             preload=bench.preload if bench.directed else 0.0,
             held=bench.of_force,
         )
+
+    def _linear_fields(
+        self, values: Array, *, final: bool, never_slack: bool
+    ) -> dict[str, tuple[Any, ...]]:
+        """Return the fields of a `Balance` in which forces are linear, within their signs."""
+        bench = self.bench
+        tables = {name: values[self.at[name]] for name in (*LINEAR["muscle"], "springs", "loads")}
+        for name in LINEAR["muscle"]:
+            if TABLE[name].least == 0.0:
+                tables[name] = np.maximum(tables[name], 0.0)
+        tables["areas"][:, 0] = np.maximum(tables["areas"][:, 0], POSITIVE_AREA * bench.unit)
+        if bench.step and not final:  # so that a line has an effect, whose derivative is found
+            tables["lines"] = np.maximum(tables["lines"], LEAST_LINE * bench.natural("N s/mm"))
+
+        merged = final and never_slack and not bench.directed
+        if merged:
+            muscles = np.arange(self.m)
+            tables["springs"][muscles, 1 + muscles] += tables["bladders"][:, 0]
+
+        without_mass = (final and not tables["mass"].any()) or not bench.step or not never_slack
+        left_out = {
+            "lines": final and not tables["lines"].any(),
+            "mass": without_mass,
+            "bladders": merged,
+        }
+        return fields_of(tables) | {name: () for name, out in left_out.items() if out}
 
     def _obstacles(self, values: Array) -> Array:
         """Return side, position and stiffnesses of the obstacles, a row a coordinate."""
@@ -528,43 +552,52 @@ class Structure:
             for name in ("asymmetry", "walls", "friction_growth")
         )
         rise = growth / self.bench.highest
-        (matrix, lower), left = self._physics
+        (matrix, lower), area_left = self._physics
         matrix = matrix.copy()
         friction = -(np.array(self.limits) * rise * max(1.0, ratio) + wall)
-        matrix[left[..., np.newaxis], self.at["friction"][:, np.newaxis]] = friction
+        matrix[area_left[..., np.newaxis], self.at["friction"][:, np.newaxis]] = friction
         return matrix, lower
 
     @cached_property
     def _physics(self) -> tuple[tuple[Array, Array], Indices]:
         """Constraints without friction, and their rows of the areas it reduces, shape (n, GRID)."""
-        bench, stiff = self.bench, self.least_stiffness
-        sides = [np.eye(self.n_linear)[self._ranges[0, : self.n_linear] == 0.0]]
-        bounds = [np.zeros(len(sides[0]))]
-        order, power = np.arange(self.n_area), np.arange(2, 2 + self.n_elastic)
-        for areas, elastic, bladder, hull in zip(
-            *(self.at[kind] for kind in ("areas", "elasticity", "bladders")),
-            bench.hull,
-            strict=True,
-        ):
-            low, high = hull.tolist()
-            u = np.linspace(low, high, GRID)[:, np.newaxis] / bench.scale
-            at_rest = np.eye(self.n_linear)[areas[:1]]
-            # the area that is left; stiffness without pressure, and at the highest
-            along = np.zeros((GRID, 3, self.n_linear))
-            along[:, 0, areas] = u**order
-            along[:, 0, areas[0]] -= LEAST_LEFT
-            along[:, 1:, elastic] = (power * u ** (power - 1) / bench.scale)[:, np.newaxis]
-            along[:, 1:, bladder] = 1.0
-            narrowing = order[1:] * u ** (order[1:] - 1) / bench.scale
-            along[:, 2, areas[1:]] = -bench.highest * narrowing
-            sides += [at_rest, along.reshape(-1, self.n_linear)]
-            bounds += [np.array([0.1 * bench.unit]), np.tile([0.0, stiff, stiff], GRID)]
-        first = len(sides[0]) + 1 + (1 + 3 * GRID) * np.arange(self.n)
-        for x, direction in product(corners(bench.levels), np.eye(self.m)):
+        signs = np.eye(self.n_linear)[self._ranges[0, : self.n_linear] == 0.0]
+        sides, bounds = [signs], [np.zeros(len(signs))]
+        for k in range(self.n):
+            side, bound = self._muscle_constraints(k)
+            sides.append(side)
+            bounds.append(bound)
+        for x, direction in product(corners(self.bench.levels), np.eye(self.m)):
             sides.append(self.stiffness_row(x, direction)[np.newaxis])
-            bounds.append(np.array([stiff]))
+            bounds.append(np.array([self.least_stiffness]))
+
+        first = len(signs) + 1 + (1 + 3 * GRID) * np.arange(self.n)
         whole = np.concatenate(sides), np.concatenate(bounds)
         return whole, first[:, np.newaxis] + 3 * np.arange(GRID)
+
+    def _muscle_constraints(self, k: int) -> tuple[Array, Array]:
+        """Return the constraints of muscle k: of the area at rest, then three at every grid point.
+
+        They are the area that is left; stiffness without pressure; and at the highest pressure.
+        """
+        bench = self.bench
+        areas, elastic, bladder = (self.at[kind][k] for kind in ("areas", "elasticity", "bladders"))
+        low, high = bench.hull[k].tolist()
+        u = np.linspace(low, high, GRID)[:, np.newaxis] / bench.scale
+        order, power = np.arange(self.n_area), np.arange(2, 2 + self.n_elastic)
+
+        grid = np.zeros((GRID, 3, self.n_linear))
+        grid[:, 0, areas] = u**order
+        grid[:, 0, areas[0]] -= LEAST_LEFT
+        grid[:, 1:, elastic] = (power * u ** (power - 1) / bench.scale)[:, np.newaxis]
+        grid[:, 1:, bladder] = 1.0
+        narrowing = order[1:] * u ** (order[1:] - 1) / bench.scale
+        grid[:, 2, areas[1:]] = -bench.highest * narrowing
+
+        at_rest = np.eye(self.n_linear)[areas[:1]]
+        stiff = self.least_stiffness
+        bounds = np.append(LEAST_AT_REST * bench.unit, np.tile([0.0, stiff, stiff], GRID))
+        return np.concatenate([at_rest, grid.reshape(-1, self.n_linear)]), bounds
 
     def stiffness_row(self, x: Array, direction: Array) -> Array:
         """Return the constraint row of the stiffness of springs along a direction."""

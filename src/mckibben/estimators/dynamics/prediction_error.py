@@ -37,7 +37,8 @@ INVERTIBLE = 1.0 - 1e-7
 """Largest magnitude of a root of C."""
 
 FIRST_STEPS, FOLLOWED, STEPS = 8, 3, 60
-"""Steps from every start; number of distinct best starts that are continued; their steps."""
+"""Evaluations from every start; number of distinct best starts that are continued; evaluations of each.
+"""
 
 NOISE_SAMPLES = 2000
 """Samples of every run used for the noise model of a start."""
@@ -130,6 +131,109 @@ class Polynomials:
         return (*self.poles, self.c, self.d)
 
 
+def delayed(x: Array, samples: int) -> Array:
+    """Return a signal that comes so many samples later, after zeros."""
+    result = np.zeros_like(x)
+    result[samples:] = x[: x.size - samples] if samples else x
+    return result
+
+
+def recursion(denominator: Array, x: Array) -> Array:
+    """Return a signal filtered from rest by 1 / denominator."""
+    from scipy.signal import lfilter
+
+    return np.asarray(lfilter([1.0], denominator, x))
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """The filter D / C, which turns A y - B / F u - start into prediction errors.
+
+    ``c`` and ``d`` have their leading 1.
+    """
+
+    c: Array
+    d: Array
+
+    def __call__(self, x: Array) -> Array:
+        """Return a filtered signal."""
+        from scipy.signal import lfilter
+
+        return np.asarray(lfilter(self.d, self.c, x))
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one input adds to the output, and derivatives of the prediction errors.
+
+    A filter at rest answers what comes later as much later, so each derivative is filtered once, and
+    `delayed`.
+
+    Parameters
+    ----------
+    output : array, shape (n,)
+    constant : float
+        To be added to the output.
+    by_input, by_rest : array, shape (n,)
+        By a coefficient of B without lag, through the input over that at rest, and through a rest at 1.
+    by_poles, by_start : tuple of array, shape (n,)
+        By every coefficient of the input's own recursion, and by every state of an estimated start.
+    """
+
+    output: Array
+    constant: float
+    by_input: Array
+    by_rest: Array
+    by_poles: tuple[Array, ...] = ()
+    by_start: tuple[Array, ...] = ()
+
+
+def free_response(
+    poles: Array, driven: Array, u: Array, rest: float, whiten: Whitening
+) -> Contribution:
+    """Return the contribution of an input through 1 / F from an estimated start.
+
+    Parameters
+    ----------
+    poles : array
+        F, with its leading 1.
+    driven, u : array, shape (n,)
+        B u and the start, without what a rest adds to them, and u.
+    rest : float
+        B u at rest.
+    """
+    states = range(poles.size - 1)
+    output = recursion(poles, driven + rest)
+    by_output = whiten(recursion(poles, output))
+    by_impulse = -whiten(recursion(poles, np.eye(1, u.size)[0]))
+    return Contribution(
+        output,
+        0.0,
+        by_input=-whiten(recursion(poles, u)),
+        by_rest=-whiten(recursion(poles, np.ones(u.size))),
+        by_poles=tuple(delayed(by_output, i + 1) for i in states),
+        by_start=tuple(delayed(by_impulse, i) for i in states),
+    )
+
+
+def response_from_rest(
+    poles: Array, driven: Array, u: Array, rest: float, whiten: Whitening
+) -> Contribution:
+    """Return the contribution of an input through 1 / F from rest; arguments as of `free_response`."""
+    output, total = recursion(poles, driven), float(poles.sum())
+    by_output = whiten(recursion(poles, output))
+    by_rest = -whiten(np.ones(u.size)) / total
+    return Contribution(
+        output,
+        rest / total,
+        by_input=-whiten(recursion(poles, u)),
+        by_rest=by_rest,
+        by_poles=tuple(
+            delayed(by_output, i + 1) - rest / total * by_rest for i in range(poles.size - 1)
+        ),
+    )
+
+
 def errors(
     theta: Array,
     orders: Orders,
@@ -142,11 +246,13 @@ def errors(
 ) -> tuple[Array, Array]:
     """Return the prediction errors of a run, and derivatives by theta and by its start.
 
+    e = D / C (A y - B / F u - start), of several inputs with the sum of all B_i / F_i u_i.
+
     Parameters
     ----------
     state : array, shape (poles,), optional
-        The start, where it is estimated: what the recursion from input to output is given, beside the
-        input, at the first samples. Default is nothing.
+        The start, where it is estimated: what is added to the input of the recursion from input to
+        output at the first samples. Default is nothing.
     before : float
         Input at which the model was at rest before a start at rest, above the first one.
     only_starts : bool
@@ -159,74 +265,69 @@ def errors(
         By theta, then by the start of this run, in which the errors are linear; without the latter
         where the start is not estimated.
     """
-    from scipy.signal import lfilter
-
     p = Polynomials.of(theta, orders)
-    c, d = np.array([1.0, *p.c]), np.array([1.0, *p.d])
-    n = run.u.size
-    estimated = start == "estimated" or orders.a > 0
+    whiten = Whitening(np.array([1.0, *p.c]), np.array([1.0, *p.d]))
+    by_constant = -whiten(np.ones(len(run)))
+    residual, by_poles, by_start = _equation_terms(p, orders, run, whiten)
+    states = None if state is None else state.reshape(-1, p.poles.shape[1])
 
-    def later(x: Array, samples: int) -> Array:
-        moved = np.zeros_like(x)
-        moved[samples:] = x[: x.size - samples] if samples else x
-        return moved
-
-    def by_noise(x: Array) -> Array:
-        return np.asarray(lfilter(d, c, x))
-
-    def alone(denominator: Array, x: Array) -> Array:
-        return np.asarray(lfilter([1.0], denominator, x))
-
-    # a filter at rest answers what comes later as much later, so each is run only once
-    lags, order = orders.input_lags, p.poles.shape[1]
-    impulse, ones = np.eye(1, n)[0], np.ones(n)
-    by_constant = -by_noise(ones)
-    states = None if state is None else state.reshape(-1, order)
     by_b: list[Array] = []
-    by_poles: list[Array] = []
-    starts: list[Array] = []
-    # equation error: the recursion is taken on measured outputs
-    gap = np.asarray(lfilter([1.0, *p.poles[0]], [1.0], run.y)) if orders.a else run.y
-    if orders.a:
-        behind = by_noise(run.y)
-        by_poles = [later(behind, i + 1) for i in range(order)]
-        starts = [later(-by_noise(impulse), k) for k in range(order)]
-    for place, b in enumerate(p.b):
-        poles = np.array([1.0, *p.poles[min(place, len(p.poles) - 1)]])
-        whole = run.driven[:, place]
+    for number, b in enumerate(p.b):
+        whole = run.driven[:, number]
         rest = 0.0 if start == "virgin" else float(whole[0]) + before
         u = whole - rest
-        driven = sum((one * later(u, lag) for lag, one in zip(lags, b, strict=True)), np.zeros(n))
-        held = float(b.sum()) * rest
-        if states is not None and place < len(states):
-            driven[:order] += states[place, :n]
+        lagged_inputs = (
+            coefficient * delayed(u, lag)
+            for lag, coefficient in zip(orders.input_lags, b, strict=True)
+        )
+        driven = sum(lagged_inputs, np.zeros(u.size))
+        if states is not None and number < len(states):
+            driven[: states.shape[1]] += states[number, : u.size]
+
+        output_at_rest = float(b.sum()) * rest
         if orders.a:
-            gap = gap - driven - held
-            by_input, by_rest = -by_noise(u), by_constant
-        elif estimated:
-            free = alone(poles, driven + held)
-            gap = gap - free
-            by_input, by_start = -by_noise(alone(poles, u)), -by_noise(alone(poles, impulse))
-            by_rest = -by_noise(alone(poles, ones))
-            behind = by_noise(alone(poles, free))
-            by_poles += [later(behind, i + 1) for i in range(order)]
-            starts += [later(by_start, k) for k in range(order)]
+            part = Contribution(driven, output_at_rest, -whiten(u), by_constant)
         else:
-            moved, total = alone(poles, driven), float(poles.sum())
-            gap = gap - moved - held / total
-            by_input = -by_noise(alone(poles, u))
-            by_rest = by_constant / total
-            behind = by_noise(alone(poles, moved))
-            by_poles += [later(behind, i + 1) - held / total * by_rest for i in range(order)]
-        by_b += [later(by_input, lag) + rest * by_rest for lag in lags]
-    gap = gap - p.constant
-    e = by_noise(gap)
+            poles = np.array([1.0, *p.poles[number]])
+            respond = free_response if start == "estimated" else response_from_rest
+            part = respond(poles, driven, u, output_at_rest, whiten)
+
+        residual = residual - part.output - part.constant
+        by_b += [delayed(part.by_input, lag) + rest * part.by_rest for lag in orders.input_lags]
+        by_poles += part.by_poles
+        by_start += part.by_start
+
+    residual = residual - p.constant
+    e = whiten(residual)
     if only_starts:
-        return e, np.column_stack([np.empty((n, 0)), *starts])
-    whitened_e, whitened_gap = alone(c, e), alone(c, gap)
-    by_c = [-later(whitened_e, i + 1) for i in range(orders.c)]
-    by_d = [later(whitened_gap, i + 1) for i in range(orders.d)]
-    return e, np.column_stack([*by_b, *by_poles, *by_c, *by_d, by_constant, *starts])
+        return e, np.column_stack([np.empty((e.size, 0)), *by_start])
+    by_noise = _by_noise(e, residual, orders, whiten)
+    return e, np.column_stack([*by_b, *by_poles, *by_noise, by_constant, *by_start])
+
+
+def _equation_terms(
+    p: Polynomials, orders: Orders, run: Run, whiten: Whitening
+) -> tuple[Array, list[Array], list[Array]]:
+    """Return A y, and derivatives of the errors by A and by the start; without A, y alone."""
+    from scipy.signal import lfilter
+
+    if not orders.a:
+        return run.y, [], []
+    by_output, by_impulse = whiten(run.y), -whiten(np.eye(1, len(run))[0])
+    states = range(p.poles.shape[1])
+    return (
+        np.asarray(lfilter([1.0, *p.poles[0]], [1.0], run.y)),
+        [delayed(by_output, i + 1) for i in states],
+        [delayed(by_impulse, i) for i in states],
+    )
+
+
+def _by_noise(e: Array, residual: Array, orders: Orders, whiten: Whitening) -> list[Array]:
+    """Return derivatives of the errors by the coefficients of C, then of D."""
+    by_error, by_residual = recursion(whiten.c, e), recursion(whiten.c, residual)
+    by_c = [-delayed(by_error, i + 1) for i in range(orders.c)]
+    by_d = [delayed(by_residual, i + 1) for i in range(orders.d)]
+    return [*by_c, *by_d]
 
 
 def spectral_radius(tail: Array) -> float:

@@ -23,11 +23,16 @@ ROOM = 236
 """Payload of a frame [bytes]."""
 
 MOST_NUMBERS = 0xFFFF
+"""Largest number of a half word: numbers of the memory, and bytes of the description."""
 
 MOST_TICKS = 2**31 - 1
+"""Longest silence [ticks]."""
 
 MOST_MICROSECONDS = 2**32 - 1
-"""Between ticks, in a word."""
+"""Longest time between ticks [us], in a word."""
+
+OVERHEAD = 6
+"""Bytes of a frame's payload besides the channels."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,7 @@ class Serving:
     limits : mapping of str to (float, float)
         Lowest and highest of a channel, in its unit; default what the model knows.
     safe : mapping of str to float
-        Of an output, what stands there while no host leads; default its lowest.
+        Of an output, its value while no host leads; default its lowest.
     watchdog : float
         How long a host may be silent at most [s].
     """
@@ -65,6 +70,7 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
                 f"{strange[0]!r:.60} is not one of its channels",
                 remedy=f"name one of {', '.join(allowed)}",
             )
+
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
     low[:n_in], high[:n_in] = block.known_inputs.T
     low[n_in:], high[n_in:] = block.reachable()
@@ -82,6 +88,7 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
             raise ModelError(
                 f"the limits of {name} are {a:g} and {b:g}", remedy="give the lower one first"
             )
+
     safe = low.copy()
     for place, name in enumerate(names[n_in:], start=n_in):
         safe[place] = serving.safe.get(name, low[place])
@@ -106,18 +113,18 @@ def served(
     """
     ticks = _ticks(serving, period)
     assert period is not None
-    single, n = content["single"], len(block.inputs) + len(block.outputs)
-    if n * content["bytes"] + 6 > ROOM:
+    single, n_in, n = content["single"], len(block.inputs), len(block.inputs) + len(block.outputs)
+    if n * content["bytes"] + OVERHEAD > ROOM:
         raise ModelError(
             f"{n} channels do not fit into a frame of the serial link",
             remedy="export in single precision, `single`, or fewer channels",
         )
+
     bounds = [[literal(value, single=single) for value in each] for each in limits(block, serving)]
+    ports = (*content["inputs"], *content["outputs"])
     channels = [
-        channel | dict(zip(("low", "high", "safe"), numbers, strict=True))
-        for channel, *numbers in zip(
-            (*content["inputs"], *content["outputs"]), *bounds, strict=True
-        )
+        port | {"low": low, "high": high, "safe": safe}
+        for port, low, high, safe in zip(ports, *bounds, strict=True)
     ]
     about: dict[str, Any] = {
         "fingerprint": "",
@@ -125,30 +132,38 @@ def served(
         "silence": ticks,
         "numbers": "float32" if single else "float64",
         "n_memory": content["n_memory"] if content["n_memory"] <= MOST_NUMBERS else 0,
-        "n_missable": len(block.inputs) - content["n_needed"],
-        "inputs": [_port(channel, single) for channel in channels[: len(block.inputs)]],
-        "outputs": [_port(channel, single) for channel in channels[len(block.inputs) :]],
+        "n_missable": n_in - content["n_needed"],
+        "inputs": [_port(channel, single) for channel in channels[:n_in]],
+        "outputs": [_port(channel, single) for channel in channels[n_in:]],
     }
-    server = about | {
-        "microseconds": round(1e6 * period),
-        "channels": channels,
-        "about": [],
-        "fingerprint_bytes": "",
-    }
-    full = {**content, "served": server}
-    texts = [render("mckibben.exporting.c", file, full) for file in ("model.c.j2", "server.c.j2")]
-    digest = hashlib.sha256("\n".join([*texts, json.dumps(about)]).encode()).digest()[:8]
-    about["fingerprint"] = digest.hex()
-    server["fingerprint"], text = digest.hex(), json.dumps(about, separators=(",", ":"))
-    if len(text) > MOST_NUMBERS:
-        raise ModelError(f"{n} channels are too many to describe", remedy="export fewer channels")
-    server["link.json"] = json.dumps(about, indent=2) + "\n"
-    server["about"] = [json.dumps(text[k : k + 80]) for k in range(0, len(text), 80)]
-    server["fingerprint_bytes"] = ", ".join(f"0x{byte:02X}" for byte in digest)
+    server = about | {"microseconds": round(1e6 * period), "channels": channels}
     return {
-        "served": server,
+        "served": server | _identity(content, server, about),
         "shared": [*content["shared"], *SERVER],
         "sources": [*content["sources"], SERVER[0].name, f"{content['name']}_server.c"],
+    }
+
+
+def _identity(
+    content: Mapping[str, Any], server: Mapping[str, Any], about: dict[str, Any]
+) -> dict[str, Any]:
+    """Return the fingerprint of the code, and the description of the device that has it.
+
+    The fingerprint is a digest of the code and the description without it; ``about`` is then complete.
+    """
+    blank = {**content, "served": {**server, "about": [], "fingerprint_bytes": ""}}
+    texts = [render("mckibben.exporting.c", file, blank) for file in ("model.c.j2", "server.c.j2")]
+    digest = hashlib.sha256("\n".join([*texts, json.dumps(about)]).encode()).digest()[:8]
+    about["fingerprint"] = digest.hex()
+    text = json.dumps(about, separators=(",", ":"))
+    if len(text) > MOST_NUMBERS:
+        n = len(server["channels"])
+        raise ModelError(f"{n} channels are too many to describe", remedy="export fewer channels")
+    return {
+        "fingerprint": digest.hex(),
+        "fingerprint_bytes": ", ".join(f"0x{byte:02X}" for byte in digest),
+        "about": [json.dumps(text[k : k + 80]) for k in range(0, len(text), 80)],
+        "link.json": json.dumps(about, indent=2) + "\n",
     }
 
 

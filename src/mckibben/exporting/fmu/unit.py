@@ -37,6 +37,7 @@ HERE = Path(__file__).parent
 _render = partial(render, "mckibben.exporting.fmu")
 
 FLAGS = ("-std=c99", "-O2", "-s", "-ffp-contract=off", "-shared")
+"""Of the compiler; without contraction C computes the same as Python."""
 
 DEFAULT_STEP = 0.01
 """Suggested communication step of a model without sample time [s]."""
@@ -54,7 +55,6 @@ BASE_UNITS: dict[str, dict[str, str] | None] = {
     "1": {},
 }
 """SI base units of the units; other units have only a name."""
-
 
 PLATFORMS = {
     "linux": ("linux64", ".so"),
@@ -123,18 +123,17 @@ def fmu_files(
     low, high = identified_limits(block)
     starts = np.where(np.isfinite(low) & np.isfinite(high), np.clip(0.0, low, high), 0.0)
     channels = (*content["inputs"], *content["outputs"])
+    units = sorted({channel["unit"] for channel in channels})
+    first_channels = f"{content['inputs'][0]['name']} to {content['outputs'][0]['name']}"
     content |= {
         "token": _token(block, content["sample_time"]),
-        "description": f"{content['inputs'][0]['name']} to {content['outputs'][0]['name']}: "
-        + ", ".join(content["kinds"]),
+        "description": f"{first_channels}: {', '.join(content['kinds'])}",
         "starts": literals(starts),
         "step": content["sample_time"] or DEFAULT_STEP,
         "variables": _variables(content, starts.tolist()),
-        "units": [
-            {"name": unit, "base": BASE_UNITS.get(unit)}
-            for unit in sorted({channel["unit"] for channel in channels})
-        ],
+        "units": [{"name": unit, "base": BASE_UNITS.get(unit)} for unit in units],
     }
+
     sources = {
         **{Path(path).name: text for path, text in source_files(content).items()},
         **_headers(),

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.papers.recognising import Labels
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, share
@@ -20,6 +21,8 @@ from mckibben.signals.features import Features, grouped
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
 
 SAMPLE_TIME = 0.005
+"""Of all runs [s]."""
+
 FORCES = (0.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
 """Weights hung on the muscle [N]."""
 
@@ -28,42 +31,51 @@ FREQUENCIES = (0.5, 1.0, 1.5, 2.0)
 
 LOWEST = (-2.85e-9, 1.19e-6, 3.86e-4, 6.48e-2)
 HIGHEST = (-4.89e-9, -1.41e-7, 1.30e-3, 9.46e-2)
-"""Pressures between which the sines go [MPa], as cubics of the force: y_1 and y_2 of Table 1."""
+"""Pressures between which the sines go [MPa], as cubics of the force [N], highest power first: y_1 and
+y_2 of Table 1.
+"""
 
 STATIC_PERIOD = 60.0
+"""Time of the slow cycle [s]."""
+
 STATIC_HIGH = 4.0
-"""Of the slow cycle: its time [s], and its highest pressure [bar]."""
+"""Its highest pressure [bar]."""
 
 RANGE = 5.0
 """Highest pressure of the rig [bar]."""
+
+SAME_FORCE = 0.03
+"""Share of the forces' range below which forces of runs are one."""
 
 SLOW = 0.25
 """Highest frequency of a slow cycle, relative to the median of all."""
 
 CYCLES = 8
+"""Of every sine."""
+
 RANDOM_TIME = 20.0
+"""Of every random wave [s]."""
+
+BAR_PER_MPA = 10
 
 
 def activation_pressure(rig: Rig | None = None) -> Protocol:
     """Return slow cycles, sines and random waves at every force, in shares of the ranges of a rig."""
-    stronger, wider = share(rig, "force", FORCES[-1]), share(rig, "pressure", RANGE)
+    force_share, pressure_share = share(rig, "force", FORCES[-1]), share(rig, "pressure", RANGE)
+    bar = BAR_PER_MPA * pressure_share
     runs = []
     for paper_force in FORCES:
-        force = stronger * paper_force
-        low, high = (
-            10 * wider * float(np.polyval(cubic, paper_force)) for cubic in (LOWEST, HIGHEST)
-        )
-        time = np.arange(round(STATIC_PERIOD / SAMPLE_TIME) + 1) * SAMPLE_TIME
-        wave = sine(time, STATIC_PERIOD, wider * STATIC_HIGH)
+        force = force_share * paper_force
+        low, high = (bar * float(np.polyval(cubic, paper_force)) for cubic in (LOWEST, HIGHEST))
+
+        wave = sine(_times(STATIC_PERIOD), STATIC_PERIOD, pressure_share * STATIC_HIGH)
         runs.append(_run(f"static-{force:.0f}N", "train", wave, force, 0.0, "static"))
         for frequency in FREQUENCIES:
-            time = np.arange(round(CYCLES / frequency / SAMPLE_TIME) + 1) * SAMPLE_TIME
-            wave = sine(time, 1 / frequency, high, low)
+            wave = sine(_times(CYCLES / frequency), 1 / frequency, high, low)
             name = f"sine-{force:.0f}N-{frequency:.1f}Hz"
             runs.append(_run(name, "train", wave, force, frequency, "hysteresis"))
-        for i, frequency in enumerate(FREQUENCIES):
-            time = np.arange(round(RANDOM_TIME / SAMPLE_TIME) + 1) * SAMPLE_TIME
-            wave = random_wave(time, frequency, high, low, seed=i)
+        for seed, frequency in enumerate(FREQUENCIES):
+            wave = random_wave(_times(RANDOM_TIME), frequency, high, low, seed=seed)
             name = f"random-{force:.0f}N-{frequency:.1f}Hz"
             runs.append(_run(name, "test", wave, force, frequency, "random"))
     return Protocol(
@@ -78,9 +90,15 @@ def activation_pressure(rig: Rig | None = None) -> Protocol:
     )
 
 
+def _times(duration: float) -> Array:
+    """Return the times of samples, first and last included [s]."""
+    return np.arange(round(duration / SAMPLE_TIME) + 1, dtype=np.float64) * SAMPLE_TIME
+
+
 def _run(
-    name: str, role: Role, wave: np.ndarray, force: float, frequency: float, stage: str
+    name: str, role: Role, wave: Array, force: float, frequency: float, stage: str
 ) -> PlannedRun:
+    """Return a run at a constant force [N] that starts at the first pressure of its wave [bar]."""
     return PlannedRun(
         name=name,
         role=role,
@@ -91,21 +109,26 @@ def _run(
 
 
 def recognised(runs: Sequence[Features]) -> list[Labels]:
-    """Return stages by the shape and rate of the pressure, at the force that is held."""
-    apart = 0.03 * runs[0].spans["force"]
-    forces = grouped([one.level("force") for one in runs], apart)
-    regular = [one.regular("pressure") for one in runs]
-    rates = [float(f"{one.frequency('pressure'):.2g}") for one in runs]
-    usual = float(np.median([f for f, sine_ in zip(rates, regular, strict=True) if sine_] or [0.0]))
-    known = sorted(
-        {f for f, sine_ in zip(rates, regular, strict=True) if sine_ and f >= SLOW * usual}
-    )
-    found: list[Labels] = []
-    for one, force, sine_, rate in zip(runs, forces, regular, rates, strict=True):
-        if not sine_:  # of the sine whose frequency is its highest
-            highest = one.highest_frequency("pressure")
-            rate = min(known, key=lambda f: abs(f - highest), default=round(highest, 2))
-        stage = "random" if not sine_ else "static" if rate < SLOW * usual else "hysteresis"
-        labels = {"stage": stage, "force": force, "frequency": 0.0 if stage == "static" else rate}
-        found.append(Labels("train" if sine_ else "test", labels))
-    return found
+    """Return stages by the shape and rate of the pressure, at the force that is held.
+
+    A random wave has the frequency of the sine nearest to its highest.
+    """
+    forces = grouped([run.level("force") for run in runs], SAME_FORCE * runs[0].spans["force"])
+    periodic = [run.regular("pressure") for run in runs]
+    frequencies = [float(f"{run.frequency('pressure'):.2g}") for run in runs]
+    of_periodic = [f for f, regular in zip(frequencies, periodic, strict=True) if regular]
+    slow = SLOW * float(np.median(of_periodic or [0.0]))
+    of_sines = sorted({f for f in of_periodic if f >= slow})
+
+    result: list[Labels] = []
+    for run, force, regular, frequency in zip(runs, forces, periodic, frequencies, strict=True):
+        if not regular:
+            highest = run.highest_frequency("pressure")
+            nearest = min(of_sines, key=lambda f: abs(f - highest), default=round(highest, 2))
+            labels = {"stage": "random", "force": force, "frequency": nearest}
+        elif frequency < slow:
+            labels = {"stage": "static", "force": force, "frequency": 0.0}
+        else:
+            labels = {"stage": "hysteresis", "force": force, "frequency": frequency}
+        result.append(Labels("train" if regular else "test", labels))
+    return result

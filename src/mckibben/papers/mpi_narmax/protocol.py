@@ -24,8 +24,11 @@ from mckibben.signals.features import Features
 from mckibben.signals.loads import pulls, ramps
 from mckibben.signals.protocol import PlannedRun, Protocol, Role
 
-SAMPLE_TIME, TIME = 0.001, 60.0
-"""Of all runs, and how long they are, but for those at 0.05 Hz [s]."""
+SAMPLE_TIME = 0.001
+"""Of all runs [s]."""
+
+TIME = 60.0
+"""Duration of runs, but for those at 0.05 Hz [s]."""
 
 LOW, HIGH = 0.1, 10.0
 """Dead zone of the regulator and highest voltage [V]."""
@@ -36,16 +39,21 @@ STRONGEST = 300.0
 VARYING = 4
 """Status in which the force varies."""
 
-UNLOADED, STILL = 0.1, 0.05
-"""Largest force of a run without load, relative to the largest of all; largest change of an
-input that is held, relative to its range."""
+UNLOADED = 0.1
+"""Largest force of a run without load, relative to the largest of all."""
+
+STILL = 0.05
+"""Largest change of an input that is held, relative to its range."""
 
 PULLED_FROM = 20.0
-"""At which the force begins while the voltage is held [s]."""
+"""Time at which the force begins while the voltage is held [s]."""
+
+LIGHTER = 0.9
+"""Largest weight of status 2, relative to that of status 3."""
 
 
 class Sine(NamedTuple):
-    """A run with a sine: its frequency [Hz], a weight [kg], and the peaks of three pulls [N]."""
+    """A run with a sine: its frequency [Hz], a weight [kg], the peaks of three pulls [N], its status."""
 
     name: str
     role: Role
@@ -63,9 +71,9 @@ SINES = (
     Sine("training-pulls-100N", "train", "pulls", 0.1, hand=100.0),
     Sine("status-4", "test", "pulls", 0.22, hand=150.0, status=VARYING),
     *(
-        one
+        run
         for f in (0.05, 0.1, 0.2)
-        for one in (
+        for run in (
             Sine(f"free-{f:g}Hz", "train", "free", f),
             Sine(f"weight-{f:g}Hz", "test", "weight", f, mass=91 / GRAVITY),
             Sine(f"hand-{f:g}Hz", "test", "pulls", f, hand=100.0),
@@ -82,39 +90,53 @@ def mpi_narmax(rig: Rig | None = None) -> Protocol:
     and pulls to its highest force.
     """
     drive = "voltage" if rig is None else rig.inputs[0]
-    wide, strong = share(rig, drive, HIGH), share(rig, "force", STRONGEST)
+    drive_share, force_share = share(rig, drive, HIGH), share(rig, "force", STRONGEST)
     runs = list[PlannedRun]()
 
     def add(name: str, role: Role, volts: Array, newtons: Array, **labels: Any) -> None:
-        inputs = Recording({drive: wide * volts, "force": strong * newtons}, SAMPLE_TIME)
-        settings = {"payload": round(labels.get("mass", 0.0), 6), f"start.{drive}": wide * LOW}
-        runs.append(PlannedRun(name, role, inputs, settings, labels))
+        channels = {drive: drive_share * volts, "force": force_share * newtons}
+        mass = round(labels.get("mass", 0.0), 6)
+        settings = {"payload": mass, f"start.{drive}": drive_share * LOW}
+        runs.append(PlannedRun(name, role, Recording(channels, SAMPLE_TIME), settings, labels))
 
     for name, role, stage, f, mass, hand, status in SINES:
         duration = max(TIME, 4 / f)
-        time = np.arange(round(duration / SAMPLE_TIME)) * SAMPLE_TIME
-        wave, pulled = sine(time, 1 / f, HIGH, LOW), pulls(time, hand, duration=duration / 6)
-        labels = {"stage": stage, "frequency": f, "mass": strong * mass, "hand": strong * hand}
-        add(name, role, wave, pulled, **labels, **({"status": status} if status else {}))
-    time = np.arange(round(TIME / SAMPLE_TIME)) * SAMPLE_TIME
-    pulled = np.where(time < PULLED_FROM, 0.0, triangle(time, 20.0, 150.0))
+        time = _times(duration)
+        volts, newtons = sine(time, 1 / f, HIGH, LOW), pulls(time, hand, duration=duration / 6)
+        labels = {
+            "stage": stage,
+            "frequency": f,
+            "mass": force_share * mass,
+            "hand": force_share * hand,
+        }
+        add(name, role, volts, newtons, **labels, **({"status": status} if status else {}))
+
+    time = _times(TIME)
+    newtons = np.where(time < PULLED_FROM, 0.0, triangle(time, 20.0, 150.0))
     for volt in (2.0, 4.0, 6.0, 8.0, 10.0):
-        # From the lowest voltage on, so that a model knows how the muscle came there.
-        wave, level = ramps(time, (0.0, 10.0), (LOW, volt)), wide * volt
-        add(f"held-{volt:g}V", "test", wave, pulled, stage="held", level=level, start=PULLED_FROM)
+        # from the lowest voltage on, so that a model has the memory of how the muscle came there
+        volts, level = ramps(time, (0.0, 10.0), (LOW, volt)), drive_share * volt
+        labels = {"stage": "held", "level": level, "start": PULLED_FROM}
+        add(f"held-{volt:g}V", "test", volts, newtons, **labels)
+
     roles: tuple[Role, ...] = ("train", "train", "test")
     for seed, role in enumerate(roles, start=1):
-        wave = random_wave(time, 0.2, HIGH, LOW, seed=seed)
-        pulled = random_wave(time, 0.2, 200.0, seed=100 + seed)
-        add(f"random-{seed}", role, wave, pulled, stage="random")
+        volts = random_wave(time, 0.2, HIGH, LOW, seed=seed)
+        newtons = random_wave(time, 0.2, 200.0, seed=100 + seed)
+        add(f"random-{seed}", role, volts, newtons, stage="random")
     source = "Actuators 2022, 11(2), 51, doi:10.3390/act11020051, Sections 2 and 4"
     notes = "How the hand pulls three times is ours: the paper gives the peaks. So are random runs."
     return Protocol("mpi-narmax", "rail", source, tuple(runs), notes)
 
 
+def _times(duration: float) -> Array:
+    """Return the times of samples, without the end [s]."""
+    return np.arange(round(duration / SAMPLE_TIME), dtype=np.float64) * SAMPLE_TIME
+
+
 def driven(recordings: Sequence[Recording]) -> str:
     """Return the input common to all recordings, besides displacement and force."""
-    shared = [x for x in ("voltage", "pressure") if all(x in one for one in recordings)]
+    shared = [x for x in ("voltage", "pressure") if all(x in run for run in recordings)]
     if not shared:
         remedy = "add the voltage of the valve to all of them, or the pressure"
         raise DataError("the recordings share no input", channel="voltage", remedy=remedy)
@@ -122,52 +144,60 @@ def driven(recordings: Sequence[Recording]) -> str:
 
 
 def recognised(runs: Sequence[Features]) -> list[Labels]:
-    """Return stages by drive and force, and the statuses: by weight, pull and frequency."""
-    drive = driven([one.recording for one in runs])
-    strongest = max(float(np.percentile(one.recording["force"], 99)) for one in runs)
-    every = [_stage(one, drive, strongest) for one in runs]
+    """Return stages by drive and force, and the statuses: by weight, pull and frequency.
 
-    def marked(status: int, stage: str, rank: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
-        """Mark the run of a stage that ranks highest, and return its labels."""
-        those = [own for own in every if own["stage"] == stage and "status" not in own]
-        chosen = max(those, key=rank, default={})
+    Status 3 is the heaviest weight, 2 the fastest lighter one, 1 the run without load at the usual
+    frequency, and 4 the strongest pulls. Training are statuses 2 and 3, runs without load, random runs
+    but the last, and of the weaker pulls those at the usual frequency.
+    """
+    drive = driven([run.recording for run in runs])
+    strongest = max(float(np.percentile(run.recording["force"], 99)) for run in runs)
+    labels = [_stage(run, drive, strongest) for run in runs]
+    frequencies = sorted(own["frequency"] for own in labels if own["stage"] == "free")
+    usual = frequencies[len(frequencies) // 2] if frequencies else 0.0
+
+    def rest(stage: str) -> list[dict[str, Any]]:
+        """Return the labels of the runs of a stage that have no status."""
+        return [own for own in labels if own["stage"] == stage and "status" not in own]
+
+    def mark(status: int, stage: str, rank: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
+        """Give a status to the run of a stage that ranks highest; return its labels."""
+        chosen = max(rest(stage), key=rank, default={})
         chosen |= {"status": status} if chosen else {}
         return chosen
 
-    heavy = marked(3, "weight", lambda own: (own["mass"], own["frequency"]))
-    marked(
-        2, "weight", lambda own: (own["mass"] < 0.9 * heavy["mass"], own["frequency"], own["mass"])
-    )
-    rates = sorted(own["frequency"] for own in every if own["stage"] == "free")
-    usual = rates[len(rates) // 2] if rates else 0.0
-    marked(1, "free", lambda own: -abs(own["frequency"] - usual))
-    marked(VARYING, "pulls", lambda own: own["hand"])
-    weaker = [own for own in every if own["stage"] == "pulls" and "status" not in own]
-    learned = min(weaker, key=lambda own: abs(own["frequency"] - usual), default=None)
-    *_, last = [None, *(own for own in every if own["stage"] == "random")]
-    train = [
-        own for own in every if own["stage"] in ("free", "random") or own.get("status") in (2, 3)
-    ]
-    train += [learned] if learned else []
-    kept = {id(own) for own in train} - {id(last)}
-    return [Labels("train" if id(own) in kept else "test", own) for own in every]
+    heavy = mark(3, "weight", lambda own: (own["mass"], own["frequency"]))
+
+    def lighter_and_fast(own: dict[str, Any]) -> tuple[bool, float, float]:
+        return own["mass"] < LIGHTER * heavy["mass"], own["frequency"], own["mass"]
+
+    mark(2, "weight", lighter_and_fast)
+    mark(1, "free", lambda own: -abs(own["frequency"] - usual))
+    mark(VARYING, "pulls", lambda own: own["hand"])
+
+    train = [own for own in labels if own["stage"] == "free" or own.get("status") in (2, 3)]
+    train += rest("random")[:-1]
+    train += sorted(rest("pulls"), key=lambda own: abs(own["frequency"] - usual))[:1]
+    ids = {id(own) for own in train}
+    return [Labels("train" if id(own) in ids else "test", own) for own in labels]
 
 
-def _stage(one: Features, drive: str, strongest: float) -> dict[str, Any]:
-    """Return the labels of a run by what moves in it."""
-    u, force = one.recording[drive], one.recording["force"]
+def _stage(run: Features, drive: str, strongest: float) -> dict[str, Any]:
+    """Return the labels of a run by what moves in it; ``strongest`` is the largest force of all [N]."""
+    u, force = run.recording[drive], run.recording["force"]
     level = float(np.median(u[len(u) // 2 :]))
-    away = np.flatnonzero(np.abs(u - level) > STILL * one.spans[drive])
-    start = 0 if not away.size else int(away[-1]) + 1
-    if start < len(u) // 2 and one.moves("force"):
-        pulled = np.abs(force[start:] - force[start]) > STILL * one.spans["force"]
+    varying = np.flatnonzero(np.abs(u - level) > STILL * run.spans[drive])
+    start = 0 if not varying.size else int(varying[-1]) + 1
+    if start < len(u) // 2 and run.moves("force"):
+        pulled = np.abs(force[start:] - force[start]) > STILL * run.spans["force"]
         start += int(np.argmax(pulled))
-        return {"stage": "held", "level": round(level, 2), "start": start * one.recording.step}
-    if not one.regular(drive):
+        return {"stage": "held", "level": round(level, 2), "start": start * run.recording.step}
+    if not run.regular(drive):
         return {"stage": "random"}
-    labels = {"frequency": float(f"{one.frequency(drive):.2g}"), "mass": 0.0, "hand": 0.0}
-    if one.moves("force"):
+
+    labels = {"frequency": float(f"{run.frequency(drive):.2g}"), "mass": 0.0, "hand": 0.0}
+    if run.moves("force"):
         return labels | {"stage": "pulls", "hand": float(np.percentile(force, 99))}
-    if abs(one.level("force")) < UNLOADED * strongest:
+    if abs(run.level("force")) < UNLOADED * strongest:
         return labels | {"stage": "free"}
-    return labels | {"stage": "weight", "mass": round(one.level("force") / GRAVITY, 2)}
+    return labels | {"stage": "weight", "mass": round(run.level("force") / GRAVITY, 2)}

@@ -36,11 +36,19 @@ MOVES = ((1, 0.7), (2, 1.5), (3, 2.3))
 """Muscle that moves, and pressure of the extensor [bar], for every three groups of Table 5."""
 
 F = 1 / PERIOD
-MEAN, SWING, AMPLITUDE, OFFSET, TASK_LEVEL = 33.0, 6.0, 40.0, 5.0, 0.6
-"""Of the references of Table 5 and Figure 13: [Hz], [mm], the latter's extensor [bar]."""
+"""Frequency of the paper's references [Hz]."""
+
+MEAN, SWING = 33.0, 6.0
+"""Of the references of Table 5 [mm]."""
+
+AMPLITUDE, OFFSET, TASK_LEVEL = 40.0, 5.0, 0.6
+"""Of the reference of Figure 13 [mm], and its pressure of the extensor [bar]."""
 
 REACHED = 0.8
 """Share of the way recorded of every muscle that references ask for at most, else they are smaller."""
+
+ENDS = "lowest error [mm]", "highest error [mm]"
+"""Columns of tables."""
 
 DRAWN = 6
 """Controllers that figures show, the first of the tables: as many as there are colours."""
@@ -74,37 +82,43 @@ def held(
 
 
 def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
-    """Track the paper's references with every controller, and further tasks with some."""
-    middle, *levels = _levels(rig, runs)
+    """Track the paper's references with every controller, and further tasks with ours and PID.
+
+    Results are the tables and the figure of Table 5, the table ``beyond`` the paper, and texts.
+    """
+    pid_level, *levels = _levels(rig, runs)
     tasks = _tasks(experiment, rig, runs, levels)
-    inverses = compensators(experiment, runs)
-    laws = _laws(experiment, rig, inverses, middle)
+    laws = _laws(experiment, rig, compensators(experiment, runs), pid_level)
     table_5 = [key for key in tasks if key.startswith("tracking_")]
     beyond = [key for key in tasks if key not in experiment.paper.tables]
     ours = [name for name in laws if name not in (SDIHC, SINGLE, SDIHC_OURS)]
-    keys = [(key, name) for key in tasks for name in (ours if key in beyond else laws)]
-    trials = [(laws[name], rig, tasks[key], experiment.seed) for key, name in keys]
-    found = dict(zip(keys, all_of(_tracked, trials, experiment.jobs), strict=True))
-    plane: dict[str, Curves] = {}
-    for key in tasks:
-        if key not in beyond:
-            panels = _shown(experiment, key, tasks[key], {name: found[key, name] for name in laws})
-            plane |= panels if key in table_5 else {}
-    experiment.figure("tracking", plane)
-    worst = {key: max(one.rmse.values()) for key, one in found.items()}
+
+    pairs = [(key, name) for key in tasks for name in (ours if key in beyond else laws)]
+    trials = [(laws[name], rig, tasks[key], experiment.seed) for key, name in pairs]
+    results = dict(zip(pairs, all_of(_tracked, trials, experiment.jobs), strict=True))
+
+    panels: dict[str, Curves] = {}
+    for key in (key for key in tasks if key not in beyond):
+        of_task = {name: results[key, name] for name in laws}
+        shown = _shown(experiment, key, tasks[key], of_task)
+        panels |= shown if key in table_5 else {}
+    experiment.figure("tracking", panels)
+
+    worst = {pair: max(result.rmse.values()) for pair, result in results.items()}  # [mm]
     if beyond:
         rows = [[name, *(worst[key, name] for key in beyond)] for name in ours]
         experiment.table("beyond", beyond, rows, **tasks["tracking_1"].facts)
-    most = {name: max(worst[key, name] for key in table_5) for name in laws}
-    experiment.says(tracking=", ".join(f"{name} {value:.2f} mm" for name, value in most.items()))
-    _table_5(experiment, [{n: [*found[key, n].rmse.values()] for n in laws} for key in table_5])
-    moved, step = ", ".join(key[-1] for key in table_5), found["task", SDIHC_OURS].step_time[0]
-    experiment.says(moved=moved, step=1e6 * step)
+    worst_of_law = {name: max(worst[key, name] for key in table_5) for name in laws}
+    tracking = ", ".join(f"{name} {rmse:.2f} mm" for name, rmse in worst_of_law.items())
+    experiment.says(tracking=tracking)
+    _table_5(experiment, [{n: [*results[key, n].rmse.values()] for n in laws} for key in table_5])
+    step_time = results["task", SDIHC_OURS].step_time[0]  # [s]
+    experiment.says(moved=", ".join(key[-1] for key in table_5), step=1e6 * step_time)
 
 
 def _levels(rig: Rig, runs: Runs) -> list[float]:
     """Return pressures of the extensor for PID, Table 5 and Figure 13, within those recorded [bar]."""
-    recorded = [float(one[EXTENSOR].mean()) for one in runs.values()]
+    recorded = [float(run[EXTENSOR].mean()) for run in runs.values()]
     wanted = np.array([1.0, *(p0 for _, p0 in MOVES), TASK_LEVEL]) * share(rig, EXTENSOR, HIGHEST)
     clipped: list[float] = np.clip(wanted, min(recorded), max(recorded)).tolist()
     return clipped
@@ -114,24 +128,27 @@ def _tasks(
     experiment: Experiment, rig: Rig, runs: Runs, levels: Sequence[float]
 ) -> dict[str, Task]:
     """Return the tasks of Table 5 and Figure 13 by their tables, and those beyond the paper."""
-    outputs, step, (*at, p0) = by_name([*runs.values()])[1], control_step(experiment), levels
-    reached = min(max(float(one[y].max()) for one in runs.values()) for y in outputs)
+    outputs, step = by_name([*runs.values()])[1], control_step(experiment)
+    *moving_levels, task_level = levels
+    reached = min(max(float(run[y].max()) for run in runs.values()) for y in outputs)
     scale = min(1.0, REACHED * reached / (AMPLITUDE + OFFSET))
 
-    def time(duration: float) -> Array:
+    def times(duration: float) -> Array:
         return np.arange(round(duration / step), dtype=np.float64) * step
 
-    whole = time((1.5 if experiment.quick else 3) * PERIOD)
-    moved = zip(outputs[: 1 if experiment.quick else len(MOVES)], at, strict=False)
-    tasks = {f"tracking_{y[-1]}": held(outputs, y, whole, p, scale) for y, p in moved}
-    wave = scale * np.abs(AMPLITUDE * np.sin(2 * np.pi * F * whole) + OFFSET)
-    channels = dict.fromkeys(outputs, wave) | {EXTENSOR: np.full(wave.size, p0)}
-    facts = {"amplitude": scale * AMPLITUDE, "offset": scale * OFFSET, "p0": p0}
+    t = times((1.5 if experiment.quick else 3) * PERIOD)
+    moving = zip(outputs[: 1 if experiment.quick else len(MOVES)], moving_levels, strict=False)
+    tasks = {f"tracking_{y[-1]}": held(outputs, y, t, p0, scale) for y, p0 in moving}
+
+    wave = scale * np.abs(AMPLITUDE * np.sin(2 * np.pi * F * t) + OFFSET)
+    channels = dict.fromkeys(outputs, wave) | {EXTENSOR: np.full(wave.size, task_level)}
+    facts = {"amplitude": scale * AMPLITUDE, "offset": scale * OFFSET, "p0": task_level}
     tasks["task"] = Task(Recording(channels, step), outputs, facts)
+
     for frequency, mass in () if experiment.quick else BEYOND:
-        load, longer = strength(rig) * mass, time(max(40.0, 2 / frequency))
+        load, longer = strength(rig) * mass, times(max(40.0, 2 / frequency))
         key = f"{frequency:g} Hz" + (f", {load:.2g} kg" if load else "")
-        task = held(outputs, outputs[0], longer, at[0], scale, frequency)
+        task = held(outputs, outputs[0], longer, moving_levels[0], scale, frequency)
         tasks[key] = task._replace(load=load)
     return tasks
 
@@ -155,17 +172,17 @@ def _laws(
 
 
 def _table_5(experiment: Experiment, tracked: Sequence[Mapping[str, Sequence[float]]]) -> None:
-    """Set how the paper's compensator compares with its rivals, by RMSE of every output."""
+    """Report how the paper's compensator compares with its rivals, by RMSE of every output [mm]."""
     tables = [t for key, t in experiment.paper.tables.items() if key.startswith("tracking_")]
-    off = {name: [rmse for one in tracked for rmse in one[name]] for name in (SDIHC, SINGLE, PID)}
+    rmse = {name: [e for task in tracked for e in task[name]] for name in (SDIHC, SINGLE, PID)}
     printed = {
         name: max(cells[name] for t in tables for x, cells in t.printed.items() if "RMSE" in x)
-        for name in off
+        for name in rmse
     }
-    closer = {name: int(np.sum(np.less(off[SDIHC], off[name]))) for name in (SINGLE, PID)}
-    n = len(off[SDIHC])
+    closer = {name: int(np.sum(np.less(rmse[SDIHC], rmse[name]))) for name in (SINGLE, PID)}
+    n = len(rmse[SDIHC])
     experiment.says(
-        table_5=", ".join(f"{name} {max(own):.2f} mm" for name, own in off.items()),
+        table_5=", ".join(f"{name} {max(errors):.2f} mm" for name, errors in rmse.items()),
         table_5_printed=", ".join(f"{value:.2f} mm" for value in printed.values()),
         table_5_closer=closer,
         table_5_outputs=n,
@@ -196,6 +213,7 @@ def compensators(experiment: Experiment, runs: Runs) -> dict[str, Block]:
 
 
 def _tracked(common: None, trial: tuple[Block | Controller, Rig, Task, int], _: Tell) -> Tracked:
+    """Return the closed loop of a trial, in a worker process: law, rig, task and seed."""
     law, rig, task, seed = trial
     if task.load:
         rig = rig.changed({"payload": float(rig.known().get("payload_kg", 0.0)) + task.load})
@@ -206,44 +224,60 @@ def _tracked(common: None, trial: tuple[Block | Controller, Rig, Task, int], _: 
 
 def widths(recording: Recording, moving: str, outputs: Sequence[str]) -> dict[str, float]:
     """Return e_w of the moving output over the last period, and cross-motion of others [%]."""
-    n = round(PERIOD / recording.step)
-    u, found = recording[REFERENCE + moving][-n:], {}
+    n, percentages = round(PERIOD / recording.step), dict[str, float]()
+    u = recording[REFERENCE + moving][-n:]
     for name in outputs:  # each turned to begin at its minimum
         x, y = (np.roll(wave, -int(np.argmin(u))) for wave in (u, recording[name][-n:]))
         if name == moving:
-            found[f"e_w of y{name[-1]} [%]"] = loop_width(x, y) if np.ptp(y) else 0.0
+            percentages[f"e_w of y{name[-1]} [%]"] = loop_width(x, y) if np.ptp(y) else 0.0
         else:
-            found[f"cross-motion of y{name[-1]} [%]"] = crosstalk(x, y, x)
-    return found
+            percentages[f"cross-motion of y{name[-1]} [%]"] = crosstalk(x, y, x)
+    return percentages
 
 
 def _shown(
-    experiment: Experiment, key: str, task: Task, found: Mapping[str, Tracked]
+    experiment: Experiment, key: str, task: Task, results: Mapping[str, Tracked]
 ) -> dict[str, Curves]:
-    """Add the results of a reference; return panels of every output over the moving one, or time."""
-    alone, one = len(task.moving) == 1, task.moving[0]
+    """Add the table of a task, and of several moving outputs its figure; return the panels.
+
+    A panel is of one output, over the moving one in the last period, or over time.
+    """
+    rows = {name: _cells(task, tracked) for name, tracked in results.items()}
+    lines: dict[str, list[Cell]] = {name: [*cells.values()] for name, cells in rows.items()}
+    experiment.table(key, [*next(iter(rows.values()))], lines, **task.facts)
+
+    alone, moving = len(task.moving) == 1, task.moving[0]
     panels: dict[str, dict[str, tuple[Array, Array]]] = {}
-    rows: dict[str, dict[str, float]] = {}
-    for name, tracked in found.items():
-        late = tracked.recording
-        late = late.slice(int(np.searchsorted(late.time, task.settle)), len(late))
-        rows[name] = {f"RMSE of y{y[-1]} [mm]": error for y, error in tracked.rmse.items()}
-        rows[name] |= widths(late, one, [*tracked.rmse]) if alone else {}
-        errors = np.array([late[y] - late[REFERENCE + y] for y in tracked.rmse])
-        ends = {"lowest error [mm]": errors.min(), "highest error [mm]": errors.max()}
-        rows[name] |= {end: float(error) for end, error in ends.items()}
-        shown = late.slice(len(late) - round(PERIOD / late.step), len(late)) if alone else late
-        for y in tracked.rmse if name in [*found][:DRAWN] else ():
-            x = shown[REFERENCE + one] if alone else shown.time
-            title = f"y{one[-1]} moves: y{y[-1]}" if alone else f"y{y[-1]}"
+    for name, tracked in [*results.items()][:DRAWN]:
+        shown = _scored(task, tracked)
+        if alone:
+            shown = shown.slice(len(shown) - round(PERIOD / shown.step), len(shown))
+        x = shown[REFERENCE + moving] if alone else shown.time
+        for y in tracked.rmse:
+            title = f"y{moving[-1]} moves: y{y[-1]}" if alone else f"y{y[-1]}"
             panels.setdefault(title, {"reference": (x, shown[REFERENCE + y])})
             panels[title][name] = x, shown[y]
-    lines: dict[str, list[Cell]] = {name: [*cells.values()] for name, cells in rows.items()}
-    experiment.table(key, [*rows[name]], lines, **task.facts)
+
     if not alone:
         experiment.figure(key, panels)
-        printed = [experiment.paper.tables[key].printed[end][SDIHC] for end in ends]
-        steady = [rows[SDIHC][end] for end in ends]
+        printed = [experiment.paper.tables[key].printed[end][SDIHC] for end in ENDS]
+        steady = [rows[SDIHC][end] for end in ENDS]
         within = Verdict(printed[0] <= steady[0] and steady[1] <= printed[1])
         experiment.says(steady=steady, steady_printed=printed, steady_within=within)
     return dict(panels)
+
+
+def _scored(task: Task, tracked: Tracked) -> Recording:
+    """Return the part of a run that is scored."""
+    run = tracked.recording
+    return run.slice(int(np.searchsorted(run.time, task.settle)), len(run))
+
+
+def _cells(task: Task, tracked: Tracked) -> dict[str, float]:
+    """Return the cells of a controller: RMSE, of one moving output widths, and extreme errors."""
+    scored = _scored(task, tracked)
+    cells = {f"RMSE of y{y[-1]} [mm]": rmse for y, rmse in tracked.rmse.items()}
+    if len(task.moving) == 1:
+        cells |= widths(scored, task.moving[0], [*tracked.rmse])
+    errors = np.array([scored[y] - scored[REFERENCE + y] for y in tracked.rmse])
+    return cells | dict(zip(ENDS, (float(errors.min()), float(errors.max())), strict=True))

@@ -4,6 +4,9 @@
 
 A contractile muscle cannot push: where the sum is below what its buckling bears, it goes slack and
 stays longer than the distance between its ends.
+
+In every function ``muscle`` is a record of `MUSCLE`, ``state`` one of `MUSCLE_STATE`, ``x`` a shortening
+[mm], and ``step`` the time of a step [s].
 """
 
 from __future__ import annotations
@@ -28,7 +31,10 @@ MOST_COORDINATES = 6
 """Coordinates that muscles may act on: three a section of an arm."""
 
 SLACK_TOLERANCE = 1e-9
-"""Of the length of a slack muscle [mm]."""
+"""Error of the length of a slack muscle [mm]."""
+
+MOST_STEPS = 100
+"""Maximum number of Newton steps to that length."""
 
 MOST_CONTRACTION = 0.6
 """Contraction at which every muscle is slack: no braid pulls so far."""
@@ -38,30 +44,30 @@ LEAST_ROOM = 0.05
 
 MUSCLE = np.dtype(
     [
-        ("length", "f8"),
+        ("length", "f8"),  # at rest [mm]
         ("area", "f8"),  # cross-section at rest [mm²]
-        ("a", "f8"),
+        ("a", "f8"),  # see `braid_area`
         ("b", "f8"),
         ("end_cap", "f8"),
-        ("contact", "f8"),  # bar
+        ("contact", "f8"),  # pressure over which the bladder reaches the braid [bar]
         ("room", "f8"),  # of air at rest [mm³]
         ("folded", "f8"),  # volume over which the bladder leaves the braid [mm³]
-        ("cos2", "f8"),
+        ("cos2", "f8"),  # squares of the cosine and sine of the threads' angle at rest
         ("sin2", "f8"),
-        ("c10", "f8"),  # times the volume of rubber [N mm]
+        ("c10", "f8"),  # Mooney and Rivlin's, times the volume of rubber [N mm]
         ("c01", "f8"),
-        ("n_elements", "i8"),
-        ("friction", "f8", (MOST_ELEMENTS,)),  # N/mm
-        ("contracting", "f8", (MOST_ELEMENTS,)),  # N/bar
+        ("n_elements", "i8"),  # of friction
+        ("friction", "f8", (MOST_ELEMENTS,)),  # stiffness [N/mm]
+        ("contracting", "f8", (MOST_ELEMENTS,)),  # force at which they slip [N/bar]
         ("extending", "f8", (MOST_ELEMENTS,)),
-        ("preload", "f8"),  # bar
+        ("preload", "f8"),  # normal pressure without air [bar]
         ("beside", "i8"),  # number of the muscle that it is tied to
         ("neighbour", "f8"),  # share of that one's pressure
         ("viscosity", "f8"),  # N s/mm
         ("n_branches", "i8"),
         ("creep", "f8", (MOST_BRANCHES,)),  # N/mm
         ("creep_time", "f8", (MOST_BRANCHES,)),  # s
-        ("push", "f8"),  # N
+        ("push", "f8"),  # force that it bears before it buckles [N]
         ("levers", "f8", (MOST_COORDINATES,)),  # shortening by each coordinate
         ("slack", "f8"),  # shortening where all coordinates are 0 [mm]
     ],
@@ -72,18 +78,18 @@ MUSCLE = np.dtype(
 MUSCLE_STATE = np.dtype(
     [
         ("x", "f8"),  # own shortening [mm]
-        ("speed", "f8"),
-        ("pressure", "f8"),
+        ("speed", "f8"),  # mm/s
+        ("pressure", "f8"),  # bar
         ("outlet", "f8"),  # pressure at the regulator's end of the line [bar]
         ("valve", "f8"),
         ("tension", "f8"),
         ("friction", "f8", (MOST_ELEMENTS,)),  # N
         ("creep", "f8", (MOST_BRANCHES,)),  # N
-        # What does not change while a step is solved:
-        ("inside", "f8"),  # N/mm²
-        ("acting", "f8"),  # N/mm², where the bladder has to reach the braid
-        ("normal", "f8"),  # bar
-        ("kept", "f8", (MOST_BRANCHES,)),
+        # constant while a step is solved, see `prepare`:
+        ("inside", "f8"),  # pressure [N/mm²]
+        ("acting", "f8"),  # pressure on the braid, where the bladder has to reach it [N/mm²]
+        ("normal", "f8"),  # pressure that presses friction elements together [bar]
+        ("kept", "f8", (MOST_BRANCHES,)),  # see `relax`
         ("drawn", "f8", (MOST_BRANCHES,)),  # N/mm
     ],
     align=True,
@@ -131,7 +137,8 @@ def tension(muscle: Any, state: Any, x: float, step: float) -> tuple[float, floa
     )
     pull = pressure * area - rubber
     slope = pressure * area_slope + pressure_slope * area - rubber_slope
-    moved = x - state.x
+
+    moved = x - state.x  # mm
     for i in range(muscle.n_elements):
         force, stiffness = slip(
             state.friction[i],
@@ -158,31 +165,38 @@ def longest(muscle: Any) -> float:
 
 @compiled
 def taut_or_slack(muscle: Any, state: Any, x: float, step: float) -> tuple[float, float, float]:
-    """Return pull [N], slope [N/mm] and own shortening [mm], for ends ``x`` mm closer."""
-    least, most = -muscle.push, MOST_CONTRACTION * muscle.length
-    if x <= most:
+    """Return pull [N], slope [N/mm] and own shortening [mm], for ends ``x`` mm closer.
+
+    A taut muscle is as short as its ends are close; a slack one, less, where its pull is what it bears.
+    """
+    least_pull, most_x = -muscle.push, MOST_CONTRACTION * muscle.length
+    if x <= most_x:
         pull, slope = tension(muscle, state, x, step)
-        if pull >= least:
+        if pull >= least_pull:
             return pull, slope, x
-    low, high = min(state.x, x), min(x, most)
-    reach, floor = 1e-3, longest(muscle)
-    while low > floor and tension(muscle, state, low, step)[0] < least:
+
+    # the pull falls with shortening: go longer until it is enough
+    low, high = min(state.x, x), min(x, most_x)
+    reach, lowest = 1e-3, longest(muscle)
+    while low > lowest and tension(muscle, state, low, step)[0] < least_pull:
         high = low
-        low = max(low - reach, floor)
+        low = max(low - reach, lowest)
         reach *= 2.0
+
+    # Newton's method, by halves where it leaves the bracket
     own = low
-    for _ in range(100):
+    for _ in range(MOST_STEPS):
         pull, slope = tension(muscle, state, own, step)
-        if pull >= least:
+        if pull >= least_pull:
             low = own
         else:
             high = own
         if high - low <= SLACK_TOLERANCE:
             break
-        own -= (pull - least) / slope
+        own -= (pull - least_pull) / slope
         if not low < own < high:
             own = 0.5 * (low + high)
-    return least, 0.0, own
+    return least_pull, 0.0, own
 
 
 @compiled

@@ -452,6 +452,8 @@ class Structure:
         """
         bench, n = self.bench, self.n
         shape = {name: self.nonlinear_values(values, name) for name in NONLINEAR}
+        for name in (one for one in NONLINEAR if TABLE[one].least == 0.0):  # but for rounding
+            shape[name] = np.maximum(shape[name], 0.0)
         never_slack = bool((shape["pushes"] >= NEVER).all())
         ratio, slopes = float(shape["asymmetry"][0]), shape["friction_slopes"]
         make = Balance if final else Balance.unchecked

@@ -13,8 +13,8 @@ BOARD = HERE.parent / "docs" / "measured" / "leaderboard.csv"
 
 ROWS = {
     ("cavatappi_loads", "sample 1, 200 g"): "Coiled muscle, sample 1",
-    ("cavatappi_loads", "sample 2, 200 and 400 g"): "Coiled muscle, sample 2, two loads",
-    ("cavatappi_loads", "sample 3, 200 and 400 g"): "Coiled muscle, sample 3, two loads",
+    ("cavatappi_loads", "sample 2, 200 and 400 g"): "Coiled muscle, sample 2",
+    ("cavatappi_loads", "sample 3, 200 and 400 g"): "Coiled muscle, sample 3",
     ("festo_dmsp10_levels", ""): "DMSP-10, random levels",
     ("festo_dmsp10_static", ""): "DMSP-10, staircase",
     ("festo_isometric_20mm", "12 cm, run 3"): "DMSP-20, force, 12 cm",
@@ -24,7 +24,7 @@ ROWS = {
     ("bouc_wen_benchmark", "black"): "Bouc-Wen benchmark, multisine",
     ("bouc_wen_benchmark", "black, sine sweep"): "Bouc-Wen benchmark, sine sweep",
     ("silverbox", "multisine"): "Silverbox, multisine",
-    ("cascaded_tanks", ""): "Cascaded tanks",
+    ("cascaded_tanks", ""): "Tanks",
 }
 """Set and task -> what it is called."""
 

@@ -302,7 +302,12 @@ def own_results(part: Part, models: Sequence[str]) -> Iterator[Result]:
             yield replace(row, reason=board.rows[0].reason or "")
             continue
         outputs = part.channels.outputs
-        yield replace(row, found=[block.simulate(run).matrix(outputs) for run in split.test])
+        try:
+            found = [block.simulate(run).matrix(outputs) for run in split.test]
+        except MckibbenError as error:  # of another sample time
+            yield replace(row, reason=str(error))
+            continue
+        yield replace(row, found=found)
 
 
 def frame_of(one: Set, part: Part, result: Result) -> pd.DataFrame:

@@ -171,7 +171,7 @@ def _words(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> 
     modelled = {*sides.inputs, *sides.outputs, *sides.further}
     dropped = {*by_name(runs)[0]} - modelled  # no inputs, as was chosen
     runs = [run.select([name for name in run if name not in dropped]) for run in runs]
-    key = "characterization", state.workspace.digest(), pair, others, sorted(dropped)
+    key = "characterization", state.workspace.digest(), pair, others, tuple(sorted(dropped))
     make = partial(characterize, runs, *pair, scheduling=others)
     with mark(ui.element("div"), "words"):
         later(key, make, lambda found: widgets.items(results.characterization(found)), height=120)

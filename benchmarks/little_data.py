@@ -54,6 +54,15 @@ libraries are those of the [leaderboard](leaderboard.md), found on all of the tr
 as all of this package's models, are of the part alone.
 
 Written by `python benchmarks/little_data.py FOLDER`, in the environment of `benchmarks/peers.txt`.
+
+Least error of this package's models over the least of the other methods; below 1 where a physical model wins:
+
+| set | least data | | | all data |
+|---|---:|---:|---:|---:|
+{summary}
+
+A model of forces extrapolates only what its terms determine. The first eighth of the recordings of
+cavatappi ends at 1.6 bar of 20, before the muscle moves, and no method has a useful error there.
 {tables}"""
 
 
@@ -106,12 +115,19 @@ def table(rows: pd.DataFrame, unit: str) -> str:
     return f"RMSE [{unit}]:\n\n" + "\n".join(lines)
 
 
+def ratios(rows: pd.DataFrame) -> str:
+    """Return the cells of a line of the summary, a column for every amount of data."""
+    ours = rows["model"].str.startswith("mckibben")
+    least = [rows[side].groupby("seconds")["error"].min() for side in (ours, ~ours)]
+    return " | ".join(numeral(float(x), 2) for x in least[0] / least[1])
+
+
 def main() -> None:
     """Measure, and write the page."""
     warnings.simplefilter("ignore")
     (folder,) = map(Path, sys.argv[1:])
     board = pd.read_csv(BOARD).fillna({"task": "", "how": ""})
-    tables = []
+    tables, summary = [], []
     for one in chosen_in(folder, list(TASKS)):
         task, models = TASKS[one.name]
         (part,) = (each for each in parts_of(one, one.recordings()) if each.task.name == task)
@@ -124,8 +140,11 @@ def main() -> None:
         frame = pd.DataFrame(rows, columns=["model", "seconds", "error"])
         heading = ": ".join(filter(None, [one.title, task]))
         unit = part.split.test[0].units[part.channels.outputs[0]]
+        summary.append(f"| {heading} | {ratios(frame)} |")
         tables.append(f"\n## {heading}\n\n{table(frame, unit)}\n")
-    PAGE_FILE.write_text(PAGE.format(many=MANY, tables="".join(tables)), encoding="utf-8")
+    PAGE_FILE.write_text(
+        PAGE.format(many=MANY, summary="\n".join(summary), tables="".join(tables)), encoding="utf-8"
+    )
 
 
 if __name__ == "__main__":

@@ -2,9 +2,10 @@
 
     peers-env/bin/python benchmarks/little_data.py FOLDER      writes docs/measured/little-data.md
 
-FOLDER and the environment are those of benchmarks/peers.py. Of `MANY` or more training recordings some are
-taken, evenly spread; of fewer, the first part of each. The test is the same. Other methods have the settings that the leaderboard states, so that only
-their weights are of the little data. Takes about a quarter of an hour.
+FOLDER and the environment are those of benchmarks/peers.py. Of `MANY` or more training recordings
+some are taken, evenly spread; of fewer, the first part of each. The test is the same. Other methods
+have the settings that the leaderboard states, so that only their weights are of the little data. Takes
+about a quarter of an hour.
 """
 
 from __future__ import annotations
@@ -50,12 +51,13 @@ PAGE = """# How much data a model needs
 
 Free-run errors on the test, of models that are given a part of the training data: some of the recordings
 where there are {many} or more of them (DMSP-20), otherwise the first part of each. The settings of other
-libraries are those of the [leaderboard](leaderboard.md), found on all of the training data; their weights,
-as all of this package's models, are of the part alone.
+libraries are those of the [leaderboard](leaderboard.md), found on all of the training data; their
+weights, as all of this package's models, are of the part alone.
 
 Written by `python benchmarks/little_data.py FOLDER`, in the environment of `benchmarks/peers.txt`.
 
-Least error of this package's models over the least of the other methods; below 1 where a physical model wins:
+Least error of this package's models over the least of the other methods; below 1 where a physical
+model wins:
 
 | set | least data | | | all data |
 |---|---:|---:|---:|---:|

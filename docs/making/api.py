@@ -62,7 +62,7 @@ USES = {
     "rigs": Use(
         "Virtual rigs and environments",
         "mckibben: Rig load_rig; "
-        "mckibben.rigs: rig_names describe save_rig record; "
+        "mckibben.rigs: rig_names describe save_rig record share; "
         "mckibben.environments: Tracking",
     ),
     "muscles": Use(

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment, Template
 
 PLOTLY = "plotly.min.js.xz"
-"""The parts of plotly.js 4.1.1 (MIT) that reports use, packed, made by recipe/plotly.mjs: in Python 60 MB."""
+"""What reports use of plotly.js 4.1.1 (MIT), packed by recipe/plotly.mjs: in Python 60 MB."""
 
 FIGURE = re.compile(r"[-−+±<>]? ?\d[\d.,e+−-]*( (to [-−]?\d\S*|\S+))?")
 """A cell that holds a number, perhaps with its unit, or an interval."""

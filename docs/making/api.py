@@ -23,14 +23,6 @@ USES = {
         "Recordings and files",
         "mckibben: Recording ReadOptions read write info; mckibben.files: columns_of",
     ),
-    "signals": Use(
-        "Signals: excitations, cycles, filters",
-        "mckibben.signals: triangle decaying_triangle progressive_triangle irregular_triangle sine "
-        "decaying_sine progressive_sine chirp multisine random_wave binary_steps "
-        "staircase ramps constant pulls build settings_of cut resample decimate_minmax coarsened "
-        "made_manageable detrend low_pass zeroed noise_level reversals branches cycles "
-        "split_cycles",
-    ),
     "describe": Use(
         "Describe a muscle",
         "mckibben: characterize data_gaps plan plot; mckibben.diagnosis: characterize Characterization "
@@ -47,27 +39,12 @@ USES = {
         "Select a model",
         "mckibben: compare study check review calibrate; mckibben.comparison.leaderboard: Leaderboard",
     ),
-    "models": Use(
-        "Run, combine and save models",
-        "mckibben: Block load simulate Series Parallel PerChannel Channel Banded PI RateDependentPI GPI "
-        "EUPI Play Affine PiecewiseLinear Polynomial check_block",
-    ),
     "control": Use(
         "Invert a model, close the loop",
         "mckibben: invert track learn; mckibben.studying.results: Inverse Tracking; "
         "mckibben.control: track Tracked learn learned Learned control_law Controller BlockController "
         "tune_pid DisturbanceObserver EstimatedLoad Twin preview_time previewed before Before "
         "slow_cycle uncompensated; mckibben.stream: run FixedRate Deadlines Step",
-    ),
-    "rigs": Use(
-        "Virtual rigs and environments",
-        "mckibben: Rig load_rig; "
-        "mckibben.rigs: rig_names describe save_rig record; "
-        "mckibben.environments: Tracking",
-    ),
-    "muscles": Use(
-        "Muscle library",
-        "mckibben.muscles: list load show Muscle Sheet Prior prior_of described scaled",
     ),
     "export": Use(
         "Export a model, drive a device",
@@ -78,11 +55,41 @@ USES = {
         "Reports",
         "mckibben: write_report reproduce; mckibben.report: StudyFolder write_leaderboard",
     ),
+    "rigs": Use(
+        "Virtual rigs and environments",
+        "mckibben: Rig load_rig; "
+        "mckibben.rigs: rig_names describe save_rig record share; "
+        "mckibben.environments: Tracking",
+    ),
+    "muscles": Use(
+        "Muscle library",
+        "mckibben.muscles: list load show Muscle Sheet Prior prior_of described scaled",
+    ),
+    "signals": Use(
+        "Signals: excitations, cycles, filters",
+        "mckibben.signals: triangle decaying_triangle progressive_triangle irregular_triangle sine "
+        "decaying_sine progressive_sine chirp multisine random_wave binary_steps "
+        "staircase ramps constant pulls build settings_of cut resample decimate_minmax coarsened "
+        "made_manageable detrend low_pass zeroed noise_level reversals branches cycles "
+        "split_cycles",
+    ),
+    "models": Use(
+        "Run, combine and save models",
+        "mckibben: Block load simulate Series Parallel PerChannel Channel Banded PI RateDependentPI GPI "
+        "EUPI Play Affine PiecewiseLinear Polynomial check_block",
+    ),
     "errors": Use(
         "Errors and warnings",
         "mckibben: MckibbenError DataError ModelError DataWarning ModelWarning",
     ),
 }
+
+OPERATIONS = (
+    *("read", "info", "characterize", "data_gaps", "plan", "fit", "compare", "study", "check"),
+    *("simulate", "invert", "track", "learn", "calibrate", "review", "export", "plot"),
+    *("write_report", "reproduce", "models", "estimator", "load", "write"),
+)
+"""Functions that do a whole job, in the order of use."""
 
 PACKAGES = ("control", "diagnosis", "exporting", "files", "link", "muscles", "report", "rigs")
 PACKAGES += ("signals", "stream")
@@ -114,6 +121,11 @@ def found(module: str, name: str) -> Any:
     return getattr(importlib.import_module(module), name)
 
 
+def first_line(operation: str) -> str:
+    """Return what an operation does."""
+    return (inspect.getdoc(found("mckibben", operation)) or "").splitlines()[0]
+
+
 def write_api() -> None:
     """Write the pages; exits where a public name is on none of them."""
     if lacking := missing():
@@ -133,5 +145,7 @@ def write_api() -> None:
     lines = ["# API reference", "", "```{index} !API, !reference, !functions", "```", ""]
     lines += [f"Classes and functions by purpose. {version} The estimator of each model,"]
     lines += ["with its settings, is described on [the page of the model](../models/index.md).", ""]
+    done = [[f"{{py:func}}`mckibben.{name}`", plain(first_line(name))] for name in OPERATIONS]
+    lines += ["## Operations", "", *table(["function", "purpose"], done), "## Pages", ""]
     lines += [*table(["purpose", "names"], rows), *toctree(list(USES), "hidden")]
     write(MADE / "api" / "index.md", "\n".join(lines))

@@ -83,7 +83,7 @@ def write_models() -> None:
         "# Models by name",
         "",
         "The page of each model describes its equations, parameters, settings, inverse, cost and "
-        "source. [Which model should I choose?](../../models/choosing.md) compares the models. "
+        "source. [Which model](../../models/choosing.md) compares the models. "
         "An asterisk marks models that are accurate only near their training data.",
         "",
     ]

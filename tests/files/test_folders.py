@@ -135,7 +135,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path, text: str | bytes, named: str
 
 
 def test_what_the_documentation_shows_is_understood(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "channels.md").read_text(encoding="utf-8")
     shown = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     assert len(shown) == 3
     for example in shown:

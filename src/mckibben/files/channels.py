@@ -211,5 +211,5 @@ def _refusing(path: Path) -> Iterator[None]:
     except DataError:
         raise
     except (RecursionError, ValueError) as error:
-        remedy = "correct it; docs/files.md shows what it can hold"
+        remedy = "correct it; docs/channels.md shows what it can hold"
         raise DataError(reason(error), file=path, remedy=remedy) from None

@@ -132,7 +132,7 @@ def split_of(given: dict[str, Any] | None, file: str | Path = NAME) -> Split:
     try:
         return Split.model_validate(given or {})
     except ValidationError as error:
-        remedy = "correct it; docs/files.md shows what it can hold"
+        remedy = "correct it; docs/channels.md shows what it can hold"
         raise DataError(f"split.{reason(error)}", file=file, remedy=remedy) from None
 
 

@@ -27,8 +27,8 @@ from mckibben.report.mathematics import mathml
 if TYPE_CHECKING:
     from jinja2 import Environment, Template
 
-PLOTLY = "plotly-basic.min.js.xz"
-"""plotly.js 4.1.1 as published (plotly.js-basic-dist-min, MIT), packed: in Python 60 MB."""
+PLOTLY = "plotly.min.js.xz"
+"""What reports use of plotly.js 4.1.1 (MIT), packed by recipe/plotly.mjs: in Python 60 MB."""
 
 FIGURE = re.compile(r"[-−+±<>]? ?\d[\d.,e+−-]*( (to [-−]?\d\S*|\S+))?")
 """A cell that holds a number, perhaps with its unit, or an interval."""

@@ -14,7 +14,7 @@ from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.feedback import FeedforwardFeedback, PIDFeedback
 from mckibben.blocks.fields import Channel
 from mckibben.control import DisturbanceObserver, Twin, control_law, track, tune_pid
-from mckibben.control.loop import PressureLoop
+from mckibben.control.pressure_loop import PressureLoop
 
 BLOCK = PI.example()
 LOW, HIGH = (float(end[0]) for end in BLOCK.reachable())

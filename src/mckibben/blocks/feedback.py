@@ -5,6 +5,8 @@ u = base + kp e + integral - kd rate,  e = reference - measured,
 one loop a muscle: the derivative is of the measurement, through a first-order filter; the integral
 stops where the output is at a limit and would be driven further (Åström and Hägglund, "Advanced PID
 Control", ch. 3). What runs on the robot is a compensator with such feedback on top.
+
+Kernels are written in the subset of Python of docs/kernels.md; fields are in the order of saved files.
 """
 
 from __future__ import annotations
@@ -41,16 +43,16 @@ def pid_step(
     """Advance the loops; the state is [integrals, rates, last measurements, last references].
 
     Coefficients are [sample time, share of the filter, lowest, highest, whether there is a base,
-    whether references are late, kp, ki, kd]; inputs are references, measurements, bases.
+    whether references are delayed by a step, kp, ki, kd]; inputs are references, measurements, bases.
     """
     n = outputs.size
     step, filter_share = coefficients[0], coefficients[1]
     lowest, highest = coefficients[2], coefficients[3]
-    has_base, late = coefficients[4] > 0.0, coefficients[5] > 0.0
+    has_base, reference_delayed = coefficients[4] > 0.0, coefficients[5] > 0.0
     kp, ki, kd = coefficients[6 : 6 + n], coefficients[6 + n : 6 + 2 * n], coefficients[6 + 2 * n :]
     for k in range(n):
         reference, measured = inputs[k], inputs[n + k]
-        error = (state[3 * n + k] if late else reference) - measured
+        error = (state[3 * n + k] if reference_delayed else reference) - measured
         state[n + k] += filter_share * ((measured - state[2 * n + k]) / step - state[n + k])
         state[2 * n + k], state[3 * n + k] = measured, reference
 
@@ -173,7 +175,9 @@ class PIDFeedback(Block):
         Parameters are those of the class; without kd the derivative is left out.
         """
         gains = tuple(kp), tuple(ki), (0.0,) * len(kp) if kd is None else tuple(kd)
-        return cls(*gains, limits, filter_time, references, _called(references, MEASURED), outputs)
+        return cls(
+            *gains, limits, filter_time, references, _with_suffix(references, MEASURED), outputs
+        )
 
     def behind(self, compensator: Block) -> Self:
         """Return the same feedback added to a compensator's outputs, matched by name and unit.
@@ -199,7 +203,7 @@ class PIDFeedback(Block):
         named = {_sent(channel): channel for channel in outputs}
         given = tuple(named[_sent(self.given[place])] for place in order)
         kp, ki, kd = (tuple(gains[k] for k in order) for gains in (self.kp, self.ki, self.kd))
-        scheduled = (*_called(references, MEASURED), *_called(given, BASE))
+        scheduled = (*_with_suffix(references, MEASURED), *_with_suffix(given, BASE))
         made = replace(self, kp=kp, ki=ki, kd=kd, late=True)
         return replace(made, driven=references, scheduled=scheduled, given=given)
 
@@ -213,9 +217,9 @@ class PIDFeedback(Block):
         return cls.of(*ends, *gains, limits=(0.0, 5.0)).behind(compensator)
 
 
-def _called(channels: Channels, ending: str) -> Channels:
-    """Return the channels whose names have a suffix."""
-    return tuple(Channel(f"{channel.name}{ending}", channel.unit) for channel in channels)
+def _with_suffix(channels: Channels, suffix: str) -> Channels:
+    """Return the channels with a suffix added to their names."""
+    return tuple(Channel(f"{channel.name}{suffix}", channel.unit) for channel in channels)
 
 
 def _sent(channel: Channel) -> tuple[str, str]:
@@ -291,7 +295,7 @@ class FeedforwardFeedback(Composition):
     def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         wires = dict(zip(self.inputs, taken, strict=True))
         bases = self.compensator.wired(board, [wires[c] for c in self.compensator.inputs])
-        wires |= dict(zip(_called(self.outputs, BASE), bases, strict=True))
+        wires |= dict(zip(_with_suffix(self.outputs, BASE), bases, strict=True))
         results = self.feedback.wired(board, [wires[channel] for channel in self.feedback.inputs])
         return [results[self.feedback.given.index(channel)] for channel in self.outputs]
 

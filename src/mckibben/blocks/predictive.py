@@ -4,9 +4,11 @@ In every sample the exact inverse runs over the references of a horizon, from th
 If its pressures are within all limits, they are the output: then this is the exact inverse. Otherwise
 all pressures of the horizon are optimised together (`mckibben.blocks.planning`), with the model as
 prediction, hysteresis included; the first of them is the output, and the model advances by it. So a
-reversal that is too fast for the supply start_inverse early, and the error is shared before and after.
+reversal that is too fast for the supply starts early, and the error is shared before and after.
 
 References arrive ``horizon - 1`` samples ahead, one a sample, and are stored until they are due.
+
+Kernels are written in the subset of Python of docs/kernels.md; fields are in the order of saved files.
 """
 
 from __future__ import annotations
@@ -44,11 +46,21 @@ FASTEST = 1e6
 """Largest limit [bar/s]."""
 
 HEAD = 7
-N_PRESSURES, HORIZON, STATES, INVERSE_STATES, NUMBERS, INVERSE_NUMBERS, N_REFERENCES = range(HEAD)
+(
+    N_PRESSURES,
+    HORIZON,
+    N_MODEL_STATES,
+    N_INVERSE_STATES,
+    N_MODEL_COEFFICIENTS,
+    N_INVERSE_COEFFICIENTS,
+    N_REFERENCES,
+) = range(HEAD)
 """Places of the coefficients before the pressure steps: all are sizes."""
 
 PASSES = 2
-"""Number of optimisations per sample, each linearised about the result of the last."""
+"""Optimisations in a sample: the first is linearised about the pressures without limits, the second
+about the result of the first.
+"""
 
 UNCHANGED = 0.1
 """Motion, relative to the pressure step, that counts as unchanged."""
@@ -59,7 +71,7 @@ Limit = Annotated[FiniteFloat, Gt(0), Le(FASTEST)]
 # -- the memory that a model and its inverse share -------------------------------------------------
 
 
-def model_state(compensator: Block, state: Array) -> Array:
+def model_state_of(compensator: Block, state: Array) -> Array:
     """Return the model's state from a compensator's.
 
     Raises
@@ -73,7 +85,7 @@ def model_state(compensator: Block, state: Array) -> Array:
         case Series() | PerChannel():
             parts = compensator.parts
             shares = np.split(state, np.cumsum([part.n_states for part in parts])[:-1])
-            found = [model_state(part, own) for part, own in zip(parts, shares, strict=True)]
+            found = [model_state_of(part, own) for part, own in zip(parts, shares, strict=True)]
             return np.concatenate(found[:: -1 if isinstance(compensator, Series) else 1])
     if isinstance(compensator, Balance) or compensator.n_states == 0:
         return state.copy()
@@ -86,11 +98,11 @@ def model_state(compensator: Block, state: Array) -> Array:
 def without_dead_time(block: Any) -> Any:
     """Return a block without its dead times, which its inverse does not compensate."""
 
-    def prompt(part: Any) -> Any:
-        late = "dead_time" in part.__dataclass_fields__ and part.dead_time > 0
-        return replace(part, dead_time=0.0) if late else part
+    def undelayed(part: Any) -> Any:
+        delayed = "dead_time" in part.__dataclass_fields__ and part.dead_time > 0
+        return replace(part, dead_time=0.0) if delayed else part
 
-    return with_parts(block, prompt)
+    return with_parts(block, undelayed)
 
 
 def inverse_state_of(compensator: Block) -> Callable[[Array], Array]:
@@ -99,14 +111,14 @@ def inverse_state_of(compensator: Block) -> Callable[[Array], Array]:
         case Inverse():
             return compensator.forward.inverse_state
         case Series() | PerChannel():
-            turn = -1 if isinstance(compensator, Series) else 1
-            parts = compensator.parts[::turn]  # in the order of the model
-            ways = [inverse_state_of(part) for part in parts]
+            order = -1 if isinstance(compensator, Series) else 1
+            parts = compensator.parts[::order]  # in the order of the model
+            converters = [inverse_state_of(part) for part in parts]
             ends = np.cumsum([part.inverse().n_states for part in parts])[:-1]
 
             def joined(memory: Array) -> Array:
-                shares = zip(ways, np.split(memory, ends), strict=True)
-                return np.concatenate([way(share) for way, share in shares][::turn])
+                states = zip(converters, np.split(memory, ends), strict=True)
+                return np.concatenate([convert(state) for convert, state in states][::order])
 
             return joined
     return np.copy
@@ -157,7 +169,7 @@ def resume_of(compensator: Block) -> Resume | None:
 # -- its kernel ------------------------------------------------------------------------------------
 
 
-def _in_room(function: Any) -> Any:
+def with_scratch_argument(function: Any) -> Any:
     """Return a step with a working-memory argument, whether it needs one or not."""
 
     @kernel
@@ -170,7 +182,7 @@ def _in_room(function: Any) -> Any:
     return function if in_scratch(function) else without_scratch
 
 
-def _start_in_room(function: Any) -> Any:
+def start_with_scratch_argument(function: Any) -> Any:
     """Return a start with a working-memory argument, whether it needs one or not."""
 
     @kernel
@@ -193,12 +205,14 @@ def predictive_kernels(
     from the model's. Coefficients are [n, horizon, the model's states, the inverse's, the model's
     coefficients, the inverse's, references m], nudges (n), limits (1 + 2 n), and the coefficients of
     both. The state is [the model's, references to come (horizon by m), last pressures (n), whether there
-    are some, plans made].
+    are some, plans made]. The working memory is [three states of the model, the inverse's state, the
+    inverse's inputs, the model's inputs, path ((1 + horizon) n), nominal path (the same), slopes
+    (horizon m by n), errors (horizon m), vectors (n + 2 m), the working memory of other kernels].
     """
     run_model, run_inverse, start_inverse = (
-        _in_room(model_step),
-        _in_room(inverse_step),
-        _start_in_room(inverse_start),
+        with_scratch_argument(model_step),
+        with_scratch_argument(inverse_step),
+        start_with_scratch_argument(inverse_start),
     )
     predictive_step = step_of(run_model, run_inverse, resume, decorate=kernel)
 
@@ -208,11 +222,11 @@ def predictive_kernels(
     ) -> None:
         """Start as the inverse does: as if its first reference had always been applied."""
         c = coefficients
-        inverse_state = scratch[: int(c[INVERSE_STATES])]
-        numbers = c[HEAD + 1 + 3 * int(c[N_PRESSURES]) + int(c[NUMBERS]) :]
-        start_inverse(numbers, inverse_state, scratch[inverse_state.size :], inputs, virgin)
+        inverse_state = scratch[: int(c[N_INVERSE_STATES])]
+        inverse = c[HEAD + 1 + 3 * int(c[N_PRESSURES]) + int(c[N_MODEL_COEFFICIENTS]) :]
+        start_inverse(inverse, inverse_state, scratch[inverse_state.size :], inputs, virgin)
         state[:] = 0.0
-        fill(state[: int(c[STATES])], inverse_state)
+        fill(state[: int(c[N_MODEL_STATES])], inverse_state)
 
     return step(predictive_step), predictive_start
 
@@ -230,46 +244,53 @@ def step_of(
         n: int,
         model: Array,
         nudges: Array,
-        memory: Array,
-        desired: Array,
+        model_state: Array,
+        references: Array,
         path: Array,
-        given: Array,
+        model_inputs: Array,
         tables: Array,
         states: Array,
-        room: Array,
+        kernel_scratch: Array,
     ) -> None:
         """Compute the errors along a path, and the model's slopes where the motion continues.
 
         ``tables`` become [slopes, errors]; they are followed by three vectors to compute in.
         """
-        size, length, count = memory.size, path.size // n - 1, desired.size
+        size, length, count = model_state.size, path.size // n - 1, references.size
         m = count // length
-        trial, kept, after = states[:size], states[size : 2 * size], states[2 * size : 3 * size]
+        trial, before_sample = states[:size], states[size : 2 * size]
+        after_sample = states[2 * size : 3 * size]
         slopes, errors = tables[: n * count], tables[n * count : (n + 1) * count]
         vectors = tables[(n + 1) * count :]
-        way, answer, change = vectors[:n], vectors[n : n + m], vectors[n + m : n + 2 * m]
-        way[:] = 1.0
-        fill(kept, memory)
+        direction, outputs = vectors[:n], vectors[n : n + m]
+        nudged_outputs = vectors[n + m : n + 2 * m]
+
+        direction[:] = 1.0
+        fill(before_sample, model_state)
         for t in range(length):
             for k in range(n):
                 p = path[(t + 1) * n + k]
-                moved = p - path[t * n + k]
-                if abs(moved) > UNCHANGED * nudges[k]:
-                    way[k] = 1.0 if moved > 0.0 else -1.0
-                given[k] = p
-            fill(trial, kept)
-            run_model(model, trial, room, given, answer)
-            fill(after, trial)
+                motion = p - path[t * n + k]
+                if abs(motion) > UNCHANGED * nudges[k]:
+                    direction[k] = 1.0 if motion > 0.0 else -1.0
+                model_inputs[k] = p
+
+            fill(trial, before_sample)
+            run_model(model, trial, kernel_scratch, model_inputs, outputs)
+            fill(after_sample, trial)
+
             for k in range(n):
-                given[k] = path[(t + 1) * n + k] + way[k] * nudges[k]
-                fill(trial, kept)
-                run_model(model, trial, room, given, change)
+                model_inputs[k] = path[(t + 1) * n + k] + direction[k] * nudges[k]
+                fill(trial, before_sample)
+                run_model(model, trial, kernel_scratch, model_inputs, nudged_outputs)
                 for i in range(m):
-                    slopes[(t * m + i) * n + k] = (change[i] - answer[i]) / (way[k] * nudges[k])
-                given[k] = path[(t + 1) * n + k]
+                    change = nudged_outputs[i] - outputs[i]
+                    slopes[(t * m + i) * n + k] = change / (direction[k] * nudges[k])
+                model_inputs[k] = path[(t + 1) * n + k]
+
             for i in range(m):
-                errors[t * m + i] = desired[t * m + i] - answer[i]
-            fill(kept, after)
+                errors[t * m + i] = references[t * m + i] - outputs[i]
+            fill(before_sample, after_sample)
 
     def predictive_step(
         coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
@@ -277,46 +298,77 @@ def step_of(
         """Compute the first pressures of a horizon within all limits, and take that step."""
         c = coefficients
         n, m, length = int(c[N_PRESSURES]), int(c[N_REFERENCES]), int(c[HORIZON])
-        size, n_inverse, own_size = int(c[STATES]), int(c[INVERSE_STATES]), int(c[NUMBERS])
+        size, n_inverse = int(c[N_MODEL_STATES]), int(c[N_INVERSE_STATES])
+        n_model_coefficients = int(c[N_MODEL_COEFFICIENTS])
         planned, count = length * n, length * m
         nudges, limits = c[HEAD : HEAD + n], c[HEAD + n : HEAD + 3 * n + 1]
-        own = c[HEAD + 3 * n + 1 :]
-        model, inverse = own[:own_size], own[own_size : own_size + int(c[INVERSE_NUMBERS])]
-        memory, desired, last = state[:size], state[size : size + count], state[size + count :]
-        states, inverse_state = scratch[: 3 * size], scratch[3 * size : 3 * size + n_inverse]
-        more = scratch[3 * size + n_inverse :]
-        asked, given = more[: inputs.size], more[inputs.size : 2 * inputs.size - m + n]
-        rest = more[2 * inputs.size - m + n :]
-        path, nominal = rest[: n + planned], rest[n + planned : 2 * (n + planned)]
-        tables = rest[2 * (n + planned) : 2 * (n + planned) + (n + 1) * count + n + 2 * m]
-        room = rest[2 * (n + planned) + (n + 1) * count + n + 2 * m :]
+        both_coefficients = c[HEAD + 3 * n + 1 :]
+        model = both_coefficients[:n_model_coefficients]
+        first_after = n_model_coefficients + int(c[N_INVERSE_COEFFICIENTS])
+        inverse = both_coefficients[n_model_coefficients:first_after]
+        model_state, references = state[:size], state[size : size + count]
+        last = state[size + count :]
+
+        first_inverse_input = 3 * size + n_inverse
+        first_model_input = first_inverse_input + inputs.size
+        first_of_path = first_model_input + inputs.size - m + n
+        first_nominal = first_of_path + n + planned
+        first_slope = first_nominal + n + planned
+        first_of_kernels = first_slope + (n + 1) * count + n + 2 * m
+        states, inverse_state = scratch[: 3 * size], scratch[3 * size : first_inverse_input]
+        inverse_inputs = scratch[first_inverse_input:first_model_input]
+        model_inputs = scratch[first_model_input:first_of_path]
+        path, nominal = scratch[first_of_path:first_nominal], scratch[first_nominal:first_slope]
+        tables, kernel_scratch = scratch[first_slope:first_of_kernels], scratch[first_of_kernels:]
+
+        # shift the queue of references
         first = last[n] == 0.0
         for i in range(count - m):
-            desired[i] = inputs[i % m] if first else desired[i + m]
-        fill(desired[count - m :], inputs[:m])
-        resume(model, memory, inverse_state)
-        fill(asked, inputs)
-        fill(given[n:], inputs[m:])
+            references[i] = inputs[i % m] if first else references[i + m]
+        fill(references[count - m :], inputs[:m])
+
+        # the inverse over the horizon
+        resume(model, model_state, inverse_state)
+        fill(inverse_inputs, inputs)
+        fill(model_inputs[n:], inputs[m:])
         for t in range(length):
-            fill(asked[:m], desired[t * m : (t + 1) * m])
-            run_inverse(inverse, inverse_state, room, asked, path[(t + 1) * n : (t + 2) * n])
-        if first:  # whatever the rate
+            fill(inverse_inputs[:m], references[t * m : (t + 1) * m])
+            pressures = path[(t + 1) * n : (t + 2) * n]
+            run_inverse(inverse, inverse_state, kernel_scratch, inverse_inputs, pressures)
+
+        # the first sample has no rate
+        if first:
             for k in range(n):
                 last[k] = min(max(path[n + k], limits[1 + k]), limits[1 + n + k])
             last[n] = 1.0
         fill(path[:n], last[:n])
         fill(nominal, path)
+
+        # plan, where a limit acts within the horizon
         if not clip_path(limits, path):
             slopes, errors = tables[: n * count], tables[n * count : (n + 1) * count]
             for _ in range(PASSES):
-                linearise(n, model, nudges, memory, desired, nominal, given, tables, states, room)
-                _ = plan_path(limits, slopes, nominal[n:], errors, path, room)
+                linearise(
+                    n,
+                    model,
+                    nudges,
+                    model_state,
+                    references,
+                    nominal,
+                    model_inputs,
+                    tables,
+                    states,
+                    kernel_scratch,
+                )
+                _ = plan_path(limits, slopes, nominal[n:], errors, path, kernel_scratch)
                 _ = clip_path(limits, path)
                 fill(nominal, path)
             last[n + 1] += 1.0
+
+        # apply the first pressures
         fill(last[:n], path[n : 2 * n])
-        fill(given[:n], last[:n])
-        run_model(model, memory, room, given, asked[:m])
+        fill(model_inputs[:n], last[:n])
+        run_model(model, model_state, kernel_scratch, model_inputs, inverse_inputs[:m])
         fill(outputs, last[:n])
 
     return predictive_step
@@ -324,17 +376,17 @@ def step_of(
 
 def one_step_of(block: Block, sample_time: float) -> Callable[..., None]:
     """Return a step that runs a block of several kernels."""
-    state = np.empty(block.n_states)
-    given, found = np.empty((1, len(block.inputs))), np.empty((1, len(block.outputs)))
-    run = block.bind(sample_time, state, given, found)
+    own_state = np.empty(block.n_states)
+    own_inputs, own_outputs = np.empty((1, len(block.inputs))), np.empty((1, len(block.outputs)))
+    run = block.bind(sample_time, own_state, own_inputs, own_outputs)
 
     def run_model(
-        numbers: Array, memory: Array, room: Array, inputs: Array, outputs: Array
+        coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
     ) -> None:
-        del numbers, room
-        state[:], given[0] = memory, inputs
+        del coefficients, scratch
+        own_state[:], own_inputs[0] = state, inputs
         run()
-        memory[:], outputs[:] = state, found[0]
+        state[:], outputs[:] = own_state, own_outputs[0]
 
     return run_model
 
@@ -376,7 +428,7 @@ class Predictive(Block):
     outputs = same_as("compensator.outputs")
 
     def __post_init__(self) -> None:
-        model_state(self._inverse, np.zeros(self._inverse.n_states))
+        model_state_of(self._inverse, np.zeros(self._inverse.n_states))
         if strange := [c.name for c in self.outputs if not drives(c)]:
             raise ModelError(
                 f"{self.kind!r} plans commands of muscles, and the outputs of "
@@ -428,7 +480,9 @@ class Predictive(Block):
     ) -> Array:
         if initial is not None and not isinstance(initial, str):
             return stated(self.kind, self.n_states, initial)
-        own = model_state(self._inverse, self._inverse.initial_state(first, initial, sample_time))
+        own = model_state_of(
+            self._inverse, self._inverse.initial_state(first, initial, sample_time)
+        )
         return np.concatenate([own, np.zeros(self.n_states - own.size)])
 
     @property
@@ -442,13 +496,15 @@ class Predictive(Block):
 
     @property
     def n_scratch(self) -> int:
-        """Scratch: trial states, pressures, slopes, and the working memory of a plan."""
+        """Length of the working memory, laid out as in `predictive_kernels`."""
         model, inverse = self._planned, self._inverse
         n, m = len(self.outputs), inverse.n_driven
-        given = len(model.inputs) + len(inverse.inputs)
-        own = 3 * model.n_states + inverse.n_states + given + 2 * n + n + 2 * m
-        room = max(plan_scratch(self.horizon), model.n_scratch, inverse.n_scratch)
-        return own + self.horizon * (2 * n + m * (1 + n)) + room
+        states = 3 * model.n_states + inverse.n_states
+        inputs = len(inverse.inputs) + len(model.inputs)
+        paths = 2 * (1 + self.horizon) * n
+        tables = self.horizon * m * (n + 1) + n + 2 * m
+        kernels = max(plan_scratch(self.horizon), model.n_scratch, inverse.n_scratch)
+        return states + inputs + paths + tables + kernels
 
     @cached_property
     def _kernels(self) -> tuple[Step, Start] | None:

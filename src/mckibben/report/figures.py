@@ -15,7 +15,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.equations import channel_symbols
 from mckibben.blocks.ranges import known_ranges
 from mckibben.channels import Channels, any_moves, channels_of
-from mckibben.control.loop import ends
+from mckibben.control.loop import reachable_ranges
 from mckibben.diagnosis.coupling import coupling
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
@@ -250,7 +250,7 @@ def _block_loop(
     driven, given = input or names[0], output or block.outputs[0].name
     compensated = block.forward_model if block.inverts else None
     ranges = known_ranges(block.inputs, block.known_inputs)
-    ranges |= ends(compensated, block.inputs[: block.n_driven], None)
+    ranges |= reachable_ranges(compensated, block.inputs[: block.n_driven], None)
     if driven not in ranges and high is None:
         raise ModelError(
             f"the range of {driven} that the model was identified on is not known",

@@ -79,21 +79,21 @@ class StudyFolder:
                 write(model_file(row.model), row.block.to_text())
                 self._saved.add(row.model)
         write_leaderboard(board, self._results)
-        undone = study.inverse
-        if undone is not None:
-            write("inverse.json", undone.inverse.to_text())
-        if undone is not None or last:
-            facts = {"model": None} if undone is None else undone.to_dict()
+        compensation = study.inverse
+        if compensation is not None:
+            write("inverse.json", compensation.inverse.to_text())
+        if compensation is not None or last:
+            facts = {"model": None} if compensation is None else compensation.to_dict()
             facts |= {"passed_over": dict(study.passed_over)}
             write("inverse_expected.json", to_json(facts) + "\n")
         best = board.best
         if best is not None and not board.pending:
-            about = {"not_checked": study.check}
+            validation = {"not_checked": study.check}
             if isinstance(study.check, Validation):
-                about = check_json(study.check, model_file(best.model))
+                validation = check_json(study.check, model_file(best.model))
             whole = study.to_dict()
-            about |= {name: whole[name] for name in ("description", "data_gaps")}
-            write("validation.json", to_json(about) + "\n")
+            validation |= {name: whole[name] for name in ("description", "data_gaps")}
+            write("validation.json", to_json(validation) + "\n")
             if best.banded is not None:
                 write("banded.json", best.banded.to_text())
         started = time.monotonic()

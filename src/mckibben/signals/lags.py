@@ -5,27 +5,30 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.channels import by_name
 from mckibben.recording import Recording
 
-LONGEST = 2**15
-"""Most samples that are correlated; of longer signals, every so many are."""
+MOST_SAMPLES = 2**15
+"""Most samples that are correlated; longer signals are thinned evenly."""
 
-NEAREST = 1e-3
-"""Correlation by which the largest lag has to be better than none."""
+LAG_PENALTY = 1e-3
+"""Correlation by which the largest lag has to be better than none: of the alike peaks of a periodic
+signal, the nearest is taken.
+"""
 
-WIDEST = 0.25
+LARGEST_LAG = 0.25
 """Largest lag that is looked for, as a share of the recording."""
 
 FORWARD = {"displacement": 1.0, "contraction": 1.0, "length": -1.0, "angle": 0.0}
 """Quantity that a drive moves -> the sign of its change where a pressure rises, 0 for either."""
 
-ALIKE = 0.8
+LEAST_CORRELATION = 0.8
 """Smallest correlation of a drive and an output that are said to be in the wrong order."""
 
-CLEARER = 0.7
+LARGEST_VARIANCE_RATIO = 0.7
 """Variance that the output leaves of a drive that follows it, relative to that in the usual order,
 below which the order is wrong.
 """
@@ -49,7 +52,7 @@ def lag(cause: Array, effect: Array, sign: float = 0.0) -> Lag:
     cause, effect : ndarray, shape (n,)
         Both vary.
     sign : {1.0, -1.0, 0.0}
-        Of the effect; 0.0 where it is unknown: then as without a lag.
+        Of the effect, where the cause rises; 0.0: use the sign at zero lag.
 
     Examples
     --------
@@ -59,38 +62,52 @@ def lag(cause: Array, effect: Array, sign: float = 0.0) -> Lag:
     >>> round(late.samples), late.correlation > 0.99
     (7, True)
     """
-    every = -(-cause.size // LONGEST)
-    x, y = (some[::every] / np.abs(some).max() for some in (cause, effect))
+    stride = -(-cause.size // MOST_SAMPLES)
+    x, y = (signal[::stride] / np.abs(signal).max() for signal in (cause, effect))
     x, y = x - x.mean(), y - y.mean()
-    n, size = x.size, 2 * x.size
-    reach = max(1, int(WIDEST * n))
+    reach = max(1, int(LARGEST_LAG * x.size))
     shifts = np.arange(-reach, reach + 1)
-    found = np.fft.irfft(np.fft.rfft(y, size) * np.fft.rfft(x, size).conj(), size)[shifts]
-    whole = [np.append(0.0, np.cumsum(some**2)) for some in (x, y)]  # of those that overlap
+
+    correlations = _overlap_correlation(x, y, shifts)
+    correlations *= sign or np.sign(correlations[reach])
+    correlations -= LAG_PENALTY * np.abs(shifts) / reach
+    early = _within_half_period(correlations[reach::-1])[::-1]
+    late = _within_half_period(correlations[reach:])
+    near, no_lag = np.concatenate([early[:-1], late]), early.size - 1
+
+    peak = int(np.argmax(near))
+    samples = stride * (peak - no_lag + _refinement(near, peak))
+    return Lag(float(samples), float(near[peak]), float(near[no_lag:].max()))
+
+
+def _overlap_correlation(x: Array, y: Array, shifts: NDArray[np.int_]) -> Array:
+    """Return the correlation of x and y, shape (n,) each, with y shifted back, one value a shift.
+
+    The energies that it is relative to are those of the samples that overlap.
+    """
+    n, size = x.size, 2 * x.size
+    correlations = np.fft.irfft(np.fft.rfft(y, size) * np.fft.rfft(x, size).conj(), size)[shifts]
+    x_energy, y_energy = (np.append(0.0, np.cumsum(signal**2)) for signal in (x, y))
     first, last = np.maximum(0, -shifts), np.minimum(n, n - shifts)
-    energies = [
-        whole[0][last] - whole[0][first],
-        whole[1][last + shifts] - whole[1][first + shifts],
-    ]
-    found /= np.sqrt(np.maximum(energies[0] * energies[1], np.finfo(float).tiny))
-    found *= sign or np.sign(found[reach])
-    found -= NEAREST * np.abs(shifts) / reach  # of several periods
-    sides = [_near(found[reach::-1])[::-1], _near(found[reach:])]
-    found, reach = np.concatenate([sides[0][:-1], sides[1]]), sides[0].size - 1
-    at = int(np.argmax(found))
-    shift = 0.0
-    if 0 < at < found.size - 1:
-        before, here, after = found[at - 1 : at + 2]
-        bend = before - 2 * here + after
-        shift = 0.5 * (before - after) / bend if bend < 0 else 0.0
-    late = every * (at - reach + shift)
-    return Lag(float(late), float(found[at]), float(found[reach:].max()))
+    x_overlap = x_energy[last] - x_energy[first]
+    y_overlap = y_energy[last + shifts] - y_energy[first + shifts]
+    correlations /= np.sqrt(np.maximum(x_overlap * y_overlap, np.finfo(float).tiny))
+    return np.asarray(correlations)
 
 
-def _near(correlations: Array) -> Array:
-    """Return the correlations from no lag on before they are negative: within half a period."""
-    against = np.flatnonzero(correlations <= 0)
-    return correlations[: max(1, int(against[0]))] if against.size else correlations
+def _within_half_period(correlations: Array) -> Array:
+    """Return the correlations, from no lag on, before the first that is not positive."""
+    negative = np.flatnonzero(correlations <= 0)
+    return correlations[: max(1, int(negative[0]))] if negative.size else correlations
+
+
+def _refinement(values: Array, peak: int) -> float:
+    """Return how far the vertex of the parabola through a peak and its neighbours is from the peak."""
+    if not 0 < peak < values.size - 1:
+        return 0.0
+    before, here, after = values[peak - 1 : peak + 2]
+    bend = before - 2 * here + after
+    return float(0.5 * (before - after) / bend) if bend < 0 else 0.0
 
 
 def lags(recording: Recording) -> dict[str, Lag]:
@@ -98,19 +115,19 @@ def lags(recording: Recording) -> dict[str, Lag]:
 
     The drive of ``displacement_2`` is ``pressure_2``, or the only one.
     """
-    moving = {name: x for name, x in recording.channels.items() if (x != x[0]).any()}
-    drives = [name for name in by_name([recording])[0] if name in moving]
-    found = {}
-    for name, samples in moving.items():
+    varying = {name: x for name, x in recording.channels.items() if (x != x[0]).any()}
+    drives = [name for name in by_name([recording])[0] if name in varying]
+    by_motion = {}
+    for name, samples in varying.items():
         quantity, _, number = name.partition("_")
         own = [drive for drive in drives if drive.partition("_")[2] == number]
         drive = next(iter(own if number else drives if len(drives) == 1 else ()), None)
         if drive is not None and name not in drives and quantity in FORWARD:
-            found[name] = lag(moving[drive], samples, FORWARD[quantity])
-    return found
+            by_motion[name] = lag(varying[drive], samples, FORWARD[quantity])
+    return by_motion
 
 
-def comes_first(found: Lag) -> bool:
-    """Return whether a signal precedes what should cause it, clearly."""
-    apart = 1.0 - found.correlation < CLEARER * (1.0 - found.in_order)
-    return found.samples <= -2.0 and found.correlation > ALIKE and apart
+def comes_first(effect: Lag) -> bool:
+    """Return whether an effect clearly precedes its cause: the two are in the wrong order."""
+    clear = 1.0 - effect.correlation < LARGEST_VARIANCE_RATIO * (1.0 - effect.in_order)
+    return effect.samples <= -2.0 and effect.correlation > LEAST_CORRELATION and clear

@@ -76,15 +76,15 @@ def zeroed(recording: Recording, channels: Sequence[str], over: str) -> Recordin
     DataError
         If there is no such channel, or the recording does not rest.
     """
-    level = {}
+    zeroed_channels = {}
     for name in channels:
-        at = rest(recording, name, over)
-        if at is None:
+        value_at_rest = rest(recording, name, over)
+        if value_at_rest is None:
             raise DataError(
                 f"it never rests at the lowest {over}, with all inputs and loads constant",
                 file=recording.source,
                 channel=name,
                 remedy="begin or end with a hold there, or subtract a zero that is known",
             )
-        level[name] = recording[name] - at
-    return replace(recording, channels={**recording.channels, **level})
+        zeroed_channels[name] = recording[name] - value_at_rest
+    return replace(recording, channels={**recording.channels, **zeroed_channels})

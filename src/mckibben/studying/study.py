@@ -17,7 +17,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.runs import FreeRun
 from mckibben.channels import Channels, moved_by
 from mckibben.comparison.leaderboard import Leaderboard
-from mckibben.comparison.planning import plan_of
+from mckibben.comparison.planning import Plan, plan_of
 from mckibben.comparison.ranking import Standing, ranked
 from mckibben.control import UNCOMPENSATED, Tracked, before, control_law, track, tune_pid
 from mckibben.diagnosis import Characterization, characterize
@@ -166,41 +166,22 @@ def study(
     recordings, tests, seed = listed(train), listed(test), chosen.seed
     reviewed = None
     if chosen.model is not None or chosen.compensator is not None:
-        # the test is not for a refit to see
+        # the review must not see the test data when it refits
         ran: Any = {"model": chosen.model, "compensator": chosen.compensator}
         reviewed = review(recordings, seed=seed, **ran)
         if chosen.input is None:
             recordings, channels = [_driven(one) for one in recordings], None
     plan = plan_of(recordings, tests, chosen, validation=validation, channels=channels)
-    channels = plan.data.channels
-    if chosen.rig is not None and channels.single:
+    if chosen.rig is not None and plan.data.channels.single:
         raise DataError(
             "loops are closed on a rig with recordings of several muscles, or under a load",
             remedy="leave `rig` out, or use `track()`",
         )
     rig = None if chosen.rig is None else load_rig(chosen.rig)
-    looped, loop = channels.inputs, None
-    if len(channels.inputs) == len(channels.outputs) == 1:
-        looped = (moved_by([*recordings, *tests], looped[0]),)
-        others = {*channels.inputs, *channels.scheduling} - set(looped)
-        with suppress(DataError):  # of a load that follows the input, which is a data gap
-            loop = characterize(
-                [*recordings, *tests], looped[0], channels.outputs[0], scheduling=sorted(others)
-            )
-    so_far = Study(
-        train=plan.data.split.train,
-        test=plan.data.split.test,
-        characterization=loop,
-        leaderboard=plan.empty,
-        predictions={},
-        inverse=None,
-        load=chosen.load,
-        notes=plan.empty.notes,
-        data_gaps=data_gaps(recordings, looped, channels.outputs, tests=tests),
-        review=reviewed,
-    )
-    if found is not None:
-        found(so_far)
+    report = found if found is not None else _ignored
+
+    so_far = replace(_characterized(plan, recordings, tests), load=chosen.load, review=reviewed)
+    report(so_far)
     try:
         with (
             telling(progress, "studying", lines=True) as tell,
@@ -210,34 +191,78 @@ def study(
         ):
             for ranking in rankings:
                 so_far = replace(so_far, leaderboard=ranking.board, predictions=ranking.outputs)
-                if ranking.board.pending and found is not None:
-                    found(so_far)
+                if ranking.board.pending:
+                    report(so_far)
     except KeyboardInterrupt:
         if not so_far.leaderboard.rows:
             raise
         return replace(so_far, leaderboard=replace(so_far.leaderboard, stopped=True))
-    board = so_far.leaderboard
-    if board.best is not None and board.best.block is not None:
-        block, split, names = board.best.block, plan.data.split, channels.outputs
-        on_test = so_far.predictions[board.best.model][len(split.train) :]
-        so_far = replace(
-            so_far,
-            check=check_on_test(block, split, on_test, names),
-            description=describe(block, split.train, fitted=True),
-        )
-    undone, passed_over = compensation(board, plan.data.split, seed)
-    so_far = replace(so_far, inverse=undone, passed_over=passed_over)
-    if not channels.single and undone is not None:
-        try:
-            plant = rig or recorded_rig([*recordings, *tests])
-            if plant is not None:
-                loops = closed_loops(board, undone.model, plant, so_far.test, seed)
-                so_far = replace(so_far, loops=loops, plant=named(plant))
-        except DataError as error:
-            so_far = replace(so_far, not_looped=str(error))
-    if found is not None:
-        found(so_far)
+
+    so_far = _checked(so_far, plan)
+    inverse, passed_over = compensation(so_far.leaderboard, plan.data.split, seed)
+    so_far = replace(so_far, inverse=inverse, passed_over=passed_over)
+    if not plan.data.channels.single and inverse is not None:
+        so_far = _looped_on_rig(so_far, inverse.model, rig, [*recordings, *tests], seed)
+    report(so_far)
     return so_far
+
+
+def _ignored(so_far: Study) -> None:
+    """Take a study so far where nobody asks for it."""
+    del so_far
+
+
+def _characterized(
+    plan: Plan, recordings: Sequence[Recording], tests: Sequence[Recording]
+) -> Study:
+    """Return a study without models: what the muscle does, and what its data cannot identify."""
+    channels, together = plan.data.channels, [*recordings, *tests]
+    loop_inputs, characterization = channels.inputs, None
+    if len(channels.inputs) == len(channels.outputs) == 1:
+        loop_inputs = (moved_by(together, channels.inputs[0]),)
+        others = {*channels.inputs, *channels.scheduling} - set(loop_inputs)
+        with suppress(DataError):  # a load that follows the input is a data gap
+            characterization = characterize(
+                together, loop_inputs[0], channels.outputs[0], scheduling=sorted(others)
+            )
+    return Study(
+        train=plan.data.split.train,
+        test=plan.data.split.test,
+        characterization=characterization,
+        leaderboard=plan.empty,
+        predictions={},
+        inverse=None,
+        notes=plan.empty.notes,
+        data_gaps=data_gaps(recordings, loop_inputs, channels.outputs, tests=tests),
+    )
+
+
+def _checked(ranked_study: Study, plan: Plan) -> Study:
+    """Return a study with the check and the description of the chosen model, if there is one."""
+    best = ranked_study.leaderboard.best
+    if best is None or best.block is None:
+        return ranked_study
+    split = plan.data.split
+    on_test = ranked_study.predictions[best.model][len(split.train) :]
+    return replace(
+        ranked_study,
+        check=check_on_test(best.block, split, on_test, plan.data.channels.outputs),
+        description=describe(best.block, split.train, fitted=True),
+    )
+
+
+def _looped_on_rig(
+    inverted: Study, chosen: str, rig: Rig | None, recordings: Sequence[Recording], seed: int
+) -> Study:
+    """Return a study with closed loops on a rig, else on the one of the recordings, or why not."""
+    try:
+        plant = rig or recorded_rig(recordings)
+        if plant is None:
+            return inverted
+        loops = closed_loops(inverted.leaderboard, chosen, plant, inverted.test, seed)
+        return replace(inverted, loops=loops, plant=named(plant))
+    except DataError as error:
+        return replace(inverted, not_looped=str(error))
 
 
 def _driven(log: Recording) -> Recording:
@@ -273,10 +298,10 @@ def check_on_test(
         return str(error)
 
 
-LONGEST = 200.0
+LONGEST_MOTION = 200.0
 """Longest motion that is tracked [s]."""
 
-SMOOTHED = 0.5
+HALF_WINDOW = 0.5
 """Half width of the window that smooths a measured motion before it is tracked [s]."""
 
 
@@ -348,8 +373,8 @@ def _followed(tests: Sequence[Recording], outputs: Sequence[str], held: Sequence
     """Return a smoothed measured motion, with scheduling inputs at their means."""
     model = max(tests, key=lambda run: min(float(np.ptp(run[name])) for name in outputs))
     step = sample_time_of(model, "be tracked")
-    n = min(len(model), round(LONGEST / step))
-    width = max(round(SMOOTHED / step), 1)
+    n = min(len(model), round(LONGEST_MOTION / step))
+    width = max(round(HALF_WINDOW / step), 1)
     window = np.ones(width) / width
     smooth = {
         name: np.convolve(np.pad(model[name][:n], width, mode="edge"), window, "same")[

@@ -4,6 +4,8 @@ Both models add a static pressure and a hysteresis, with the rate of the contrac
 noisy, through an optional first-order filter. The published one has all its hysteresis in the rate,
 and is bound to the frequency of a test signal; ours carries dry friction by operators, and is bound to
 none.
+
+Kernels are written in the subset of Python of docs/kernels.md; fields are in the order of saved files.
 """
 
 from __future__ import annotations
@@ -138,14 +140,21 @@ class ActivationPressure(Activation):
     start_kernel = published_start
     parameters = ("contractions", "pressures", "phi", "gamma")
     typical = (
-        (*[0.0] * 3, -1.0, *[0.0] * 2, 0.01, 6.0, *[0.0] * 3, 2.0, 0.0, 0.001, 0.0, 4.0),
-        (
+        (  # contractions
+            *(0.0, 0.0, 0.0, -1.0),
+            *(0.0, 0.0, 0.01, 6.0),
+            *(0.0, 0.0, 0.0, 2.0),
+            *(0.0, 0.001, 0.0, 4.0),
+        ),
+        (  # pressures
             *(0.0, 0.0, 0.1, 0.2),
             *(0.0, 0.0, 0.1, 4.0),
             *(0.0, 0.0, 0.1, 1.0),
             *(0.0, 0.0, 0.1, 2.0),
         ),
-        *((0.0, 0.0, 0.01, 0.3), (0.27, 0.67), 1.0),
+        (0.0, 0.0, 0.01, 0.3),  # phi
+        (0.27, 0.67),  # gamma
+        1.0,  # frequency
     )
     n_states = 2  # previous contraction and filtered rate
     formulas = (
@@ -195,37 +204,46 @@ CENTRE, SCALE, FORCE_CENTRE, FORCE_SCALE, DEGREE, FORCE_DEGREE, N_SLOW, SURFACE 
 
 @step
 def remembering_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Advance the model; the state is [play operators, previous contraction, filtered rate, x_m].
+    """Advance the model.
 
+    The state is [n play operators, previous contraction, filtered rate, n_slow slow contractions x_m].
     Coefficients from `SURFACE` on are c row by row, thresholds, a, b, d, g, h and decays of x_m.
     """
-    degree, by_force = int(coefficients[DEGREE]), int(coefficients[FORCE_DEGREE])
-    m = int(coefficients[N_SLOW])
-    n = state.size - 2 - m
-    thresholds = SURFACE + (degree + 1) * (by_force + 1)
-    surface, r = coefficients[SURFACE:thresholds], coefficients[thresholds:]
-    friction = r[n:]
-    viscosity = friction[2 * n :]
-    relaxation = viscosity[2:]
-    decays = relaxation[2 * m :]
-    followers = state[n + 2 :]
+    degree, force_degree = int(coefficients[DEGREE]), int(coefficients[FORCE_DEGREE])
+    n_slow = int(coefficients[N_SLOW])
+    n = state.size - 2 - n_slow
+    first_threshold = SURFACE + (degree + 1) * (force_degree + 1)
+    first_friction = first_threshold + n
+    first_viscosity = first_friction + 2 * n
+    first_relaxation = first_viscosity + 2
+    first_decay = first_relaxation + 2 * n_slow
+    surface = coefficients[SURFACE:first_threshold]
+    thresholds = coefficients[first_threshold:first_friction]
+    friction = coefficients[first_friction:first_viscosity]
+    viscosity = coefficients[first_viscosity:first_relaxation]
+    relaxation = coefficients[first_relaxation:first_decay]
+    decays = coefficients[first_decay : first_decay + n_slow]
+    slow = state[n + 2 :]
+
     e = inputs[0]
     x = (e - coefficients[CENTRE]) / coefficients[SCALE]
     f = (inputs[1] - coefficients[FORCE_CENTRE]) / coefficients[FORCE_SCALE]
     rate = coefficients[SMOOTHING] * state[n + 1] + coefficients[RATE_GAIN] * (e - state[n])
+
     p = 0.0
     for i in range(degree, -1, -1):
         row = 0.0
-        for j in range(by_force, -1, -1):
-            row = row * f + surface[i * (by_force + 1) + j]
+        for j in range(force_degree, -1, -1):
+            row = row * f + surface[i * (force_degree + 1) + j]
         p = p * x + row
     for k in range(n):
-        state[k] = min(max(state[k], e - r[k]), e + r[k])
+        state[k] = min(max(state[k], e - thresholds[k]), e + thresholds[k])
         p += (friction[k] + f * friction[n + k]) * (e - state[k])
     p += (viscosity[0] + f * viscosity[1]) * rate
-    for k in range(m):
-        followers[k] = decays[k] * followers[k] + (1.0 - decays[k]) * x
-        p += (relaxation[k] + f * relaxation[m + k]) * (followers[k] - x)
+    for k in range(n_slow):
+        slow[k] = decays[k] * slow[k] + (1.0 - decays[k]) * x
+        p += (relaxation[k] + f * relaxation[n_slow + k]) * (slow[k] - x)
+
     state[n], state[n + 1] = e, rate
     outputs[0] = p
 
@@ -233,12 +251,12 @@ def remembering_step(coefficients: Array, state: Array, inputs: Array, outputs: 
 @kernel
 def remembering_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start as if the contraction had only risen to the first one, or never moved."""
-    m = int(coefficients[N_SLOW])
-    n = state.size - 2 - m
-    thresholds = SURFACE + (int(coefficients[DEGREE]) + 1) * (int(coefficients[FORCE_DEGREE]) + 1)
+    degree, force_degree = int(coefficients[DEGREE]), int(coefficients[FORCE_DEGREE])
+    first_threshold = SURFACE + (degree + 1) * (force_degree + 1)
+    n = state.size - 2 - int(coefficients[N_SLOW])
     e = inputs[0]
     for k in range(n):
-        state[k] = e if virgin else e - coefficients[thresholds + k]
+        state[k] = e if virgin else e - coefficients[first_threshold + k]
     state[n], state[n + 1] = e, 0.0
     state[n + 2 :] = (e - coefficients[CENTRE]) / coefficients[SCALE]
 
@@ -278,8 +296,16 @@ class ActivationMemory(Activation):
     start_kernel = remembering_start
     parameters = ("surface", "friction", "viscosity", "relaxation")
     typical = (
-        *((2.0, 0.5, 1.5, 0.1, 0.2, 0.0), (0.2, 0.8), (0.3, 0.2, 0.1, 0.0), (0.05, 0.01)),
-        *((0.1, 0.02), (0.5,), 2, 1, (2.5, 2.5), (2.5, 2.5)),
+        (2.0, 0.5, 1.5, 0.1, 0.2, 0.0),  # surface
+        (0.2, 0.8),  # thresholds
+        (0.3, 0.2, 0.1, 0.0),  # friction
+        (0.05, 0.01),  # viscosity
+        (0.1, 0.02),  # relaxation
+        (0.5,),  # time_constants
+        2,  # degree
+        1,  # force_degree
+        (2.5, 2.5),  # input_scale
+        (2.5, 2.5),  # force_scale
     )
     formulas = (
         r"p = \sum_{ij} c_{ij} x^i f^j + \sum_k (a_k + b_k f) S_k[\epsilon] + (d_0 + d_1 "

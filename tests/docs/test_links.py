@@ -68,3 +68,16 @@ def test_tutorials_are_in_the_index() -> None:
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     tutorials = (ROOT / "docs" / "tutorials").glob("*.md")
     assert [path for path in tutorials if f"tutorials/{path.stem}\n" not in index] == []
+
+
+def test_paths_that_the_page_of_the_architecture_names_exist() -> None:
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = re.findall(r"`([\w/.<>]+)`", text)
+    folders = ROOT, ROOT / "src" / "mckibben"
+    patterns = {name: re.sub(r"<\w+>", "*", name).rstrip("/") for name in named}
+    assert len(patterns) > 40
+    assert [
+        name
+        for name, pattern in patterns.items()
+        if not [path for folder in folders for path in folder.glob(pattern)]
+    ] == []

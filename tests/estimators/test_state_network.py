@@ -12,11 +12,8 @@ from mckibben.arrays import Array
 from mckibben.blocks.derivatives import derivatives
 from mckibben.blocks.dynamics.state_network import StateNetwork
 from mckibben.comparison.planning import plan_of
-from mckibben.estimators.dynamics.state_network import (
-    NetworkErrors,
-    StateNetworkEstimator,
-    follow_network,
-)
+from mckibben.estimators.dynamics.network_kernel import simulate_network
+from mckibben.estimators.dynamics.state_network import NetworkErrors, StateNetworkEstimator
 from mckibben.recording import Recording
 from tests.golden.models import network
 
@@ -88,7 +85,7 @@ def test_a_run_that_leaves_all_bounds_ends() -> None:
     linear, hidden, readout = np.array([[5.0, 0, 1], [1, 0, 0]]), np.zeros((1, 3)), np.zeros((2, 1))
     found, state = np.empty((50, 1, 1)), np.ones((1, 1))
     given = np.zeros((51, 1)), 1, 0, np.ones(50, dtype=bool), found
-    assert not follow_network(linear, hidden, readout, 1.0, state, *given)
+    assert not simulate_network(linear, hidden, readout, 1.0, state, *given)
 
 
 def test_several_outputs_are_learned_and_a_seed_gives_the_same_again() -> None:

@@ -33,8 +33,8 @@ SMOOTH, FINE = 1.0, 0.03
 FEWEST_MUSCLES = 3
 """Smallest number of muscles for estimating a spread."""
 
-MIDDLE = 0.8413
-"""Quantile of a normal distribution at one standard deviation."""
+ONE_SIGMA_PROBABILITY = 0.8413
+"""Probability that a normal variable is below one standard deviation."""
 
 DEFAULT_SPREAD = 1.0
 """Spread assumed with fewer muscles."""
@@ -44,18 +44,19 @@ DEFAULT_SPREAD = 1.0
 class Prior:
     """Prior of a muscle's traits.
 
-    Traits of a name go up and down together by a level, and differ from it by a smooth shape.
+    The deviations of a name's traits (such as the friction after several travels) from their mean are
+    a level that all have in common, a shape that is smooth along them, and an independent part.
 
     Parameters
     ----------
     sheet : Sheet
         Of the muscle.
     mean : array, shape (COUNT,)
-        NaN of what no muscle tells.
+        NaN where no muscle has the trait.
     levels, shapes : dict of str to float
-        Standard deviations.
+        Standard deviations of the level and of the shape, by name of the traits.
     zero : float
-        Standard deviation of where displacements count from, beyond rest [mm].
+        Standard deviation of the origin of displacements, relative to the muscle at rest [mm].
     """
 
     sheet: Sheet
@@ -65,20 +66,23 @@ class Prior:
     zero: float
 
     def covariance(self, name: str) -> Array:
-        """Return the covariance of traits of a name."""
-        place = POSITIONS[name]
-        apart = ((place[:, np.newaxis] - place) / SMOOTH) ** 2
-        curved = self.shapes[name] ** 2 * np.exp(-0.5 * apart.sum(axis=2))
-        return np.asarray(self.levels[name] ** 2 + curved + FINE**2 * np.eye(len(place)))
+        """Return the covariance of traits of a name: of level, shape and independent part."""
+        positions = POSITIONS[name]
+        distances = ((positions[:, np.newaxis] - positions) / SMOOTH) ** 2
+        shape = self.shapes[name] ** 2 * np.exp(-0.5 * distances.sum(axis=2))
+        return np.asarray(self.levels[name] ** 2 + shape + FINE**2 * np.eye(len(positions)))
 
     def weights(self) -> Array:
-        """Return rows that normalise deviations of traits from their mean to unit covariance."""
+        """Return the whitening matrix: it maps deviations from the mean to unit covariance.
+
+        Shape (traits with a mean, COUNT).
+        """
         rows = []
-        for name, place in PLACES.items():
-            known = np.flatnonzero(np.isfinite(self.mean[place]))
-            part = np.zeros((known.size, COUNT))
+        for name, columns in PLACES.items():
+            known = np.flatnonzero(np.isfinite(self.mean[columns]))
             factor = np.linalg.cholesky(self.covariance(name)[np.ix_(known, known)])
-            part[:, known + place.start] = np.linalg.inv(factor)
+            part = np.zeros((known.size, COUNT))
+            part[:, known + columns.start] = np.linalg.inv(factor)
             rows.append(part)
         return np.concatenate(rows)
 
@@ -92,7 +96,7 @@ def prior_of(given: str | Path | Sheet, *, without: Sequence[str] = ()) -> Prior
         A muscle of the library, from which to begin; a data sheet, or its TOML file (or that of an
         identified muscle).
     without : sequence of str
-        Muscles of the library that are not asked.
+        Names of muscles of the library to leave out.
 
     Raises
     ------
@@ -103,8 +107,8 @@ def prior_of(given: str | Path | Sheet, *, without: Sequence[str] = ()) -> Prior
     if isinstance(given, Sheet):
         without = (*without, *(given.without or ()))
         like = load(given.like) if given.like else None
-        asked = [muscle for muscle in muscles if muscle.name not in without]
-        return of_muscles(_with(like, asked, without), given, like)
+        muscles = [muscle for muscle in muscles if muscle.name not in without]
+        return of_muscles(_with(like, muscles, without), given, like)
     path = Path(given)
     if path.suffix != ".toml":
         return of_muscles(muscles, load(given).sheet, load(given))
@@ -137,57 +141,85 @@ def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = No
     muscles = sorted(muscles, key=lambda muscle: muscle.name)
     table = np.array([muscle.traits for muscle in muscles])
     known = np.isfinite(table)
-    shapes = np.array([muscle.sheet.shape for muscle in muscles])
-    here = sheet.shape if like is None else like.sheet.shape
+    similarity = np.array([muscle.sheet.shape for muscle in muscles])
+    wanted = sheet.shape if like is None else like.sheet.shape
+
     mean = np.full(COUNT, np.nan)
-    of_levels, of_shapes = {}, {}
-    for name, place in PLACES.items():
-        level, shape = _spreads(table[:, place])
-        spread = float(np.hypot(level, shape))
-        for number in range(place.start, place.stop):
-            which = known[:, number]
+    levels, shapes = {}, {}
+    for name, columns in PLACES.items():
+        level_std, shape_std = _spreads(table[:, columns])
+        spread = float(np.hypot(level_std, shape_std))
+        for trait in range(columns.start, columns.stop):
+            which = known[:, trait]
             if which.any():
-                middle = float(table[which, number].mean())
-                share, _ = _shares(shapes[which], here, spread)
-                mean[number] = middle + share @ (table[which, number] - middle)
-        left = _shares(shapes[known[:, place].any(axis=1)], here, spread)[1]
-        of_levels[name] = float(np.hypot(left * level, ALIKE))
-        of_shapes[name] = float(np.hypot(left * shape, ALIKE))
-    return Prior(sheet, mean, of_levels, of_shapes, ZERO * sheet.rest_length_mm)
+                average = float(table[which, trait].mean())
+                weights, _ = _kriging_weights(similarity[which], wanted, spread)
+                mean[trait] = average + weights @ (table[which, trait] - average)
+        informed = known[:, columns].any(axis=1)
+        remaining = _kriging_weights(similarity[informed], wanted, spread)[1]
+        levels[name] = float(np.hypot(remaining * level_std, ALIKE))
+        shapes[name] = float(np.hypot(remaining * shape_std, ALIKE))
+    return Prior(sheet, mean, levels, shapes, ZERO * sheet.rest_length_mm)
 
 
-def _shares(shapes: Array, here: Array, spread: float) -> tuple[Array, float]:
-    """Return the weight of each muscle's deviation, and the remaining share of the spread."""
-    if not len(shapes):
+def _kriging_weights(similarity: Array, wanted: Array, spread: float) -> tuple[Array, float]:
+    """Return the weight of each muscle's deviation from the mean, and the remaining share of the spread.
+
+    Parameters
+    ----------
+    similarity : array, shape (muscles, 3)
+        Coordinates of the muscles: `Sheet.shape`.
+    wanted : array, shape (3,)
+        Those of the muscle whose traits are wanted.
+    spread : float
+        Standard deviation of the traits over all muscles.
+    """
+    if not len(similarity):
         return np.zeros(0), 1.0
 
-    def alike(one: Array, other: Array) -> Array:
-        apart = (one[:, np.newaxis] - other) / NEAR
-        return np.asarray(np.exp(-0.5 * (apart**2).sum(axis=2)))
+    def correlation(some: Array, others: Array) -> Array:
+        distances = (some[:, np.newaxis] - others) / NEAR
+        return np.asarray(np.exp(-0.5 * (distances**2).sum(axis=2)))
 
-    near = alike(shapes, here[np.newaxis])[:, 0]
-    among = alike(shapes, shapes) + (ALIKE / spread) ** 2 * np.eye(len(shapes))
-    share: Array = np.asarray(np.linalg.solve(among, near), dtype=np.float64)
-    return share, max(1.0 - float(near @ share), 0.0) ** 0.5
+    to_wanted = correlation(similarity, wanted[np.newaxis])[:, 0]
+    independent = (ALIKE / spread) ** 2 * np.eye(len(similarity))
+    among = correlation(similarity, similarity) + independent
+    weights: Array = np.asarray(np.linalg.solve(among, to_wanted), dtype=np.float64)
+    return weights, max(1.0 - float(to_wanted @ weights), 0.0) ** 0.5
 
 
 def _spreads(table: Array) -> tuple[float, float]:
-    """Return the spreads of muscles' levels, and of shapes about these, allowing for few muscles.
+    """Return the standard deviations of a new muscle's level, and of its shape about the level.
 
-    A new one's is Student's; the Gaussian with the same middle two thirds is taken.
+    With few muscles, the prediction of a new one follows Student's distribution: the Gaussian with the
+    same probability within one standard deviation is taken.
+
+    Parameters
+    ----------
+    table : array, shape (muscles, traits)
+        Traits of one name; NaN where a muscle does not have it.
     """
     known = np.isfinite(table)
-    muscles = known.any(axis=1)
-    n = int(muscles.sum())
+    has_any = known.any(axis=1)
+    n = int(has_any.sum())
     if n < FEWEST_MUSCLES:
         return DEFAULT_SPREAD, DEFAULT_SPREAD
-    table, known = table[muscles], known[muscles]
-    away = np.where(known, table, 0.0)
-    away = np.where(known, away - away.sum(axis=0) / np.maximum(known.sum(axis=0), 1), 0.0)
-    level = away.sum(axis=1) / known.sum(axis=1)
-    shape = np.where(known, away - level[:, np.newaxis], 0.0)
-    free = n - 1
-    new = (1.0 + 1.0 / n) * float(stdtrit(free, MIDDLE)) ** 2
-    of_level = float(np.sqrt(new * (level - level.mean()) @ (level - level.mean()) / free))
-    of_shape = float(np.sqrt(new * (shape**2).sum() / max((table.shape[1] - 1) * free, 1)))
-    return max(of_level, ALIKE), max(of_shape, ALIKE)
+    table, known = table[has_any], known[has_any]
+
+    # deviations from the mean over muscles, 0 where unknown
+    deviations = np.where(known, table, 0.0)
+    means = deviations.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    deviations = np.where(known, deviations - means, 0.0)
+
+    # a muscle's mean deviation is its level, the rest its shape
+    level = deviations.sum(axis=1) / known.sum(axis=1)
+    shape = np.where(known, deviations - level[:, np.newaxis], 0.0)
+
+    # variance of the prediction for a new muscle, relative to that of the sample
+    freedom = n - 1
+    factor = (1.0 + 1.0 / n) * float(stdtrit(freedom, ONE_SIGMA_PROBABILITY)) ** 2
+    centred = level - level.mean()
+    level_std = float(np.sqrt(factor * centred @ centred / freedom))
+    shape_freedom = max((table.shape[1] - 1) * freedom, 1)
+    shape_std = float(np.sqrt(factor * (shape**2).sum() / shape_freedom))
+    return max(level_std, ALIKE), max(shape_std, ALIKE)

@@ -26,7 +26,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Board
 from mckibben.blocks.compose import Composition, PerChannel, Series
 from mckibben.blocks.coupled import balance_terms as at
-from mckibben.blocks.coupled.balance import Balance, balance_in
+from mckibben.blocks.coupled.balance import Balance, Placed, balance_in
 from mckibben.blocks.coupled.balance_law import AT_REST, FROM_REST, IN_TIME, update_state
 from mckibben.blocks.coupled.balance_solving import start_at_rest, start_held, unbalanced
 from mckibben.blocks.fields import STRICT, Channel
@@ -41,48 +41,65 @@ from mckibben.errors import ModelError
 def load_estimate_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Compute loads; the pseudo-inverse follows the balance's coefficients."""
+    """Compute the loads of a sample.
+
+    Inputs: m displacements, n pressures, and the schedules. Coefficients: those of the balance, then
+    the pseudo-inverse of its shares of loads, row by row. Scratch, with x, the scheduling inputs of the
+    balance, at its end:
+
+        coordinates q (m) | residual forces (m) and what they need | x: schedules | loads
+    """
     c = coefficients
     n, m = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES])
-    n_x = int(c[at.N_SCHEDULES]) + int(c[at.N_LOADS])
-    q, x, loads = scratch[:m], scratch[scratch.size - n_x :], scratch[scratch.size - outputs.size :]
+    n_loads = int(c[at.N_LOADS])
+    n_x = int(c[at.N_SCHEDULES]) + n_loads
+    q, x = scratch[:m], scratch[scratch.size - n_x :]
+    loads = x[n_x - n_loads :]
     for j in range(m):
         q[j] = inputs[j] + state[int(c[at.TARE]) + j]
-    way = FROM_REST if state[at.FRESH] != 0.0 else IN_TIME
-    estimate(c, state, way, q, inputs, loads, scratch)
-    update_state(c, state, way, q, inputs[m : m + n], x)
+    mode = FROM_REST if state[at.FRESH] != 0.0 else IN_TIME
+    estimate(c, state, mode, q, inputs, loads, scratch)
+    update_state(c, state, mode, q, inputs[m : m + n], x)
     fill(outputs, loads)
 
 
 @kernel
 def estimate(
-    c: Array, state: Array, way: int, q: Array, inputs: Array, loads: Array, scratch: Array
+    c: Array, state: Array, mode: int, q: Array, inputs: Array, loads: Array, scratch: Array
 ) -> None:
-    """Fill the loads in equilibrium at given coordinates."""
+    """Fill the loads in equilibrium at given coordinates.
+
+    ``loads`` is the end of the scheduling inputs x in the scratch: zeroed first, so that the residual
+    forces are those without load, which the loads then balance.
+    """
     n, m = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES])
-    n_x, n_loads = int(c[at.N_SCHEDULES]), int(c[at.N_LOADS])
-    x, residual = scratch[scratch.size - n_x - n_loads :], scratch[m : 2 * m]
-    for i in range(n_x):
+    n_schedules, n_loads = int(c[at.N_SCHEDULES]), int(c[at.N_LOADS])
+    x, residual = scratch[scratch.size - n_schedules - n_loads :], scratch[m : 2 * m]
+    for i in range(n_schedules):
         x[i] = inputs[m + n + i]
     for i in range(n_loads):
         loads[i] = 0.0
-    unbalanced(c, state, way, q, x, inputs[m : m + n], scratch[m:])
-    solving = c[c.size - n_loads * m :]
+    unbalanced(c, state, mode, q, x, inputs[m : m + n], scratch[m:])
+    load_pseudoinverse = c[c.size - n_loads * m :]
     for i in range(n_loads):
         for j in range(m):
-            loads[i] -= solving[i * m + j] * residual[j]
+            loads[i] -= load_pseudoinverse[i * m + j] * residual[j]
 
 
 @kernel
 def load_estimate_start(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
 ) -> None:
-    """Start as the balance does, under the frictionless loads of the first sample."""
+    """Start as the balance does, under the frictionless loads of the first sample.
+
+    The scratch is that of `load_estimate_step`; once the loads are known, its residual forces make room
+    for the pressures p of the start (n), and what these need.
+    """
     c = coefficients
     n, m = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES])
-    n_x, n_loads = int(c[at.N_SCHEDULES]), int(c[at.N_LOADS])
-    q, p, x = scratch[:m], scratch[m : m + n], scratch[scratch.size - n_x - n_loads :]
-    loads = x[n_x:]
+    n_schedules, n_loads = int(c[at.N_SCHEDULES]), int(c[at.N_LOADS])
+    q, p, x = scratch[:m], scratch[m : m + n], scratch[scratch.size - n_schedules - n_loads :]
+    loads = x[n_schedules:]
     state[:] = 0.0
     fill(q, inputs)
     estimate(c, state, AT_REST, q, inputs, loads, scratch)
@@ -171,8 +188,8 @@ class LoadEstimate(Block):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return the balance's coefficients, and the pseudo-inverse of its shares of loads."""
-        solving = np.linalg.pinv(np.array(self.forward.loads))
-        return np.concatenate([self.forward.coefficients(sample_time), solving.ravel()])
+        load_pseudoinverse = np.linalg.pinv(np.array(self.forward.loads))
+        return np.concatenate([self.forward.coefficients(sample_time), load_pseudoinverse.ravel()])
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -224,8 +241,9 @@ class ForceCompensator(Composition):
         assert self._estimate is not None
         before = self.forward.parts[:-1] if isinstance(self.forward, Series) else ()
         stages = [stage.parts for stage in before if isinstance(stage, PerChannel)]
-        acting = [pressure.inverse() for _, pressure in reversed(stages)]
-        return (*(place for place, _ in stages), self._estimate.forward, *acting)
+        on_displacement = [displacement for displacement, _ in stages]
+        on_pressure = [pressure.inverse() for _, pressure in reversed(stages)]
+        return (*on_displacement, self._estimate.forward, *on_pressure)
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
@@ -242,16 +260,16 @@ class ForceCompensator(Composition):
         return (self.forward.inputs[1],)
 
     def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
-        force, place, *scheduled = taken
-        return Series(self.parts).wired(board, [place, *scheduled, force])
+        force, displacement, *scheduled = taken
+        return Series(self.parts).wired(board, [displacement, *scheduled, force])
 
     def joined(self, parts: Sequence[str]) -> str:
         return rf"p = {'['.join(reversed(parts))}[x{']' * len(parts)}"
 
     def reachable(self) -> tuple[Array, Array]:
         """Return the identified pressures."""
-        place = [part.kind for part in self.parts].index(Balance.kind)
-        return Series(self.parts[place:]).reachable()
+        first = [part.kind for part in self.parts].index(Balance.kind)
+        return Series(self.parts[first:]).reachable()
 
     @classmethod
     def example(cls) -> Self:
@@ -307,20 +325,36 @@ def load_of(model: Block) -> Block:
             f"{model.title!r} does not estimate loads from displacements and pressures",
             remedy="identify 'balance', on recordings with a measured force",
         )
-    balance, before = placed.balance, placed.before
-    measured = [_each(block.inverse(), balance.driven) for block in placed.behind]
-    same = _each(None, balance.driven)
-    coordinates = [*measured, *(same for _ in before[len(measured) :])]
-    pressures = [_each(block, balance.given) for block in before] or [_each(None, balance.given)]
-    stages = [
-        PerChannel((*there, *acting))
-        for there, acting in zip(coordinates or [same], pressures, strict=True)
+    stages = _stages(placed)
+    estimate = LoadEstimate(placed.balance)
+    return Series((*stages, estimate)) if stages else estimate
+
+
+def _stages(placed: Placed) -> list[PerChannel]:
+    """Return the blocks on displacements and pressures that lead to those of the balance, in stages.
+
+    Each stage has a block for every displacement, then one for every pressure. Example: a model from
+    pressure to length, of a regulator's lag, an offset, the balance solved for displacements, and a
+    conversion of these to length, gives two stages: length to displacement beside the lag, and the
+    displacement unchanged beside the offset.
+    """
+    balance = placed.balance
+    on_pressures = [_of_each(block) for block in placed.before]
+    on_displacements = [_of_each(block.inverse()) for block in placed.behind]
+    n_stages = max(len(on_pressures), len(on_displacements))
+    on_pressures += [_unchanged(balance.given)] * (n_stages - len(on_pressures))
+    on_displacements += [_unchanged(balance.driven)] * (n_stages - len(on_displacements))
+    return [
+        PerChannel((*displacements, *pressures))
+        for displacements, pressures in zip(on_displacements, on_pressures, strict=True)
     ]
-    return Series((*stages, LoadEstimate(balance))) if before or measured else LoadEstimate(balance)
 
 
-def _each(block: Block | None, channels: Sequence[Channel]) -> tuple[Block, ...]:
-    """Return the block of every channel: a block's parts, or none."""
-    if block is None:
-        return tuple(Affine(1.0, 0.0, channel, channel) for channel in channels)
+def _unchanged(channels: Sequence[Channel]) -> tuple[Block, ...]:
+    """Return blocks that pass channels on as they are."""
+    return tuple(Affine(1.0, 0.0, channel, channel) for channel in channels)
+
+
+def _of_each(block: Block) -> tuple[Block, ...]:
+    """Return the block of every channel."""
     return block.parts if isinstance(block, PerChannel) else (block,)

@@ -163,7 +163,9 @@ def track(
     scored = slice(lead + round(settle / step), n)
     if scored.start >= n:
         raise ModelError(
-            "nothing is left to score", remedy="give a longer reference, or less settle"
+            "nothing is left to score",
+            parameter="settle",
+            remedy="give a longer reference, or less settle",
         )
     scheduled = reference.matrix(beside) if beside else np.empty((len(reference), 0))
     scheduled = np.concatenate([np.tile(scheduled[:1], (lead, 1)), scheduled])

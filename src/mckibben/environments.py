@@ -140,7 +140,9 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         self._pressures = [i for i, name in enumerate(outputs) if name.startswith("pressure")]
         if not self._displacements:
             raise DataError(
-                f"the rig {system.name!r} measures no displacement", remedy="choose another rig"
+                f"the rig {system.name!r} does not measure it",
+                channel="displacement",
+                remedy="choose another rig",
             )
         self._commands = [
             name

@@ -304,8 +304,9 @@ class Recording(Hinted, DrawsItself):
             if any(conversion(channel, name, 1.0) for name in self.channels):
                 remedy = f"state {REST_LENGTH}, which makes it of another"
             raise DataError(
-                f"there is no channel {channel!r}; there are {', '.join(self.channels)}",
+                f"there is no such channel; there are {', '.join(self.channels)}",
                 file=self.source,
+                channel=channel,
                 remedy=remedy,
             )
         return self.channels[channel]
@@ -550,7 +551,7 @@ def sample_time_of(
     """
     if recording.sample_time is None:
         problem = f"a recording without time cannot {purpose}"
-        raise DataError(problem, file=recording.source, remedy=remedy)
+        raise DataError(problem, file=recording.source, channel="time", remedy=remedy)
     return recording.sample_time
 
 
@@ -562,13 +563,15 @@ def check_sample_times(recordings: Sequence[Recording], *, equal: bool = True) -
             raise DataError(
                 "some recordings have time and others have none",
                 file=one.source,
+                channel="time",
                 remedy="give `rate` for those without, or use them separately",
             )
         if equal and step and usual and abs(step - usual) > SAME_TIME * usual:
             raise DataError(
                 f"the sample time is {step:g} s here and {usual:g} s in {first.name}",
                 file=one.source,
-                remedy=f"give `resample={max(step, usual):.3g}`",
+                options=[{"resample": float(f"{max(step, usual):.3g}")}],
+                remedy="give recordings of one sample time",
             )
 
 

@@ -170,8 +170,9 @@ def _tail(recordings: Sequence[Recording], channel: str, travel: float, rest: st
         described.append(f"last {len(run) - start} samples of {run.name}")
     elif not whole:
         raise DataError(
-            f"{len(recordings[-1])} samples are too few to hold out a part for a test",
+            f"{len(recordings[-1])} samples are too few to hold out a part for it",
             file=recordings[-1].source,
+            parameter="test",
             remedy="give a longer recording, or a separate test recording with `test`",
         )
     if whole:

@@ -18,6 +18,7 @@ from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.learning import READY, SENSES
+from tests.refusals import refused
 
 Array = NDArray[np.float64]
 
@@ -153,7 +154,7 @@ def test_a_memory_that_never_came_of_running_is_refused() -> None:
     for place in (-block.n_adapted + 2 * block.learnable.fitted.size, -SENSES + READY):
         spoilt = np.array(memory)
         spoilt[place] = -1.0
-        with pytest.raises(ModelError, match="'adaptive'"):
+        with refused(ModelError, parameter="memory", names="'adaptive'"):
             replace(block, memory=tuple(spoilt.tolist()))
 
 

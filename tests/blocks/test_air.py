@@ -17,6 +17,7 @@ from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.memoryless import Affine
 from mckibben.exporting import export_c
 from tests.blocks.strategies import numbers, paths
+from tests.refusals import mentions
 
 Array = NDArray[np.float64]
 
@@ -63,8 +64,9 @@ def test_a_finer_grid_gives_the_same_pressures(air: Air, u: Array, times: int) -
 def test_a_dead_time_between_samples_is_rounded_with_a_warning(tmp_path: Path) -> None:
     u = np.linspace(0.0, 9.0, 50)
     between = replace(EXAMPLE, dead_time=0.023)
-    with pytest.warns(ModelWarning, match=r"0\.023.*0\.02"):
+    with pytest.warns(ModelWarning) as caught:
         pressure = between.simulate(u, sample_time=STEP)
+    assert mentions(str(caught[0].message), (0.023, 0.02))
     np.testing.assert_array_equal(pressure, EXAMPLE.simulate(u, sample_time=STEP))
     with pytest.warns(ModelWarning, match=r"0\.023"):
         Series((between, Affine(2.0, 0.0))).stream(STEP)

@@ -33,6 +33,7 @@ from tests.blocks.balances import (
     undone,
 )
 from tests.blocks.strategies import numbers
+from tests.refusals import refused
 from tests.twins import TWINS
 
 Array = NDArray[np.float64]
@@ -127,7 +128,7 @@ def test_a_preload_is_how_hard_muscles_pull_against_each_other() -> None:
         ALONE,
         replace(CROWDED, drive=((1.0, 0.5, 0.1), (1.0, 0.5, -0.1), (1.0, 0.2, 0.4))),
     ):
-        with pytest.raises(ModelError, match="preload"):
+        with refused(ModelError, parameter="preload"):
             with_fields(block, {"preload": 1.0})
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given
 from numpy.typing import NDArray
 
@@ -25,6 +24,7 @@ from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import DISPLACEMENT
 from tests.blocks.strategies import paths, pi_models
+from tests.refusals import refused
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def test_blocks_in_parallel_take_their_inputs_by_name_and_add_outputs_of_one_nam
     stream = whole.stream(0.1)
     streamed = [np.array(stream.step(row)) for row in u]
     np.testing.assert_array_equal(streamed, whole.simulate(u, sample_time=0.1))
-    with pytest.raises(ModelError, match="pressure_1"):
+    with refused(ModelError, channel="pressure_1"):
         Parallel((made[0, 0], replace(made[0, 0], input=Channel("pressure_1", "psi"))))
 
 
@@ -125,5 +125,5 @@ def test_more_muscles_than_coordinates_are_undone_by_the_least_of_them() -> None
     np.testing.assert_allclose(block.simulate(v), h, atol=1e-14)
     np.testing.assert_allclose(v @ [0.9, 0.9, 0.9], 0.0, atol=1e-14)  # they pull together at none
     np.testing.assert_allclose(block.inverse().inverse().simulate(v), h, atol=1e-14)
-    with pytest.raises(ModelError, match="3 inputs and 2 outputs"):
+    with refused(ModelError, names=(3, 2)):
         _ = block.radius

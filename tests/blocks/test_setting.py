@@ -12,6 +12,7 @@ from mckibben.blocks.force.activation import ActivationPressure
 from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.setting import settable, with_fields
 from mckibben.papers.paper import printed
+from tests.refusals import mentions, refused
 
 
 @pytest.mark.parametrize("kind", registry.names("blocks"))
@@ -49,11 +50,12 @@ def with_still(model: Block) -> Series:
 
 def test_beyond_what_was_identified_it_warns_and_what_was_is_refused() -> None:
     model = printed("activation-pressure-profile")
-    with pytest.warns(ModelWarning, match=r"frequency is set to 3.*from 0\.5.* to 2"):
+    with pytest.warns(ModelWarning) as caught:
         with_fields(model, {"frequency": 3.0})
-    with pytest.raises(ModelError, match="frequency, rate_time_constant"):
+    assert mentions(str(caught[0].message), ("frequency", "3.00", "0.500", "2.00"))
+    with refused(ModelError, parameter="gamma", names=("frequency", "rate_time_constant")):
         with_fields(model, {"gamma": (0.0, 1.0)})
-    with pytest.raises(ModelError, match="frequency"):
+    with refused(ModelError, parameter="frequency"):
         with_fields(model, {"frequency": -1.0})
-    with pytest.raises(ModelError, match="leave it out"):
+    with refused(ModelError, parameter="frequency"):
         with_fields(Affine.example(), {"frequency": 1.0})

@@ -16,6 +16,7 @@ from mckibben.measured.scoring import KEYS, START, entries
 from mckibben.measured.sets import parted, sets_in, split_of
 from mckibben.signals import irregular_triangle
 from tests.cli.conftest import Cli
+from tests.refusals import refused
 
 TIME = np.arange(0, 30, 0.02)
 MODELS = ["pi", "gpi"]
@@ -137,7 +138,7 @@ def test_a_set_that_cannot_be_read_is_said_and_the_rest_goes_on(folder: Path) ->
     [
         ({"cuts": 0.5}, "split.cuts"),
         ({"tasks": [{"cut": 1.5}]}, "split.tasks.0.cut"),
-        ({"tasks": [{"cut": 0.5, "test": ["a"]}]}, "test, leave_out and cut"),
+        ({"tasks": [{"cut": 0.5, "test": ["a"]}]}, "leave_out"),
         ({"tasks": []}, "split.tasks"),
         ({"tasks": [{"name": "a"}, {"name": "a"}]}, "name"),
         ({"resample": -1.0}, "split.resample"),
@@ -145,16 +146,15 @@ def test_a_set_that_cannot_be_read_is_said_and_the_rest_goes_on(folder: Path) ->
     ],
 )
 def test_what_cannot_be_a_split_is_refused_by_its_name(given: dict[str, object], said: str) -> None:
-    with pytest.raises(DataError, match=r"channels\.toml") as caught:
+    with refused(DataError, file="channels.toml", names=said):
         split_of(given)
-    assert said in str(caught.value)
 
 
 def test_each_pattern_has_to_match_something(folder: Path) -> None:
     text = (folder / "volts" / "channels.toml").read_text().replace('"run4"', '"run4", "run9"')
     (folder / "volts" / "channels.toml").write_text(text)
     _, volts = sets_in(folder)
-    with pytest.raises(DataError, match=r"run9.*run2, run3, run4"):
+    with refused(DataError, file=folder / "volts", names=("run9", "run2", "run3", "run4")):
         parted(volts.split.tasks[0], volts.recordings(), volts.folder)
 
 
@@ -243,15 +243,14 @@ def test_the_metrics_are_those_of_the_comparison(folder: Path, tmp_path: Path) -
         (lambda rows: rows.drop(columns="row"), "row"),
         (lambda rows: pd.concat([rows, rows[-1:]]), "twice"),
         (lambda rows: rows.assign(set="other"), "volts"),
-        (lambda rows: rows.assign(task="other"), "none of the tasks"),
+        (lambda rows: rows.assign(task="other"), "tasks"),
     ],
 )
 def test_predictions_that_are_not_whole_are_refused(
     folder: Path, tmp_path: Path, change: Callable[[pd.DataFrame], pd.DataFrame], said: str
 ) -> None:
-    with pytest.raises(DataError, match=r"mine\.csv") as caught:
+    with refused(DataError, file=tmp_path / "mine.csv", names=said):
         scored(folder, tmp_path, change(predictions(folder, "last run", ["run4"])))
-    assert said in str(caught.value)
 
 
 def test_splits_are_written_and_predictions_of_them_scored_in_lines(

@@ -17,6 +17,7 @@ from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.laws import trial_limits, wander
 from mckibben.registry import load, names
 from mckibben.system.compiling import deferred
+from tests.refusals import refused
 
 Array = NDArray[np.float64]
 
@@ -139,5 +140,5 @@ def _outside(x: float) -> float:
 
 
 def test_functions_without_derivative_are_refused_by_name() -> None:
-    with pytest.raises(ModelError, match=r"np\.i0"):
+    with refused(ModelError, names="np.i0"):
         twin(_outside)

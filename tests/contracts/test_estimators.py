@@ -19,6 +19,7 @@ from mckibben import load as load_model
 from mckibben.blocks.free_runs import FreeRuns
 from tests.estimators.examples import CASES, KINDS, quick, recorded, resolved
 from tests.estimators.examples import few_steps as few_steps  # a fixture
+from tests.refusals import refused
 
 pytestmark = [
     pytest.mark.parametrize(("name", "kind"), CASES),
@@ -184,7 +185,7 @@ def test_absent_channels_are_named(name: str, kind: str) -> None:
     model = fitted(name, kind).model_
     for channel in (one.name for one in (*model.inputs, *model.outputs)):
         bare = first.select([other for other in made.channels if other != channel])
-        with pytest.raises(DataError, match=channel):
+        with refused(DataError, channel=channel):
             quick(name, kind).fit([*recorded(kind)[1:], bare])
 
 
@@ -194,9 +195,9 @@ def test_bad_recordings_and_settings_are_refused(name: str, kind: str) -> None:
     for bad in ([], [run.slice(0, 2) for run in runs]):
         with pytest.raises(DataError):
             fit(bad)
-    with pytest.raises(DataError, match=given):
+    with refused(DataError, channel=given):
         fit([run.with_channels(**{given: np.ones(len(run))}) for run in runs])
-    with pytest.raises(ModelError, match=r"seed.*-1"):
+    with refused(ModelError, parameter="seed", names=-1):
         quick(name, kind, seed=-1).fit(runs)
     assert not hasattr(quick(name, kind), "model_")
 

@@ -15,6 +15,7 @@ from mckibben.blocks.repetition import Repetition
 from mckibben.control import Twin, learn, learned
 from mckibben.workflow import learn as from_files
 from mckibben.workflow import track
+from tests.refusals import refused
 
 STEP, N = 0.02, 1000
 DISPLACEMENT, PRESSURE = Channel("displacement", "mm"), Channel("pressure", "bar")
@@ -121,9 +122,9 @@ def test_recordings_that_are_no_repetitions_are_refused() -> None:
     for runs in ([], [run, other], [run, run.slice(0, N // 2)], [run.select(["displacement"])]):
         with pytest.raises(DataError):
             learned(EXACT, runs)
-    with pytest.raises(ModelError, match="repetitions"):
+    with refused(ModelError, parameter="repetitions"):
         learn(EXACT, lambda block: run, 0)
-    with pytest.raises(ModelError, match="ahead"):
+    with refused(ModelError, parameter="ahead"):
         learned(EXACT, [run], ahead=N)
 
 

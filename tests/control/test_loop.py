@@ -15,6 +15,7 @@ from mckibben.blocks.feedback import FeedforwardFeedback, PIDFeedback
 from mckibben.blocks.fields import Channel
 from mckibben.control import DisturbanceObserver, Twin, control_law, track, tune_pid
 from mckibben.control.pressure_loop import PressureLoop
+from tests.refusals import refused
 
 BLOCK = PI.example()
 LOW, HIGH = (float(end[0]) for end in BLOCK.reachable())
@@ -76,31 +77,31 @@ def test_noise_beyond_a_range_is_no_wish() -> None:
         *[(0.0,) * 3] * 3,
         limits=(0.0, 2.5),
     )
-    for first, refused in ((-0.02, False), (2.52, False), (-10.0, True), (17.0, True)):
+    for first, is_refused in ((-0.02, False), (2.52, False), (-10.0, True), (17.0, True)):
         columns = dict.fromkeys(names, np.full(3, 30.0))
         extensor = np.array([first, 1.0, 1.0])
         wanted = Recording(columns | {"pressure_extensor": extensor}, 0.05)
-        with pytest.raises(DataError) if refused else nullcontext():
+        with pytest.raises(DataError) if is_refused else nullcontext():
             track(pid, load_rig("soft-arm"), wanted, approach=0.1)
 
 
 def test_bad_loops_are_refused() -> None:
     controller = BLOCK.inverse()
-    with pytest.raises(DataError, match="displacement"):
+    with refused(DataError, names="displacement"):
         track(controller, plant(), Recording({"pressure": np.ones(10)}, 0.02))
     with pytest.raises(DataError):
         track(controller, plant(), Recording({"displacement": np.ones(10)}, None))
-    with pytest.raises(ModelError, match="slew"):
+    with refused(ModelError, parameter="slew"):
         track(controller, plant(), reference(), slew=-1.0)
-    with pytest.raises(ModelError, match="settle"):
+    with refused(ModelError, parameter="settle"):
         track(controller, plant(), reference(1), settle=1e3)
-    with pytest.raises(ModelError, match="ki"):
+    with refused(ModelError, parameter="ki"):
         PIDFeedback.of(BLOCK.outputs, BLOCK.inputs, (1.0, 2.0), (1.0,), limits=(0.0, 5.0))
-    with pytest.raises(ModelError, match="bang"):
+    with refused(ModelError, names="'bang'"):
         control_law("bang", controller, PIDFeedback.example)
-    with pytest.raises(ModelError, match="preview"):
+    with refused(ModelError, parameter="preview"):
         track(controller, plant(), reference(), preview=-1.0)
-    with pytest.raises(ModelError, match="filter_time"):
+    with refused(ModelError, parameter="filter_time"):
         DisturbanceObserver(BLOCK.inverse(), filter_time=0.0)
 
 

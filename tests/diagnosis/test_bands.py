@@ -23,6 +23,7 @@ from mckibben.diagnosis.bands import (
     outside,
 )
 from mckibben.signals import random_wave, triangle
+from tests.refusals import refused
 
 MODEL = GPI.example()
 STEP = 0.1
@@ -163,7 +164,7 @@ def test_samples_beyond_the_calibration_are_counted(banded: Banded) -> None:
 def test_a_band_of_an_older_shape_is_refused_with_the_remedy(banded: Banded) -> None:
     saved = banded.to_dict()
     saved["band"] = saved["band"] | {"bells": [], "sharpness": 1.0}
-    with pytest.raises(ModelError, match="calibrate the model again"):
+    with refused(ModelError, parameter="bells", names="calibrate"):
         from_dict(saved)
 
 
@@ -186,19 +187,19 @@ def test_what_it_cannot_calibrate_on_is_refused(banded: Banded) -> None:
     slower = Recording(dict(runs[0].channels), 2 * STEP)
     still = runs[0].with_channels({"displacement": "mm"}, displacement=np.zeros(len(runs[0])))
     drift = MODEL.simulate(runs[0]["pressure"]) + np.linspace(0.0, 5.0, len(runs[0]))
-    for bad, said in (
-        ([], None),
-        ([runs[0], slower], "sample time"),
-        ([runs[0].select(["pressure"])], "displacement"),
-        ([runs[0].select(["displacement"])], "pressure"),
-        ([runs[0], runs[0], runs[1]], "twice"),
-        ([runs[0].with_channels(displacement=drift)], None),
+    for bad, fields in (
+        ([], {"parameter": "recordings"}),
+        ([runs[0], slower], {"options": ({"resample": 2 * STEP},)}),
+        ([runs[0].select(["pressure"])], {"channel": "displacement"}),
+        ([runs[0].select(["displacement"])], {"channel": "pressure"}),
+        ([runs[0], runs[0], runs[1]], {"names": "twice"}),
+        ([runs[0].with_channels(displacement=drift)], {}),
     ):
-        with pytest.raises(DataError, match=said):
+        with refused(DataError, **fields):
             calibrate(MODEL, bad)
     with pytest.raises(ModelError):
         calibrate(MODEL, [still])
-    with pytest.raises(DataError, match="fitted to"):
+    with refused(DataError, names="fitted"):
         calibrate(MODEL, runs, fitted=[runs[1]])
     with pytest.raises(ModelError):
         calibrate(MODEL.inverse(), runs)

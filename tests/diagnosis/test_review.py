@@ -14,6 +14,7 @@ from mckibben.diagnosis.review import Delay, Refit, Review
 from mckibben.files.headers import channel_of, parse
 from tests.cli.conftest import cli as cli  # a fixture
 from tests.diagnosis.faulty import Faulty
+from tests.refusals import refused
 
 MUSCLE = PI(thresholds=(0.0, 0.3, 0.8, 1.5), weights=(4.0, 1.0, 0.6, 0.4))
 STEP = 0.02
@@ -123,13 +124,13 @@ def test_without_commands_pressures_are_compared_with_the_compensators() -> None
 
 def test_what_is_no_log_is_refused() -> None:
     log, _ = logged(0, noise=0.05)
-    for bad, said in (
-        (log.select(["pressure", "displacement"]), "reference"),
+    for bad, channel in (
+        (log.select(["pressure", "displacement"]), "reference_displacement"),
         (log.select(["reference_displacement", "displacement"]), "pressure"),
     ):
-        with pytest.raises(DataError, match=said):
+        with refused(DataError, channel=channel):
             review(bad, model=MUSCLE)
-    with pytest.raises(ModelError, match="with model"):
+    with refused(ModelError, parameter="model"):
         review(log)
 
 

@@ -29,6 +29,7 @@ from mckibben.estimators.catalogue import (
 from mckibben.estimators.core.estimator import Estimator, Purpose
 from mckibben.estimators.hysteresis.pi import PIEstimator
 from mckibben.parsers import setting
+from tests.refusals import refused
 
 FITTED = Path(__file__).parents[2] / "docs" / "models" / "fitted"
 MODELS = registry.names("estimators")
@@ -95,7 +96,7 @@ def test_a_load_that_some_recordings_lack_is_an_objection_of_those_that_are_told
 
 def test_settings_of_another_model_are_refused() -> None:
     for name in ("gpi", "pii"):
-        with pytest.raises(ModelError, match=name):
+        with refused(ModelError, parameter=f"{name}.seed"):
             settings_of("pi", {f"{name}.seed": 3})
 
 
@@ -114,5 +115,5 @@ def test_a_bare_setting_goes_to_the_models_that_have_it() -> None:
     both = {"pi": PIEstimator, "bouc-wen": other}
     found = settings_of_all(both, {"n_operators": 7, "bouc-wen.seed": 3})
     assert found == {"pi": {"n_operators": 7}, "bouc-wen": {"seed": 3}}
-    with pytest.raises(ModelError, match="n_operators"):
+    with refused(ModelError, parameter="n_operators"):
         settings_of_all({"bouc-wen": other}, {"n_operators": 7})

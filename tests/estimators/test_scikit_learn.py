@@ -32,6 +32,7 @@ from mckibben.estimators.coupled.play_ridge import PlayRidgeEstimator
 from mckibben.registry import load
 from tests.estimators.examples import CASES, KINDS, quick, recorded
 from tests.estimators.examples import few_steps as few_steps  # a fixture
+from tests.refusals import refused
 
 # -- its checks ------------------------------------------------------------------------------------
 
@@ -304,9 +305,9 @@ def test_columns_of_frames_are_found_by_their_names() -> None:
     )
     assert estimator.fit(pd.DataFrame(X), pd.Series(Y), sample_time=0.07).model_ == expected
     for wrong in (frame.drop(columns=TWO[0]), frame.rename(columns={TWO[0]: "pressure_9"})):
-        with pytest.raises(DataError, match=TWO[0]):
+        with refused(DataError, channel=TWO[0]):
             estimator.fit(wrong, Y)
-    with pytest.raises(DataError, match="sample_time"):
+    with refused(DataError, parameter="sample_time"):
         estimator.fit(frame, Y, sample_time=0.1)
 
 
@@ -334,6 +335,7 @@ def test_arrays_need_no_scikit_learn(tmp_path: Path) -> None:
 import sys
 import numpy as np
 from mckibben import PIEstimator
+from tests.refusals import refused
 sys.modules["sklearn"] = None
 u = np.sin(np.arange(300) / 20)
 estimator = PIEstimator(n_operators=2)

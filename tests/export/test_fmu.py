@@ -22,6 +22,7 @@ from mckibben.exporting import export_fmu
 from mckibben.exporting.fmu.unit import own_platform
 from tests.export.building import SAMPLE_TIME
 from tests.export.models import MODELS, difference, path_for, simulated
+from tests.refusals import refused
 from tests.tools import needs
 
 Array = NDArray[np.float64]
@@ -177,9 +178,9 @@ def test_communication_steps_may_be_longer_or_shorter_than_the_models(tmp_path: 
 
 def test_what_makes_no_fmu_is_refused(tmp_path: Path) -> None:
     block = MODELS["pi"]
-    with pytest.raises(DataError, match=r"\.fmu"):
+    with refused(DataError, file=tmp_path / "model.zip"):
         export_fmu(block, tmp_path / "model.zip")
-    with pytest.raises(ModelError, match="sample_time"):
+    with refused(ModelError, parameter="sample_time"):
         export_fmu(MODELS["creep"], tmp_path / "model.fmu", library=False)
     assert list(tmp_path.iterdir()) == []
 

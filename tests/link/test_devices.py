@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from mckibben.link import Link, LinkError
 from tests.export.building import build
 from tests.export.models import path_for
 from tests.golden.commands import call
+from tests.refusals import refused
 from tests.tools import needs
 
 SAMPLE_TIME = 0.02
@@ -43,11 +45,11 @@ def test_a_device_gives_the_numbers_of_the_export(emulated: bool, tmp_path: Path
 
 def test_a_port_that_cannot_be_opened_or_is_gone_is_an_error() -> None:
     for wrong in (__file__, "/dev/null", "/absent"):
-        with pytest.raises(DataError, match=wrong):
+        with refused(DataError, file=wrong):
             Link(wrong)
     ours, theirs = os.openpty()
     name = os.ttyname(theirs)
-    with pytest.raises(LinkError, match="nothing has answered"):
+    with refused(LinkError, parameter="patience"):
         Link(name, patience=0.1)
     os.close(ours)
     with pytest.raises(DataError):
@@ -65,17 +67,22 @@ def test_the_command_line_shows_a_device(tmp_path: Path) -> None:
         assert "displacement" in looked.out
 
 
-REFUSED = {
-    "pressure, displacement": Serving(),
-    "displacement is 90": Serving(SERVING.limits, {"displacement": 90.0}),
-    "'speed'": Serving({"speed": (0.0, 1.0)}),
-    "watchdog: it is 0.001": Serving(SERVING.limits, watchdog=0.001),
-    "pressure are 3 and 1": Serving({**SERVING.limits, "pressure": (3.0, 1.0)}),
-}
+REFUSED: list[tuple[dict[str, Any], Serving]] = [
+    ({"parameter": "limits", "names": ("pressure", "displacement")}, Serving()),
+    ({"channel": "displacement", "names": 90}, Serving(SERVING.limits, {"displacement": 90.0})),
+    ({"channel": "speed"}, Serving({"speed": (0.0, 1.0)})),
+    ({"parameter": "watchdog", "names": 0.001}, Serving(SERVING.limits, watchdog=0.001)),
+    (
+        {"channel": "pressure", "names": (3, 1)},
+        Serving({**SERVING.limits, "pressure": (3.0, 1.0)}),
+    ),
+]
 
 
-@pytest.mark.parametrize("named", REFUSED)
-def test_what_cannot_be_served_is_refused(named: str, tmp_path: Path) -> None:
-    serving, block = REFUSED[named], examples()["play"]
-    with pytest.raises(ModelError, match=named):
+@pytest.mark.parametrize(("fields", "serving"), REFUSED)
+def test_what_cannot_be_served_is_refused(
+    fields: dict[str, Any], serving: Serving, tmp_path: Path
+) -> None:
+    block = examples()["play"]
+    with refused(ModelError, **fields):
         export_c(block, tmp_path / "c", sample_time=SAMPLE_TIME, serving=serving)

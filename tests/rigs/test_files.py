@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from mckibben import DataError
 from mckibben.rigs import describe, load_rig, save_rig
 from mckibben.system.ordinary import DESCRIPTION
+from tests.refusals import refused
 
 GOOD = describe(load_rig("mas20-hanging"))
 
@@ -68,14 +70,14 @@ def test_impossible_and_unknown_parameters_are_refused_by_name(path: str) -> Non
 def test_a_wrong_file_is_refused_by_name(text: str | bytes, named: str, tmp_path: Path) -> None:
     file = tmp_path / "rig.toml"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(DataError, match=named) as refused:
+    with refused(DataError, file=file) as told:
         load_rig(file)
-    assert str(file) in str(refused.value)
+    assert re.search(named, told.value.problem)
 
 
 def test_names_of_no_rig_are_refused(tmp_path: Path) -> None:
     for wrong in ("mas30", tmp_path / "missing.toml"):
-        with pytest.raises(DataError, match=str(wrong)):
+        with refused(DataError, names=wrong):
             load_rig(wrong)
-    with pytest.raises(DataError, match=r"\.toml"):
+    with refused(DataError, file=tmp_path / "rail.json"):
         save_rig(load_rig("rail"), tmp_path / "rail.json")

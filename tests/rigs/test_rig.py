@@ -12,6 +12,7 @@ from mckibben import DataError, DataWarning
 from mckibben.recording import Recording, base_name
 from mckibben.rigs import load_rig, rig_names, save_rig
 from mckibben.signals import irregular_triangle, sine
+from tests.refusals import refused
 
 
 @pytest.mark.parametrize("name", rig_names())
@@ -102,12 +103,12 @@ def test_wrong_inputs_and_actions_are_refused() -> None:
     with pytest.raises(DataError):  # before it is reset
         rig.step([1.0, 0.0])
     rig.reset()
-    with pytest.raises(DataError, match=r"\[1.0\]"):
+    with refused(DataError, channel=None, names="force"):
         rig.step([1.0])
-    with pytest.raises(DataError, match="force"):
+    with refused(DataError, channel="force"):
         rig.step([1.0, np.nan])
-    with pytest.raises(DataError, match="pressure"):
+    with refused(DataError, channel="pressure"):
         rig.step({"pressure": 1.0})
-    with pytest.raises(DataError, match="-1"):
+    with refused(DataError, parameter="seed"):
         rig.reset(seed=-1)
     assert rig.step({"voltage": 3.0}).shape == (3,)

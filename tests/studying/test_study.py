@@ -19,6 +19,7 @@ from mckibben.rigs import load_rig
 from mckibben.signals import triangle
 from mckibben.studying.study import closed_loops, named, recorded_rig
 from tests.blocks.balances import CROWDED
+from tests.refusals import refused
 
 TIME = np.arange(0, 24, 0.02)
 
@@ -128,16 +129,18 @@ def test_a_loop_is_closed_on_the_rig_as_it_was_changed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("meta", "match"),
+    ("meta", "fields"),
     [
-        ({"rig": "rail v2 (virtual)"}, "rail"),
-        ({"rig": "rail v0 (virtual)", "rig_changes": {}}, "rail v0"),
-        ({"rig": "rail v2 (virtual)", "rig_changes": {"crane": 1}}, "crane"),
-        ({}, "rig"),
+        ({"rig": "rail v2 (virtual)"}, {"names": "rail"}),
+        ({"rig": "rail v0 (virtual)", "rig_changes": {}}, {"names": "v0"}),
+        ({"rig": "rail v2 (virtual)", "rig_changes": {"crane": 1}}, {"parameter": "crane"}),
+        ({}, {"names": "rig"}),
     ],
 )
-def test_no_loop_is_closed_on_a_rig_that_is_not_known(meta: dict[str, Any], match: str) -> None:
+def test_no_loop_is_closed_on_a_rig_that_is_not_known(
+    meta: dict[str, Any], fields: dict[str, Any]
+) -> None:
     given = Recording({"voltage": np.linspace(0, 3, 20)}, 0.05)
     other = load_rig("rail").run(given)
-    with pytest.raises(DataError, match=match):
+    with refused(DataError, **fields):
         recorded_rig([given.with_meta(**meta), other])

@@ -186,6 +186,7 @@ class Adaptive(Block):
                 raise ModelError(
                     f"the memory of {self.kind!r} has {len(self.memory)} numbers, its "
                     f"state {self.n_states}",
+                    parameter="memory",
                     remedy="resume what was saved with the same model",
                 )
             self._check_memory(np.array(self.memory))
@@ -215,7 +216,8 @@ class Adaptive(Block):
         counts = (senses[:, READY] >= 0) & (senses[:, READY] <= p) & (senses[:, USUAL] > 0)
         if not (counts.all() and (root[:p] > 0).all()):
             raise ModelError(
-                f"the covariance or errors in the memory of {self.kind!r} are not positive",
+                f"the covariance or errors in that of {self.kind!r} are not positive",
+                parameter="memory",
                 remedy="save the model afresh, or resume what was saved unchanged",
             )
         for parameters in (theta, used):

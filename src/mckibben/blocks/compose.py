@@ -243,6 +243,7 @@ class Series(Composition):
                 raise ModelError(
                     f"{before.kind!r} has {len(before.outputs)} output(s), "
                     f"{after.kind!r} after it takes {driven}",
+                    parameter="parts",
                     remedy="connect blocks with matching channels",
                 )
 
@@ -300,6 +301,7 @@ class Series(Composition):
                 raise ModelError(
                     f"{part.kind!r} has a saved start state and depends on the rate, so "
                     "parts after it would start from another sample than in Python",
+                    parameter="initial",
                     remedy="start it from 'first_sample'",
                 )
             driven = signals[: part.n_driven]
@@ -347,8 +349,9 @@ class Parallel(Composition):
             for channel in (c for part in self.parts for c in getattr(part, side)):
                 if units.setdefault(channel.name, channel.unit) != channel.unit:
                     raise ModelError(
-                        f"parts of {self.kind!r} have {channel.name} in "
+                        f"parts of {self.kind!r} have it in "
                         f"{units[channel.name]!r} and {channel.unit!r}",
+                        channel=channel.name,
                         remedy="put blocks in parallel whose units agree",
                     )
 

@@ -98,7 +98,8 @@ def wide(ends: tuple[float, float]) -> tuple[float, float]:
     if NARROWEST <= width < np.inf and width >= NARROWEST_SHARE * (abs(low) + abs(high)):
         return ends
     raise ModelError(
-        f"the input range {ends} is empty, or too narrow or wide to compute with",
+        f"{ends} is empty, or too narrow or wide to compute with",
+        parameter="input_range",
         remedy="give (lowest, highest)",
     )
 

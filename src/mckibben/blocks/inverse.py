@@ -71,7 +71,9 @@ class Invertible(Block):
             return
         if self.input_range is None:
             raise ModelError(
-                f"{self.kind!r} has no inverse without an input range", remedy="give input_range"
+                f"{self.kind!r} has no inverse without it",
+                parameter="input_range",
+                remedy="give the lowest and highest input",
             )
         steepness = self.least_slope()
         if not steepness > 0:

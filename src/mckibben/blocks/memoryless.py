@@ -276,7 +276,9 @@ class Polynomial(Invertible):
     def check_invertible(self) -> None:
         if self.input_range is None:
             raise ModelError(
-                "'polynomial' has no inverse without an input range", remedy="give input_range"
+                "'polynomial' has no inverse without it",
+                parameter="input_range",
+                remedy="give the lowest and highest input",
             )
         slopes = slopes_at(self.polynomial, *self._arguments())
         if slopes.min() < -1e-12 * np.abs(slopes).max() or slopes.max() <= 0:

@@ -77,7 +77,8 @@ class Checked(ABCMeta):
             kind = getattr(cls, "kind", cls.__name__)
             given = "" if first["type"] == "missing" else f", but it is {first['input']!r:.60}"
             raise ModelError(
-                f"{where} of {kind!r}: {first['msg']}{given}",
+                f"of {kind!r}: {first['msg']}{given}",
+                parameter=where,
                 remedy=f"give what {cls.__name__} documents",
             ) from None
 
@@ -87,13 +88,18 @@ def _check_declared(part: Parametrised) -> None:
     for name in part.increasing:
         if np.any(np.diff(getattr(part, name)) <= 0):
             raise ModelError(
-                f"the {name} of {part.kind!r} do not increase",
+                f"those of {part.kind!r} do not increase",
+                parameter=name,
                 remedy="sort them and drop repeated ones",
             )
     sizes = {name: len(getattr(part, name)) for name in part.same_length}
     if len(set(sizes.values())) > 1:
         listed = ", ".join(f"{size} {name}" for name, size in sizes.items())
-        raise ModelError(f"{part.kind!r} has {listed}", remedy="give as many of each")
+        raise ModelError(
+            f"{part.kind!r} has {listed}",
+            parameter=min(sizes, key=sizes.__getitem__),
+            remedy="give as many of each",
+        )
 
 
 class Parametrised(metaclass=Checked):

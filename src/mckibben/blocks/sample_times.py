@@ -17,7 +17,8 @@ def needs_sample_time(kind: str, sample_time: float | None) -> float:
     """Return the sample time; raise an error if a rate-dependent block has none."""
     if sample_time is None or not sample_time > 0:
         raise ModelError(
-            f"{kind!r} depends on rate and needs a sample time, but the data have no time",
+            f"{kind!r} depends on rate and needs it, but the data have no time",
+            parameter="sample_time",
             remedy="read the recording with a column of times or `rate`, or give `sample_time`",
         )
     return sample_time
@@ -34,7 +35,8 @@ def own_sample_time(kind: str, own: float, sample_time: float | None) -> float:
     step = needs_sample_time(kind, sample_time)
     if abs(step - own) > 1e-3 * own:
         raise ModelError(
-            f"{kind!r} holds for a sample time of {own:g} s, but the data have {step:g} s",
+            f"{kind!r} holds for {own:g} s, but the data have {step:g} s",
+            parameter="sample_time",
             remedy=f"resample them to {own:g} s, or identify the model again",
         )
     return own

@@ -77,7 +77,7 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
     known, read = {field.name for field in fields(cls)}, _READ.get()
     remedy = getattr(cls, "made_again", "save the model again")
     if unknown := sorted(values.keys() - known, key=str):
-        raise ModelError(f"{kind!r} has no field {unknown[0]!r}", remedy=remedy)
+        raise ModelError(f"{kind!r} has no such field", parameter=unknown[0], remedy=remedy)
     since = getattr(cls, "added", {})
     lacking = (name for name in known - values.keys() if read and read >= since.get(name, 1))
     if missing := sorted(lacking):
@@ -112,7 +112,8 @@ def load(path: str | Path) -> Block:
     except DataError as error:
         problem, remedy = error.problem, error.remedy
     except ModelError as error:
-        raise ModelError(error.problem, file=path, remedy=error.remedy) from None
+        error.file = path
+        raise error from None
     except (ValueError, RecursionError) as error:
         problem = f"it is not readable as a model ({str(error)[:200]})"
         remedy = "save the model again"

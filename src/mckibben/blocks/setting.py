@@ -41,7 +41,8 @@ def with_fields(model: Block, values: Mapping[str, Any]) -> Block:
         if name not in known:
             listed = f"set one of {', '.join(known)}" if known else "leave it out"
             raise ModelError(
-                f"{name!r} of {model.title!r} cannot be set: it is identified, or no such field",
+                f"{model.title!r} does not let it be set: it is identified, or no such field",
+                parameter=name,
                 remedy=f"{listed}",
             )
 

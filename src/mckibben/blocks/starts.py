@@ -38,12 +38,14 @@ def stated(kind: str, n_states: int, initial: Initial) -> Array:
     if isinstance(initial, str):
         raise ModelError(
             f"{kind!r} has no start {initial!r}",
+            parameter="initial",
             remedy=f"give 'first_sample', 'virgin', or {n_states} numbers",
         )
     state = np.array(initial, dtype=np.float64)
     if state.shape != (n_states,) or not np.isfinite(state).all():
         raise ModelError(
             f"{kind!r} has {n_states} states, the initial state given has shape {state.shape}",
+            parameter="initial",
             remedy=f"give {n_states} finite numbers, or 'first_sample'",
         )
     return state

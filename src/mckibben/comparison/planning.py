@@ -136,7 +136,7 @@ def _data_of(
     every = [one for side in sides for one in side]
     notes = reading_notes(every)
     if not sides[0]:
-        raise DataError("there are no recordings to fit", remedy="give at least one")
+        raise DataError("there are none to fit", parameter="recordings", remedy="give at least one")
     channels = channels or channels_of(every, chosen.input, chosen.output, chosen.load)
     unit = _unit_of(sides, channels)
     sides = [[one.with_derived(channels.sides) for one in side] for side in sides]
@@ -192,6 +192,7 @@ def _unit_of(sides: Sequence[Sequence[Recording]], channels: Channels) -> str:
     if len(set(units.values())) > 1:
         raise DataError(
             f"the outputs have different units: {units}, so that their errors have no mean",
+            parameter="output",
             remedy="compare models of each separately, with `output`",
         )
     return data.outputs[0].unit

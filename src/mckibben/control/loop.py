@@ -168,7 +168,9 @@ def track(
     scored = slice(n_approach + round(settle / step), n_approach + len(reference))
     if scored.start >= scored.stop:
         raise ModelError(
-            "nothing is left to score", remedy="give a longer reference, or less settle"
+            "nothing is left to score",
+            parameter="settle",
+            remedy="give a longer reference, or less settle",
         )
     commands = _Commands.of(plant, offer, step, pressure_loop=pressure_loop, slew=slew)
     controller.reset(step)

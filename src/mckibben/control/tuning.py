@@ -184,7 +184,8 @@ def _simc(
     final = float(_settled(response).mean())
     if not _moves(response):
         raise ModelError(
-            f"{name} has no effect",
+            "it has no effect",
+            channel=name,
             remedy=f"check the plant, or its middle {name.partition('_')[0]}",
         )
     way = np.sign(final)  # a displacement that counts stretching falls as pressure rises

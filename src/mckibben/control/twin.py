@@ -101,6 +101,7 @@ class Twin:
             raise ModelError(
                 f"{self.forward.title!r} is a model of steps of {own:g} s, and a loop of "
                 f"{self.sample_time:g} s is closed on it",
+                parameter="sample_time",
                 remedy="resample the reference to that, or take a model of any sample time",
             )
         self.held = dict(held or {})
@@ -140,7 +141,8 @@ class Twin:
         """
         if name not in self._limits:
             raise ModelError(
-                f"{self.forward.title!r} has no limits of {name}",
+                f"{self.forward.title!r} has no limits of it",
+                channel=name,
                 remedy=f"give `limits[{name}]=LOW:HIGH`, or calibrate it",
             )
         return self._limits[name]
@@ -164,7 +166,8 @@ class Twin:
                 held[setting.removeprefix("start.")] = float(value)
             else:
                 raise DataError(
-                    f"a twin has no setting {setting!r}",
+                    "a twin has no such setting",
+                    parameter=setting,
                     remedy="give sample_time, or start.NAME",
                 )
         return type(self)(

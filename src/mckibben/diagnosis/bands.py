@@ -183,7 +183,8 @@ def calibrate(
             remedy="calibrate the model that was inverted",
         )
     if not recordings:
-        raise DataError("there is nothing to calibrate on", remedy="give at least one recording")
+        problem = "there are none to calibrate on"
+        raise DataError(problem, parameter="recordings", remedy="give at least one")
     check_sample_times(recordings)
     for recording in recordings:
         check_units(recording, model.outputs)

@@ -263,7 +263,8 @@ def check(
 def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
     """Raise an error for recordings that cannot test a model; see `check`."""
     if not recordings:
-        raise DataError("there is no recording to check the model on", remedy="give at least one")
+        problem = "there are none to check the model on"
+        raise DataError(problem, parameter="recordings", remedy="give at least one")
     for recording in recordings:
         check_units(recording, (*block.inputs, *block.outputs))
         if len(recording) < FEWEST_IN_EACH:

@@ -143,7 +143,8 @@ def excitation(
     """Return the excitation of recordings; parameters and errors as in `data_gaps`."""
     every = listed(recordings)
     if not every:
-        raise DataError("there are no recordings to judge", remedy="give at least one")
+        problem = "there are none to judge"
+        raise DataError(problem, parameter="recordings", remedy="give at least one")
     found = channels_of(every, inputs, outputs)
     driven = (*(name for name in found.offered if name == PRESSURE), *found.inputs)
     names = (*driven, *found.outputs)

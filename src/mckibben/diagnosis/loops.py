@@ -116,7 +116,8 @@ def prepare(
         On no recordings, a missing channel, fewer than ten samples, or a channel that hardly moves.
     """
     if not recordings:
-        raise DataError("there is no recording to characterize", remedy="give at least one")
+        problem = "there are none to characterize"
+        raise DataError(problem, parameter="recordings", remedy="give at least one")
     us, ys = ([one[name] for one in recordings] for name in (input_name, output_name))
     source, n = recordings[0].source, sum(map(len, recordings))
     if n < FEWEST_SAMPLES:

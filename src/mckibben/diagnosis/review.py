@@ -191,7 +191,9 @@ def _ran(model: Block | None, compensator: Block | None) -> tuple[Block, Block |
         model = compensator.forward_model
     if model is None:
         raise ModelError(
-            "it is not known which model was in the loop", remedy="give it with `model`"
+            "it is not known which model was in the loop",
+            parameter="model",
+            remedy="give it with `model`",
         )
     model = inside(model)
     if compensator is None:
@@ -214,8 +216,9 @@ def _check(logs: Sequence[Recording], model: Block, inputs: Sequence[str], follo
     if not logs or not followed:
         name = REFERENCE + model.outputs[0].name
         raise DataError(
-            f"there is no {name} to compare with the model's",
+            "there is no such channel to compare with the model's",
             file=logs[0].source if logs else None,
+            channel=name,
             remedy=f"map its column, as in `columns[{name}]=COLUMN`",
         )
     for log in logs:

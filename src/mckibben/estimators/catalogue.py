@@ -146,7 +146,8 @@ def settings_of_all(
         if not takers:
             every = sorted({setting for some in known.values() for setting in some})
             raise ModelError(
-                f"{', '.join(estimators)} has no setting {key!r}",
+                f"{', '.join(estimators)} has no such setting",
+                parameter=key,
                 remedy=f"give one, or MODEL.NAME, of {', '.join(every)}",
             )
         for model in takers:

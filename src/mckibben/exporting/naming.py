@@ -76,6 +76,7 @@ def identifier(name: str) -> str:
     ):
         raise ModelError(
             f"{name!r:.60} cannot name C functions",
+            parameter="name",
             remedy="give `name` a letter and then letters, digits or underscores, at most "
             f"{LONGEST}, no word of C or name of its headers, and not starting with "
             "mck",

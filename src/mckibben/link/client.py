@@ -39,7 +39,15 @@ Note = IntFlag("Note", "RUNNING TRIPPED LIMITED BAD_INPUT BAD_OUTPUT RESUMED CLI
 
 
 class LinkError(DataError):
-    """A device that does not answer, refuses, or is not what it was."""
+    """A device that does not answer, refuses, or is not what it was.
+
+    Attributes
+    ----------
+    status : int
+        Why the device refused, a place in `STATUSES`; 0 where it did not.
+    """
+
+    status: int = 0
 
 
 class Frame(NamedTuple):
@@ -170,7 +178,8 @@ class Link(AbstractContextManager["Link"]):
             self.device = device = self._identified()
             if fingerprint is not None and fingerprint.lower() != device.fingerprint:
                 problem = f"the device has model {device.fingerprint}, not {fingerprint:.40}"
-                raise LinkError(problem, remedy="load the program exported with that model")
+                remedy = "load the program exported with that model"
+                raise LinkError(problem, parameter="fingerprint", remedy=remedy)
             self._model, longest = bytes.fromhex(device.fingerprint)[:4], device.silence
             self._kind = np.dtype(device.numbers).newbyteorder("<")
             self._silence = longest if watchdog is None else round(watchdog / device.period)
@@ -282,7 +291,8 @@ class Link(AbstractContextManager["Link"]):
             asked = time.monotonic()
             if asked - begun >= self._patience:
                 problem = f"nothing has answered for {self._patience:g} s"
-                raise LinkError(problem, remedy="check power, port, rate, and other users of it")
+                remedy = "check power, port, rate, and other users of it"
+                raise LinkError(problem, parameter="patience", remedy=remedy)
             with working():
                 self._port.write(b"\0" + packed if sent else packed)  # a zero ends noise
             sent += 1
@@ -293,7 +303,9 @@ class Link(AbstractContextManager["Link"]):
             raise unreadable()
         if answer[0]:
             problem = f"the device refuses {kind.name}: {STATUSES[answer[0]]}"
-            raise LinkError(problem, remedy="see docs/deploy/link.md, or open the link again")
+            error = LinkError(problem, remedy="see docs/deploy/link.md, or open the link again")
+            error.status = answer[0]
+            raise error
         return answer[1:]
 
     def _take(self, timeout: float, kind: Kind | None = None) -> bytes | None:

@@ -162,7 +162,8 @@ def _load(path: Path) -> Muscle:
         raise invalid(error, path, "correct it, as files of the library have it") from None
     except ModelError as error:
         remedy = error.remedy or "correct it"
-        raise DataError(f"its balance: {error.problem}", file=path, remedy=remedy) from None
+        where = "balance" if error.parameter is None else f"balance.{error.parameter}"
+        raise DataError(error.problem, file=path, parameter=where, remedy=remedy) from None
     assert isinstance(balance, Balance)
     errors = np.concatenate(
         [np.array(found.uncertainty[name], dtype=np.float64) for name in GROUPS]

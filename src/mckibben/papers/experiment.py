@@ -466,7 +466,8 @@ def reproduce(
 def _plant(name: str, rig: Rig | str | None, data: Sequence[Recording] | None) -> Rig | None:
     """Return the rig, if any; a `DataError` if it lacks a channel, or if there is no recording."""
     if data is not None and not data:
-        raise DataError("there is no recording", remedy=f"record its protocol: {name}")
+        remedy = f"record its protocol: {name}"
+        raise DataError("there are none", parameter="recordings", remedy=remedy)
     if rig is None and data is not None:
         return None
     plant = load_rig(rig or protocol(name).rig)

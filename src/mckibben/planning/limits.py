@@ -91,7 +91,8 @@ def narrowed(limits: Limits, asked: Mapping[str, Iterable[float | None]]) -> Lim
     for name, given in asked.items():
         if name not in limits:
             raise DataError(
-                f"limits are given for {name!r}, which is not driven",
+                "limits are given for it, and it is not driven",
+                channel=name,
                 remedy=f"give them for {', '.join(limits)}",
             )
         own, unit = limits[name], standard_unit(name) or ""
@@ -144,5 +145,7 @@ def check_possible(limits: Limits, seconds: float, rig: Rig | None) -> None:
             )
     if not any(limit.span > 0 for limit in limits.values()):
         raise DataError(
-            f"none of {', '.join(limits)} may move", remedy="give wider limits with `limits`"
+            f"none of {', '.join(limits)} may move",
+            parameter="limits",
+            remedy="give wider limits with `limits`",
         )

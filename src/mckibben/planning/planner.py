@@ -158,8 +158,9 @@ def _known(recordings: list[Recording], rig: Rig | None) -> Excitation:
         sample_time_of(recording, "be planned from")
         if lacking := [name for name in (rig.inputs if rig else ()) if name not in recording]:
             raise DataError(
-                f"the recording lacks {', '.join(lacking)}, which the rig has",
+                "the recording lacks it, and the rig has it",
                 file=recording.source,
+                channel=lacking[0],
                 remedy="give recordings of this rig, or leave `rig` out",
             )
     return excitation(recordings, None if rig is None else rig.inputs)

@@ -88,14 +88,18 @@ class Commands:
         names = ", ".join(self.ranges)
         if isinstance(action, Mapping):
             if unknown := sorted(set(action) - set(self.ranges)):
-                problem = f"the rig {self.rig!r} has no input {', '.join(unknown)}"
-                raise DataError(problem, remedy=f"give {names}")
+                problem = f"the rig {self.rig!r} has no such input"
+                raise DataError(problem, channel=unknown[0], remedy=f"give {names}")
             rest = dict(zip(self.ranges, self.rest, strict=True))
             action = list((rest | dict(action)).values())
         asked = np.asarray(action, dtype=float)
         if asked.shape != (len(self.ranges),) or not np.isfinite(asked).all():
             problem = f"the rig {self.rig!r} cannot take the commands {asked.tolist()}"
-            raise DataError(problem, remedy=f"give a finite number each for {names}")
+            wrong = None
+            if asked.shape == (len(self.ranges),):
+                wrong = [*self.ranges][int(np.argmin(np.isfinite(asked)))]
+            remedy = f"give a finite number each for {names}"
+            raise DataError(problem, channel=wrong, remedy=remedy)
         return asked
 
     def limited(self, asked: Array) -> Array:

@@ -161,7 +161,8 @@ class Rig(DrawsItself, Section, ABC):
             if not isinstance(place, dict) or (last not in place and sections != ["start"]):
                 known = place if isinstance(place, dict) else fields
                 raise DataError(
-                    f"the rig {self.name!r} has no parameter {path!r}",
+                    f"the rig {self.name!r} has no such parameter",
+                    parameter=path,
                     remedy=f"use one of {', '.join(known)}",
                 )
             place[last] = value
@@ -187,7 +188,9 @@ class Rig(DrawsItself, Section, ABC):
         for group, factor in factors.items():
             if group not in AGEING:
                 raise DataError(
-                    f"muscles do not age in {group!r}", remedy=f"give one of {', '.join(AGEING)}"
+                    "muscles do not age in it",
+                    parameter=group,
+                    remedy=f"give one of {', '.join(AGEING)}",
                 )
             for name, muscle in _muscles_in(self):
                 for path in AGEING[group]:

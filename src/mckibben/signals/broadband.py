@@ -101,6 +101,7 @@ def multisine(
     if not 1 <= n <= MOST_HARMONICS:
         raise DataError(
             f"a period of {period:g} s has {n} harmonics up to {max_frequency:g} Hz",
+            parameter="max_frequency",
             remedy=f"choose them so that there are 1 to {MOST_HARMONICS}",
         )
     order = np.arange(1, n + 1)

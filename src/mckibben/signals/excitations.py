@@ -183,7 +183,7 @@ def _cycles(
     require_finite("low", low)
     heights = require_finite("peaks", peaks) - low
     if heights.size == 0:
-        raise DataError("there are no peaks", remedy="give at least one")
+        raise DataError("there are none", parameter="peaks", remedy="give at least one")
     if t.min() < 0:
         raise DataError(
             f"time starts at {t.min():g} s", remedy="count time from the start of the first cycle"

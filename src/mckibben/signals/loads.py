@@ -58,10 +58,13 @@ def ramps(time: ArrayLike, instants: Sequence[float], values: Sequence[float]) -
     if places.shape != heights.shape or places.ndim != 1 or places.size == 0:
         raise DataError(
             f"{places.size} instants and {heights.size} values make no ramps",
+            parameter="instants",
             remedy="give one value an instant, and at least one",
         )
     if not (np.diff(places) > 0).all():
-        raise DataError("the points are not in order", remedy="give increasing instants")
+        raise DataError(
+            "they are not in order", parameter="instants", remedy="give increasing ones"
+        )
     return np.asarray(np.interp(t, places, heights))
 
 
@@ -100,6 +103,7 @@ def pulls(
     if duration > share:
         raise DataError(
             f"{n_pulls} pulls of {duration:g} s do not fit into {t[-1] - t[0]:g} s",
+            parameter="duration",
             remedy="ask for fewer or shorter ones",
         )
     count = np.minimum(np.floor((t - t[0]) / share), n_pulls - 1)

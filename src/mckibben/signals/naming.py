@@ -68,12 +68,15 @@ def build(name: str, time: ArrayLike, **settings: Any) -> Array:
     for setting in settings:
         if setting not in known:
             raise DataError(
-                f"the signal {name!r} has no setting {setting!r}", remedy=f"use {', '.join(known)}"
+                "the signal has no such setting",
+                parameter=f"{name}:{setting}",
+                remedy=f"use {', '.join(known)}",
             )
     for setting, (words, default) in known.items():
         if default is None and setting not in settings:
             raise DataError(
-                f"the signal {name!r} needs the setting {setting!r}",
+                "the signal needs this setting",
+                parameter=f"{name}:{setting}",
                 remedy=f"write for instance {name}:{setting}=..., {words}",
             )
     parsed = {key: _parsed(name, key, value, kinds[key]) for key, value in settings.items()}
@@ -108,5 +111,5 @@ def _parsed(name: str, setting: str, value: Any, kind: Any) -> Any:
         return [float(part) for part in value] if isinstance(value, Sequence) else float(value)
     except (TypeError, ValueError):
         raise DataError(
-            f"the signal {name!r} cannot take {setting}={value!r}", remedy=f"give {_words(kind)}"
+            f"it is {value!r}", parameter=f"{name}:{setting}", remedy=f"give {_words(kind)}"
         ) from None

@@ -47,7 +47,7 @@ def staircase(time: ArrayLike, levels: Sequence[float], hold: float, ramp: float
     """
     t = as_time(time)
     if not len(levels):
-        raise DataError("a staircase needs levels", remedy="give at least one")
+        raise DataError("there are none", parameter="levels", remedy="give at least one")
     require_positive("hold", hold)
     require(0 <= ramp < np.inf, "ramp", ramp, "0 s or more", DataError)
     heights = require_finite("levels", levels)

@@ -321,40 +321,43 @@ class Balance(Invertible):
             each = [len(row) for row in value if widths]
             self._refuse(
                 len(value) != count or each != count * widths,
-                f"has {name} of {len(value)}{f' rows of {each}' * bool(widths)}",
+                f"has {len(value)}{f' rows of {each}' * bool(widths)}",
                 f"give {count}{''.join(f' rows of {width}' for width in widths)}",
+                name,
             )
 
     def _check_physics(self) -> None:
         """Raise an error for numbers that would generate energy or have no meaning."""
         low, high = self.pressure_range or (-np.inf, np.inf)
         ends = {"hull": self.hull, "pressure_range": ((low, high),)}
-        positive = {"lags": self.lags, "areas at rest": [row[0] for row in self.areas]}
+        positive = {"lags": self.lags, "areas": [row[0] for row in self.areas]}
         for name, pairs in ends.items():
             wrong = any(not lower < upper for lower, upper in pairs)
-            self._refuse(wrong, f"has the {name} {getattr(self, name)}", "give the lower end first")
+            has = f"has {getattr(self, name)}"
+            self._refuse(wrong, has, "give the lower end first", name)
         for name, values in positive.items():
             wrong = any(not value > 0 for value in values)
-            self._refuse(wrong, f"has the {name} {values}", "give positive ones")
+            self._refuse(wrong, f"has {values}", "give positive ones", name)
         rises = all(a < b for a, b in pairwise((0.0, *self.limits)))
         wanted = "give positive ones, in increasing order"
-        self._refuse(not rises, f"has the limits {self.limits}", wanted)
+        self._refuse(not rises, f"has {self.limits}", wanted, "limits")
         for name in self.parameters:
             numbers = np.array(getattr(self, name) or 0.0, ndmin=2)
             if name == "obstacles" and self.obstacles:
                 numbers = numbers.reshape(-1, self.sizes.obstacle)[:, at.STIFFNESS :]
             wrong = TABLE[name].least == 0.0 and bool((numbers < 0).any())
             self._refuse(
-                wrong, f"has {name} below 0, which would generate energy", "give none below 0"
+                wrong, "has some below 0, which would generate energy", "give none below 0", name
             )
         both = bool(self.mass and self.pushes)
-        self._refuse(both, "has mass and muscles that go slack", "give one of mass and pushes")
+        only = "give one of mass and pushes"
+        self._refuse(both, "has it, and muscles that go slack", only, "mass")
         both = self.held and self.tare
-        self._refuse(both, "has a tare and starts held", "give one of tare and held")
+        self._refuse(both, "has it, and starts held", "give one of tare and held", "tare")
 
-    def _refuse(self, wrong: bool, what: str, remedy: str) -> None:
+    def _refuse(self, wrong: bool, what: str, remedy: str, field: str | None = None) -> None:
         if wrong:
-            raise ModelError(f"{self.kind!r} {what}", remedy=remedy)
+            raise ModelError(f"{self.kind!r} {what}", parameter=field, remedy=remedy)
 
     def equations(self) -> tuple[str, ...]:
         """Return the force balance with the terms of this model, then area and elasticity."""

@@ -63,7 +63,8 @@ class Coupling(Block):
         n, m = len(self.driven), len(self.given)
         if min(n, m) == 0 or widths != [m] * n:
             raise ModelError(
-                f"gains of {self.kind!r} have rows of {widths}, and it {n} inputs and {m} outputs",
+                f"those of {self.kind!r} have rows of {widths}, and it {n} inputs and {m} outputs",
+                parameter="gains",
                 remedy="give a row an input, of one number an output",
             )
 

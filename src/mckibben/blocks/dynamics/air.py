@@ -192,6 +192,7 @@ class Air(fields.WithMemory, Invertible):
             raise ModelError(
                 f"{self.kind!r} has an ambient pressure of {lowest:g} and a supply of "
                 f"{highest:g} {self.output.unit}",
+                parameter="supply",
                 remedy="give a supply above the ambient pressure, or None",
             )
 

@@ -308,7 +308,8 @@ class GeneralizedBoucWen(fields.WithMemory, Invertible):
     def __post_init__(self) -> None:
         if len(self.shape) != 5 or not np.abs(self.shape).sum() < 1:
             raise ModelError(
-                f"the shape of {self.kind!r} is {self.shape}",
+                f"that of {self.kind!r} is {self.shape}",
+                parameter="shape",
                 remedy="give five numbers whose sizes add up to less than 1",
             )
 

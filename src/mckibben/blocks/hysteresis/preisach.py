@@ -308,6 +308,7 @@ class Preisach(Triangle, Invertible):
         if depth not in range(1, DEPTH + 1) or direction not in (1.0, -1.0):
             raise ModelError(
                 f"the memory of {self.kind!r} has depth {depth:g} and direction {direction:g}",
+                parameter="initial",
                 remedy=f"give a depth of 1 to {DEPTH}, a direction of 1 or -1, or 'first_sample'",
             )
         return state

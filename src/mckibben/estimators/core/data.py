@@ -208,7 +208,7 @@ def training_data(
     )
     every = [one.with_derived([*driven, *given, *scheduling]) for one in listed(recordings)]
     if not every:
-        raise DataError("there are no recordings to fit", remedy="give at least one")
+        raise DataError("there are none to fit", parameter="recordings", remedy="give at least one")
     if same := set(driven) & set(given):
         raise DataError(
             "input and output are the same channel",

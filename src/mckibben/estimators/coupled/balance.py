@@ -260,7 +260,8 @@ class BalanceEstimator(CoupledEstimator):
         """Return the balance, solved for coordinates, after the air and dead zone."""
         if unknown := {*(self.terms or ())} - {*TERMS}:
             raise ModelError(
-                f"terms names {', '.join(sorted(unknown))}",
+                f"there are none named {', '.join(sorted(unknown))}",
+                parameter="terms",
                 remedy=f"choose from {', '.join(TERMS)}",
             )
         if self.tare and self.unknown_load:
@@ -375,8 +376,9 @@ class BalanceEstimator(CoupledEstimator):
             lags = np.array(self.lags)
             if lags[0] < shortest or lags[-1] > longest or (np.diff(np.log(lags)) < 0.69).any():
                 raise ModelError(
-                    f"lags of {np.array2string(lags, precision=3)} s cannot be identified "
+                    f"those of {np.array2string(lags, precision=3)} s cannot be identified "
                     "from these recordings",
+                    parameter="lags",
                     remedy="give fewer lags, in order, each twice the last or more, from "
                     f"{shortest:.3g} to {longest:.3g} s",
                 )

@@ -144,7 +144,8 @@ def check_numbers(data: TrainingData) -> None:
     span = data.travel
     if not (span > STILL * span.max()).all():
         raise ModelError(
-            f"{data.outputs[int(np.argmin(span))].name} never changes, but by {span.min():.3g}",
+            f"it never changes, but by {span.min():.3g}",
+            channel=data.outputs[int(np.argmin(span))].name,
             remedy="record muscles that move",
         )
     for run in data.runs:

@@ -100,7 +100,8 @@ def check_single_muscle(data: TrainingData) -> None:
     """
     if len(data.inputs) != 1 or any(channel.unit not in LOADS for channel in data.scheduled):
         raise ModelError(
-            "a prior is for one muscle with no scheduling input but its load",
+            "it is for one muscle with no scheduling input but its load",
+            parameter="prior",
             remedy="leave prior out",
         )
 

@@ -120,7 +120,7 @@ class CoupledEstimator(Estimator):
         """Return the training data, of the channels that are named or found."""
         every = listed(recordings)
         if not every:
-            raise DataError("there are no recordings", remedy="give at least one")
+            raise DataError("there are none", parameter="recordings", remedy="give at least one")
         first = every[0]
         channels = self.resolved(every, self.input, self.output, self.scheduling)
         inputs, outputs, scheduling = channels.inputs, channels.outputs, self.taken(channels)

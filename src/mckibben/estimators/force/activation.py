@@ -318,7 +318,8 @@ def characteristic_points(runs: Sequence[Run], moving: Sequence[bool]) -> tuple[
     still = extremes[:, 1, 0] <= extremes[:, 0, 0]
     if still.any():
         raise DataError(
-            f"the contraction does not move under {forces[still][0]:g} N",
+            f"it does not move under {forces[still][0]:g} N",
+            channel="contraction",
             remedy="leave that run out",
         )
     ends = np.array([[regress(forces, extremes[:, j, c]) for c in (0, 1)] for j in (0, 1)])

@@ -286,6 +286,7 @@ def checked_sample_time(block: Block, sample_time: float | None) -> float | None
     if step is None:
         raise ModelError(
             f"{block.kind!r} depends on the rate",
+            parameter="sample_time",
             remedy="give the time between steps, `sample_time=SECONDS`",
         )
     block.check_time(step)

@@ -67,7 +67,8 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
     for given, allowed in ((serving.limits, names), (serving.safe, names[n_in:])):
         if strange := sorted(set(given) - set(allowed)):
             raise ModelError(
-                f"{strange[0]!r:.60} is not one of its channels",
+                "the model has no such channel",
+                channel=strange[0],
                 remedy=f"name one of {', '.join(allowed)}",
             )
 
@@ -81,12 +82,13 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
     if unknown:
         raise ModelError(
             f"the model has no limits of {', '.join(unknown)}",
+            parameter="limits",
             remedy=f"give them for each, `limits[{unknown[0]}]=LOW:HIGH`",
         )
     for name, a, b in zip(names, low, high, strict=True):
         if not a < b:
             raise ModelError(
-                f"the limits of {name} are {a:g} and {b:g}", remedy="give the lower one first"
+                f"its limits are {a:g} and {b:g}", channel=name, remedy="give the lower one first"
             )
 
     safe = low.copy()
@@ -94,8 +96,9 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
         safe[place] = serving.safe.get(name, low[place])
         if not low[place] <= safe[place] <= high[place]:
             raise ModelError(
-                f"the safe value of {name} is {safe[place]:g}, beyond its limits "
+                f"its safe value is {safe[place]:g}, beyond its limits "
                 f"{low[place]:g} to {high[place]:g}",
+                channel=name,
                 remedy="give one within",
             )
     return low, high, safe

@@ -71,6 +71,7 @@ def ros2_files(
     if not re.fullmatch(r"[a-z](_?[a-z0-9])+", name):
         raise ModelError(
             f"{name!r:.60} cannot name a package of ROS 2",
+            parameter="name",
             remedy="give `name` small letters, digits and single underscores, starting with "
             "a letter",
         )

@@ -52,7 +52,8 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
     if rig is not None:
         if "length" not in rig.inputs:
             remedy = "change a copy of the rig mas10-test-stand"
-            raise DataError(f"the rig {rig.name!r} imposes no length", remedy=remedy)
+            problem = f"the rig {rig.name!r} does not impose it"
+            raise DataError(problem, channel="length", remedy=remedy)
         wide = rig.start.get("length", rig.limits("length").high) / LONGEST
         strong = share(rig, "pressure", HIGHEST)
     runs = list[PlannedRun]()

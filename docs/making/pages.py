@@ -16,7 +16,7 @@ SYMBOL = re.compile(
 """A letter with indices or powers, and its argument: w_{t-1}, x^2, F_{r_i}[u]_t."""
 
 OPTION = re.compile(r"(?<![\w-])(--[a-z][a-z-]*)")
-"""An option in a sentence: lines do not break within it where it is code."""
+"""An option in a sentence: where it is code, its hyphens stay, and lines do not break within it."""
 
 DOCS = Path(__file__).parents[1]
 MADE = DOCS / "_generated"

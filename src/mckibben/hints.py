@@ -10,6 +10,8 @@ from types import MappingProxyType
 MODULE = {
     "report": "write_report",
     "untold": "data_gaps",
+    "RDPIEstimator": "estimator('rdpi')",
+    "TSFNNEstimator": "estimator('tsfnn')",
     "presets": "estimator(NAME); its class is type(estimator(NAME))",
     "simulators": "export(model, FILE, 'mjcf')",
     "check_rig": "load_rig, which checks what it reads",

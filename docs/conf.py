@@ -25,7 +25,6 @@ html_math_renderer = "mathml"
 exclude_patterns = ["_build", "gallery", "making", "templates/__pycache__", "README.md"]
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
-smartquotes_action = "qe"  # quotes and ellipses: dashes begin options of commands
 autodoc_default_options = {
     "members": True,
     "show-inheritance": True,

@@ -134,7 +134,8 @@ def page(model: str, name: str, group: str, cost: Mapping[str, list[str]]) -> li
             "",
         ]
     if pictured(model).is_file():
-        lines += [f"![{name}, free-run simulation](../../pictures/models/{model}.png)", ""]
+        lines += [f"```{{image}} ../../pictures/models/{model}.png", ":class: model-loop"]
+        lines += [f":alt: {name}, free-run simulation", "```", ""]
         lines += [f"*{caption(model)}, and its free-run simulation.*", ""]
     lines += [
         "## How to fit it",

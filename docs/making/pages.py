@@ -15,6 +15,9 @@ SYMBOL = re.compile(
 )
 """A letter with indices or powers, and its argument: w_{t-1}, x^2, F_{r_i}[u]_t."""
 
+OPTION = re.compile(r"(?<![\w-])(--[a-z][a-z-]*)")
+"""An option in a sentence: where it is code, its hyphens stay, and lines do not break within it."""
+
 DOCS = Path(__file__).parents[1]
 MADE = DOCS / "_generated"
 
@@ -38,7 +41,11 @@ def plain(text: str) -> str:
                 if where % 2:
                     yield symbol(part)
                 else:
-                    yield part if place % 2 else re.sub(r"([\\*_\[\]<>$|#])", r"\\\1", part)
+                    yield (
+                        part
+                        if place % 2
+                        else OPTION.sub(r"`\1`", re.sub(r"([\\*_\[\]<>$|#])", r"\\\1", part))
+                    )
 
     paragraphs = [" ".join(part.split()) for part in re.split(r"\n\s*\n", text)]
     return "\n\n".join("".join(shown(paragraph)) for paragraph in paragraphs)

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from types import MappingProxyType
 
 MODULE = {
     "report": "write_report",
+    "untold": "data_gaps",
+    "RDPIEstimator": "estimator('rdpi')",
+    "TSFNNEstimator": "estimator('tsfnn')",
+    "presets": "estimator(NAME); its class is type(estimator(NAME))",
+    "simulators": "export(model, FILE, 'mjcf')",
+    "check_rig": "load_rig, which checks what it reads",
+    "rig_from_data_sheet": "load_rig of a file that `mckibben rig show NAME -o FILE` writes",
     "concat": "a list of recordings, which are fitted together",
     "Regressor": "estimator(NAME)",
     "HysteresisRegressor": "estimator(NAME)",
@@ -171,8 +178,38 @@ BLOCK = {
 }
 """Attribute that a model might have -> what there is."""
 
+COMMAND_LINE = {
+    "check-block": "In Python: mckibben.check_block",
+    "untold": "Use: mckibben info",
+    "ros": "Use: mckibben export ros2",
+    "rig new": "Use: mckibben rig show NAME -o FILE",
+    "export --overwrite": "Use --force",
+    "export --fmi": "FMUs are FMI 2.0",
+    "export --platforms": "An FMU has the library for this machine, or none with --no-library",
+    "export --adjustable": "Change the model, and export it again",
+    "export --sheet": "Write a rig of the sheet, and export a balance fitted to it",
+    "characterize --beside": "Use --scheduling",
+    "reproduce --train": "Use --data FOLDER",
+    "reproduce --test": "Use --data FOLDER",
+    "fit --method": "Use --set method=...",
+    "simulate --horizon": "All simulations are free runs",
+    "invert --flow-limit": "A limit is of one muscle: --rate-limit",
+    "invert --total-limit": "A limit is of one muscle: --rate-limit",
+    "app --host": "The workbench is for this machine alone",
+    "compare --dask": "In Python: mckibben.compare(..., executor=...)",
+    "compare --folds": "Eight parts of the training data are left out in turn",
+    "compare --n-folds": "Eight parts of the training data are left out in turn",
+    "study --folds": "Eight parts of the training data are left out in turn",
+    "study --n-folds": "Eight parts of the training data are left out in turn",
+    "plan --for": "A plan is for every model",
+    "plan --model": "A plan is for every model",
+    "plan --muscle": "A plan is for every model",
+}
+"""Command, or command and option, of earlier versions -> what to do now."""
+
 KEYWORDS = {
     "features": "input",
+    "beside": "scheduling",
     "dt": "sample_time",
     "ts": "sample_time",
     "period": "sample_time",
@@ -228,6 +265,16 @@ def nearest(name: str, known: Iterable[str], hints: Mapping[str, str] | None = N
         return found
     close = get_close_matches(name, [one for one in known if not one.startswith("_")], 1, ALIKE)
     return close[0] if close else ""
+
+
+def former(command: Sequence[str], word: str) -> str:
+    """Return what to do instead of a command or an option that there was; empty if there was none.
+
+    >>> former(["export", "c"], "--overwrite")
+    'Use --force'
+    """
+    keys = (" ".join([*command[:n], word]) for n in range(len(command), -1, -1))
+    return next((COMMAND_LINE[key] for key in keys if key in COMMAND_LINE), "")
 
 
 def absent(owner: str, name: str, known: Iterable[str], kind: str = "") -> str:

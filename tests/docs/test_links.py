@@ -67,7 +67,7 @@ def test_links_between_pages_lead_somewhere(page: Path) -> None:
 def test_tutorials_are_in_the_index() -> None:
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     tutorials = (ROOT / "docs" / "tutorials").glob("*.md")
-    assert [path for path in tutorials if f"tutorials/{path.stem}\n" not in index] == []
+    assert [path for path in tutorials if f"<tutorials/{path.stem}>\n" not in index] == []
 
 
 def test_paths_that_the_page_of_the_architecture_names_exist() -> None:

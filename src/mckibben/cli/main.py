@@ -33,6 +33,7 @@ from mckibben.errors import (
     ModelWarning,
     rendered,
 )
+from mckibben.hints import former
 
 BAD_INPUT = 2
 
@@ -128,7 +129,7 @@ def _run() -> int:
         finish()
         return code or 0
     except click.UsageError as error:
-        click.UsageError(visible(error.format_message()), error.ctx).show()
+        click.UsageError(visible(_usage(error)), error.ctx).show()
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
         return _say("Interrupted.", INTERRUPTED)
@@ -150,6 +151,19 @@ def _run() -> int:
             raise
         text = f"Internal error, please report it: {type(error).__name__}: {error}. "
         return _say(f"{text}Set MCKIBBEN_DEBUG=1 to see where.", 1)
+
+
+def _usage(error: click.UsageError) -> str:
+    """Return what is wrong with a command line; of earlier versions, with what to do now."""
+    message = error.format_message()
+    if found := re.match(r"No such (?:option|command):? '?([\w-]+)'?\.?", message):
+        context, command = error.ctx, list[str]()
+        while context is not None and context.parent is not None:
+            command.insert(0, context.info_name or "")
+            context = context.parent
+        if hint := former(command, found[1]):
+            return f"{found[0]} {hint}."
+    return message
 
 
 def _say(message: str, code: int) -> int:

@@ -26,7 +26,13 @@ from mckibben.arrays import Array, Mask
 from mckibben.blocks.fields import Channel, Initial, check_units, drives
 from mckibben.blocks.kernels import Step, scratch_of
 from mckibben.blocks.parameters import Parametrised, gathered, plain
-from mckibben.blocks.ranges import AT_REST, first_known, range_over, unknown, widened
+from mckibben.blocks.ranges import (
+    REST_SAMPLE_TIME,
+    fault_bounds,
+    first_known,
+    range_over,
+    unknown_ranges,
+)
 from mckibben.blocks.runs import Run, run_of
 from mckibben.blocks.sample_times import refuse_time
 from mckibben.blocks.starts import explaining_past, stated
@@ -256,9 +262,9 @@ class Block(Hinted, DrawsItself, Parametrised):
         if self._of_model is not None:
             return first_known(self.outputs, self._of_model.known_channels)
         timeless = self.rate_dependent and self.sample_time is None
-        run = partial(self._run, AT_REST if timeless else self.sample_time)
+        run = partial(self._run, REST_SAMPLE_TIME if timeless else self.sample_time)
         found = range_over(run, self.known_inputs, moving=not timeless)
-        return unknown(len(self.outputs)) if found is None else found
+        return unknown_ranges(len(self.outputs)) if found is None else found
 
     @property
     def known_channels(self) -> list[tuple[tuple[Channel, ...], Array]]:
@@ -277,7 +283,7 @@ class Block(Hinted, DrawsItself, Parametrised):
         >>> PI.example().input_bounds.tolist()
         [[-5.0, 10.0]]
         """
-        return widened(self.inputs, self.known_inputs)
+        return fault_bounds(self.inputs, self.known_inputs)
 
     @property
     def n_missable(self) -> int:

@@ -165,8 +165,6 @@ class Block(Hinted, DrawsItself, Parametrised):
         """Title of the block: its kind, and for an inverse also the kind of the inverted block."""
         return self.kind
 
-    # -- channels ----------------------------------------------------------------------------
-
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
         cls.__repr__ = Block.__repr__  # type: ignore[method-assign]  # not the long one of dataclasses
@@ -176,6 +174,8 @@ class Block(Hinted, DrawsItself, Parametrised):
         values = [(f, getattr(self, f.name)) for f in dataclasses.fields(self)]  # type: ignore[arg-type]
         changed = [f"{f.name}={SHORT.repr(value)}" for f, value in values if value != f.default]
         return shorten(f"{type(self).__name__}({', '.join(changed)})", 240, placeholder=" ...)")
+
+    # -- channels ----------------------------------------------------------------------------
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
@@ -291,6 +291,12 @@ class Block(Hinted, DrawsItself, Parametrised):
         return 0
 
     # -- memory ------------------------------------------------------------------------------
+    #
+    # On a recording, a block starts (`start_on`) from the first of these that it has:
+    # 1. the state that the first outputs give (`known_state`, by `state_at`),
+    # 2. the state after inputs that explain the first outputs (`past`),
+    # 3. its default start at the first input (`initial_state`, from `start`).
+    # Outputs have a say only in a model that starts at rest (`_first_outputs`).
 
     @property
     def n_states(self) -> int:

@@ -275,7 +275,7 @@ class Block(Hinted, DrawsItself, Parametrised):
     def input_bounds(self) -> Array:
         """Lowest and highest value of every input that is no fault, shape (n_inputs, 2).
 
-        See `mckibben.blocks.ranges.widened`.
+        See `mckibben.blocks.ranges.fault_bounds`.
 
         Examples
         --------

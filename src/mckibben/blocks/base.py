@@ -26,7 +26,13 @@ from mckibben.arrays import Array, Mask
 from mckibben.blocks.fields import Channel, Initial, check_units, drives
 from mckibben.blocks.kernels import Step, scratch_of
 from mckibben.blocks.parameters import Parametrised, gathered, plain
-from mckibben.blocks.ranges import AT_REST, first_known, range_over, unknown, widened
+from mckibben.blocks.ranges import (
+    REST_SAMPLE_TIME,
+    fault_bounds,
+    first_known,
+    range_over,
+    unknown_ranges,
+)
 from mckibben.blocks.runs import Run, run_of
 from mckibben.blocks.sample_times import refuse_time
 from mckibben.blocks.starts import explaining_past, stated
@@ -159,8 +165,6 @@ class Block(Hinted, DrawsItself, Parametrised):
         """Title of the block: its kind, and for an inverse also the kind of the inverted block."""
         return self.kind
 
-    # -- channels ----------------------------------------------------------------------------
-
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
         cls.__repr__ = Block.__repr__  # type: ignore[method-assign]  # not the long one of dataclasses
@@ -170,6 +174,8 @@ class Block(Hinted, DrawsItself, Parametrised):
         values = [(f, getattr(self, f.name)) for f in dataclasses.fields(self)]  # type: ignore[arg-type]
         changed = [f"{f.name}={SHORT.repr(value)}" for f, value in values if value != f.default]
         return shorten(f"{type(self).__name__}({', '.join(changed)})", 240, placeholder=" ...)")
+
+    # -- channels ----------------------------------------------------------------------------
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
@@ -256,9 +262,9 @@ class Block(Hinted, DrawsItself, Parametrised):
         if self._of_model is not None:
             return first_known(self.outputs, self._of_model.known_channels)
         timeless = self.rate_dependent and self.sample_time is None
-        run = partial(self._run, AT_REST if timeless else self.sample_time)
+        run = partial(self._run, REST_SAMPLE_TIME if timeless else self.sample_time)
         found = range_over(run, self.known_inputs, moving=not timeless)
-        return unknown(len(self.outputs)) if found is None else found
+        return unknown_ranges(len(self.outputs)) if found is None else found
 
     @property
     def known_channels(self) -> list[tuple[tuple[Channel, ...], Array]]:
@@ -269,7 +275,7 @@ class Block(Hinted, DrawsItself, Parametrised):
     def input_bounds(self) -> Array:
         """Lowest and highest value of every input that is no fault, shape (n_inputs, 2).
 
-        See `mckibben.blocks.ranges.widened`.
+        See `mckibben.blocks.ranges.fault_bounds`.
 
         Examples
         --------
@@ -277,7 +283,7 @@ class Block(Hinted, DrawsItself, Parametrised):
         >>> PI.example().input_bounds.tolist()
         [[-5.0, 10.0]]
         """
-        return widened(self.inputs, self.known_inputs)
+        return fault_bounds(self.inputs, self.known_inputs)
 
     @property
     def n_missable(self) -> int:
@@ -285,6 +291,12 @@ class Block(Hinted, DrawsItself, Parametrised):
         return 0
 
     # -- memory ------------------------------------------------------------------------------
+    #
+    # On a recording, a block starts (`start_on`) from the first of these that it has:
+    # 1. the state that the first outputs give (`known_state`, by `state_at`),
+    # 2. the state after inputs that explain the first outputs (`past`),
+    # 3. its default start at the first input (`initial_state`, from `start`).
+    # Outputs have a say only in a model that starts at rest (`_first_outputs`).
 
     @property
     def n_states(self) -> int:

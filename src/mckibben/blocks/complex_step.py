@@ -87,16 +87,16 @@ def _improved(evaluate: Any, target: Any, u: Any, memory: Any) -> Any:
     return u
 
 
-def _carried(name: str, slope: Callable[[float, float], float]) -> Callable[[Any], complex]:
+def _with_derivative(name: str, slope: Callable[[float, float], float]) -> Callable[[Any], complex]:
     """Return a function of ``math`` that propagates its derivative, ``slope(x, value)``."""
     own, by = getattr(math, name), deferred(slope)
 
-    def carried(x: Any) -> complex:
+    def with_derivative(x: Any) -> complex:
         z = complex(x)
         value = own(z.real)
         return complex(value, z.imag * by(z.real, value))
 
-    return deferred(carried)
+    return deferred(with_derivative)
 
 
 HELPERS: dict[str, Callable[..., Any]] = {
@@ -109,25 +109,25 @@ HELPERS: dict[str, Callable[..., Any]] = {
     "copysign": _copysign,
     "atan2": _atan2,
     "pow": _pow,
-    "acos": _carried("acos", lambda x, _: -1.0 / math.sqrt(1.0 - x * x)),
-    "acosh": _carried("acosh", lambda x, _: 1.0 / math.sqrt(x * x - 1.0)),
-    "asin": _carried("asin", lambda x, _: 1.0 / math.sqrt(1.0 - x * x)),
-    "asinh": _carried("asinh", lambda x, _: 1.0 / math.sqrt(x * x + 1.0)),
-    "atan": _carried("atan", lambda x, _: 1.0 / (1.0 + x * x)),
-    "atanh": _carried("atanh", lambda x, _: 1.0 / (1.0 - x * x)),
-    "cos": _carried("cos", lambda x, _: -math.sin(x)),
-    "cosh": _carried("cosh", lambda x, _: math.sinh(x)),
-    "exp": _carried("exp", lambda _, value: value),
-    "expm1": _carried("expm1", lambda _, value: value + 1.0),
-    "log": _carried("log", lambda x, _: 1.0 / x),
-    "log10": _carried("log10", lambda x, _: 1.0 / (x * math.log(10.0))),
-    "log1p": _carried("log1p", lambda x, _: 1.0 / (1.0 + x)),
-    "log2": _carried("log2", lambda x, _: 1.0 / (x * math.log(2.0))),
-    "sin": _carried("sin", lambda x, _: math.cos(x)),
-    "sinh": _carried("sinh", lambda x, _: math.cosh(x)),
-    "sqrt": _carried("sqrt", lambda _, value: 0.5 / value),
-    "tan": _carried("tan", lambda _, value: 1.0 + value * value),
-    "tanh": _carried("tanh", lambda _, value: 1.0 - value * value),
+    "acos": _with_derivative("acos", lambda x, _: -1.0 / math.sqrt(1.0 - x * x)),
+    "acosh": _with_derivative("acosh", lambda x, _: 1.0 / math.sqrt(x * x - 1.0)),
+    "asin": _with_derivative("asin", lambda x, _: 1.0 / math.sqrt(1.0 - x * x)),
+    "asinh": _with_derivative("asinh", lambda x, _: 1.0 / math.sqrt(x * x + 1.0)),
+    "atan": _with_derivative("atan", lambda x, _: 1.0 / (1.0 + x * x)),
+    "atanh": _with_derivative("atanh", lambda x, _: 1.0 / (1.0 - x * x)),
+    "cos": _with_derivative("cos", lambda x, _: -math.sin(x)),
+    "cosh": _with_derivative("cosh", lambda x, _: math.sinh(x)),
+    "exp": _with_derivative("exp", lambda _, value: value),
+    "expm1": _with_derivative("expm1", lambda _, value: value + 1.0),
+    "log": _with_derivative("log", lambda x, _: 1.0 / x),
+    "log10": _with_derivative("log10", lambda x, _: 1.0 / (x * math.log(10.0))),
+    "log1p": _with_derivative("log1p", lambda x, _: 1.0 / (1.0 + x)),
+    "log2": _with_derivative("log2", lambda x, _: 1.0 / (x * math.log(2.0))),
+    "sin": _with_derivative("sin", lambda x, _: math.cos(x)),
+    "sinh": _with_derivative("sinh", lambda x, _: math.cosh(x)),
+    "sqrt": _with_derivative("sqrt", lambda _, value: 0.5 / value),
+    "tan": _with_derivative("tan", lambda _, value: 1.0 + value * value),
+    "tanh": _with_derivative("tanh", lambda _, value: 1.0 - value * value),
 }
 """Complex-step replacements of functions of the kernel language, and ``over`` for division."""
 
@@ -147,11 +147,11 @@ class _Rewriting(ast.NodeTransformer):
         self.generic_visit(node)
         name = ast.unparse(node.func).removeprefix("math.").removeprefix("np.")
         if isinstance(node.func, ast.Attribute) and name in BY_REAL_PART:
-            node.args = [_part(node.args[0])]
+            node.args = [_real_part(node.args[0])]
         elif name in ("min", "max"):
-            return reduce(lambda one, other: _helped(name, one, other), node.args)
+            return reduce(lambda one, other: _helper_call(name, one, other), node.args)
         elif name in HELPERS:
-            return _helped(name, *node.args)
+            return _helper_call(name, *node.args)
         elif name != ast.unparse(node.func):
             known = ", ".join(sorted({*HELPERS, *BY_REAL_PART} - {"over"}))
             raise ModelError(
@@ -163,7 +163,7 @@ class _Rewriting(ast.NodeTransformer):
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         self.generic_visit(node)
         divides = isinstance(node.op, ast.Div)
-        return _helped("over", node.left, node.right) if divides else node
+        return _helper_call("over", node.left, node.right) if divides else node
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
         written = ast.parse(f"{ast.unparse(node.target)} = {ast.unparse(node.target)}").body[0]
@@ -171,23 +171,24 @@ class _Rewriting(ast.NodeTransformer):
         if not isinstance(node.op, ast.Div):
             return node
         assert isinstance(written, ast.Assign)
-        written.value = _helped("over", written.value, node.value)
+        written.value = _helper_call("over", written.value, node.value)
         return written
 
     def visit_Compare(self, node: ast.Compare) -> ast.expr:
         self.generic_visit(node)
-        node.left, node.comparators = _part(node.left), [_part(each) for each in node.comparators]
+        node.left = _real_part(node.left)
+        node.comparators = [_real_part(each) for each in node.comparators]
         return node
 
 
-def _helped(name: str, *given: Any) -> ast.Call:
+def _helper_call(name: str, *given: Any) -> ast.Call:
     return ast.Call(ast.Name(PREFIX + name, ast.Load()), list(given), [])
 
 
-def _part(node: Any) -> Any:
+def _real_part(node: Any) -> Any:
     """Return the real part of a compared value."""
     if isinstance(node, ast.Tuple):
-        return ast.Tuple([_part(each) for each in node.elts], ast.Load())
+        return ast.Tuple([_real_part(each) for each in node.elts], ast.Load())
     truth = ast.Compare | ast.BoolOp | ast.Constant
     return node if isinstance(node, truth) else ast.Attribute(node, "real", ast.Load())
 

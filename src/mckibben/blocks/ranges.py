@@ -20,11 +20,11 @@ LARGEST = float(np.finfo(np.float64).max)
 
 SAMPLES_PER_LEG = 20
 
-AT_REST = 1.0
+REST_SAMPLE_TIME = 1.0
 """Sample time [s] of runs of one sample at rest, which it does not change."""
 
 
-def unknown(count: int) -> Array:
+def unknown_ranges(count: int) -> Array:
     """Return the ranges of channels of which none is known, shape (count, 2)."""
     return np.tile([-np.inf, np.inf], (count, 1))
 
@@ -36,7 +36,7 @@ def first_known(
 
     A measured channel has that of what it measures.
     """
-    found = unknown(len(channels))
+    found = unknown_ranges(len(channels))
     named: dict[Channel, Array] = {}
     for given, ranges in sources:
         for channel, ends in zip(given, ranges, strict=True):
@@ -95,10 +95,10 @@ def range_over(
         found = [run(way, None)] if moving else []
         outputs = np.vstack([*found, *(run(row[np.newaxis], "first_sample") for row in corners)])
     ends = np.stack([outputs.min(axis=0), outputs.max(axis=0)], axis=1)
-    return np.where(np.isfinite(ends), ends, unknown(len(ends)))
+    return np.where(np.isfinite(ends), ends, unknown_ranges(len(ends)))
 
 
-def widened(channels: Sequence[Channel], known: Array) -> Array:
+def fault_bounds(channels: Sequence[Channel], known: Array) -> Array:
     """Return the lowest and highest value of every channel that is no fault, shape (n, 2).
 
     The identified range, or where none is known the plausible one of its unit, is widened at both ends

@@ -65,7 +65,7 @@ class Candidate:
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def made(self) -> type[Estimator]:
+    def estimator_class(self) -> type[Estimator]:
         """Class of the estimator."""
         if isinstance(self.model, str):
             found: type[Estimator] = registry.load("estimators", self.model)
@@ -74,9 +74,9 @@ class Candidate:
 
     def estimator(self, channels: Channels) -> Estimator:
         """Return the estimator of the channels of a comparison."""
-        named = self.made.channel_settings(channels)
+        named = self.estimator_class.channel_settings(channels)
         own = {} if isinstance(self.model, str) else self.model.get_params()
-        return self.made(**own | named | dict(self.settings))
+        return self.estimator_class(**own | named | dict(self.settings))
 
 
 @dataclass(frozen=True)
@@ -113,13 +113,13 @@ def plan_of(
     data, empty = _data_of(train, test, validation, chosen, channels)
     every = [*data.recordings, *data.checks]
     items, left_out = _chosen(chosen.models, every, data.channels, chosen.seed)
-    made = {name: item.made for name, item in items.items()}
+    made = {name: item.estimator_class for name, item in items.items()}
     made |= {name: declared(name) for name in left_out}
     own = settings_of_all(made, chosen.settings) if chosen.settings else {}
     refused = refusals(items, data.split.train, data.channels)
     items = {
         name: replace(items[name], settings={**items[name].settings, **own.get(name, {})})
-        for name in sorted(items, key=lambda name: items[name].made.effort)
+        for name in sorted(items, key=lambda name: items[name].estimator_class.effort)
     }
     return Plan(data, items, replace(empty, left_out=left_out, pending=tuple(items)), refused)
 
@@ -158,11 +158,18 @@ def _data_of(
     split = split_of(recordings, tests, channels)
     parts = parts_of(checks or split.train, channels)
     data = Data(split, parts, channels, tuple(checks))
-    chosen_by = ("given" if checks else "cross-validation") if parts else "fit"
+    empty = _empty_leaderboard(data, unit, chosen.seed)
+    return data, replace(empty, notes=notes, shared=shared)
+
+
+def _empty_leaderboard(data: Data, unit: str, seed: int) -> Leaderboard:
+    """Return a leaderboard without models: what it states of its data."""
+    split, parts, channels = data.split, data.parts, data.channels
+    chosen_by = ("given" if data.checks else "cross-validation") if parts else "fit"
     described = split.described
     if chosen_by == "cross-validation":
         described += f", cross-validated on {counted(len(parts), 'part')}"
-    return data, Leaderboard(
+    return Leaderboard(
         inputs=channels.inputs,
         outputs=channels.outputs,
         unit=unit,
@@ -170,10 +177,8 @@ def _data_of(
         split=described,
         n_train=sum(map(len, split.train)),
         n_test=sum(int(rows.sum()) for rows in split.test_rows),
-        seed=chosen.seed,
+        seed=seed,
         chosen_by=chosen_by,
-        notes=notes,
-        shared=shared,
         loads=channels.scheduling,
         offered=channels.offered,
         ignored=channels.unused,
@@ -223,7 +228,7 @@ def _chosen(
         items = {name: Candidate(name, seeded) for name in names}
         left_out = objections(items, recordings, channels)
         for name, item in items.items():
-            if item.made.long:
+            if item.estimator_class.long:
                 left_out.setdefault(name, LONG)
         return {name: item for name, item in items.items() if name not in left_out}, left_out
     if isinstance(models, Mapping):
@@ -264,7 +269,9 @@ def objections(
     found: dict[str, str] = {}
     for name, item in items.items():
         try:
-            reason = item.made.objection(recordings, channels) or _timeless(item.made, recordings)
+            reason = item.estimator_class.objection(
+                recordings, channels
+            ) or _missing_time_objection(item.estimator_class, recordings)
         except ModelError as error:  # a plug-in that is broken is not the end of all others
             reason = str(error)
         if reason is not None:
@@ -284,8 +291,10 @@ def refusals(
     return objections({name: items[name] for name in refused}, recordings, unloaded)
 
 
-def _timeless(estimator: type[Estimator], recordings: Sequence[Recording]) -> str | None:
-    """Return the recordings without the time that a model needs, or None."""
+def _missing_time_objection(
+    estimator: type[Estimator], recordings: Sequence[Recording]
+) -> str | None:
+    """Return why a model that needs time cannot be fitted to recordings without it, or None."""
     missing = [each.name for each in recordings if each.sample_time is None]
     if not (missing and estimator.needs_time):
         return None

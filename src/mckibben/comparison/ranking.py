@@ -85,7 +85,7 @@ class FitResult:
 def effort_of(item: Candidate, data: Data) -> float:
     """Return the approximate time of a fit [s]."""
     samples = sum(len(recording) for recording in data.split.train)
-    return float(item.made.effort * max(samples, 2000) / 10_000)
+    return float(item.estimator_class.effort * max(samples, 2000) / 10_000)
 
 
 def fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:
@@ -303,7 +303,7 @@ def ranked(
     """
     checked(jobs)
     data, table, checkpoints = plan.data, _Table(plan), Checkpoints(folder, plan.data)
-    keys = {name: (item, source(item.made)) for name, item in plan.items.items()}
+    keys = {name: (item, source(item.estimator_class)) for name, item in plan.items.items()}
     for name, reason in plan.refused.items():
         table.add(Row(name, reason=reason), ())
     for name in plan.items.keys() - plan.refused.keys():

@@ -69,6 +69,7 @@ def previewed(reference: Recording, preview: float) -> Recording:
 
 
 Ahead = tuple[Array, Array]
+"""Reference and schedule of a later step, for compensators with a dead time or a horizon."""
 
 
 class Controller(ABC):
@@ -204,7 +205,7 @@ class DisturbanceObserver(Controller):
     def reset(self, sample_time: float) -> None:
         self.stream = self.compensator.stream(sample_time)
         self._model_stream = self._model.stream(sample_time)
-        self._share = 1.0 - np.exp(-sample_time / self.filter_time)
+        self._filter_gain = 1.0 - np.exp(-sample_time / self.filter_time)
         self._disturbance = np.zeros(self.compensator.n_driven)
         self._expected: Array | None = None
         self._scheduled = np.empty(0)
@@ -213,7 +214,7 @@ class DisturbanceObserver(Controller):
         """Return the compensator's commands for the reference without the disturbance."""
         if self._expected is not None:
             residual = self._measured(measured) - self._expected
-            self._disturbance += self._share * (residual - self._disturbance)
+            self._disturbance += self._filter_gain * (residual - self._disturbance)
         self._scheduled = scheduled
         wanted = self._inputs(np.concatenate((*ahead, measured)))
         wanted[: self._disturbance.size] -= self._disturbance
@@ -259,13 +260,13 @@ class EstimatedLoad(Controller):
         self.controller.reset(sample_time)
         self.stream = self.controller.stream
         self._estimate = self.estimate.stream(sample_time)
-        self._share = 1.0 - np.exp(-sample_time / self.filter_time)
+        self._filter_gain = 1.0 - np.exp(-sample_time / self.filter_time)
         self._load = np.zeros(len(self.estimate.outputs))
 
     def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
         """Return the controller's commands, with the current load estimate for the next step."""
         found = self._estimate.step(self._inputs(measured))
-        self._load = self._load + self._share * (found - self._load)
+        self._load = self._load + self._filter_gain * (found - self._load)
         now, then = (np.concatenate((self._load, others)) for others in (scheduled, ahead[1]))
         return self.controller.step(reference, measured, now, (ahead[0], then))
 

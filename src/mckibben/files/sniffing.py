@@ -64,6 +64,10 @@ class Layout:
     start_time: float = 0.0
 
 
+LinesWithLayout = tuple[Sequence[bytes], Layout]
+"""The lines of a text, and their layout."""
+
+
 @dataclass(frozen=True)
 class Names:
     """The names of columns, their units or blanks, and the line of names and the last of the header."""

@@ -22,9 +22,10 @@ from mckibben.errors import DataError
 from mckibben.files import own
 from mckibben.files.cells import MISSING, Dialect, column
 from mckibben.files.decoding import decoded
-from mckibben.files.headed import keyed, labview
 from mckibben.files.instants import may_be_instant
+from mckibben.files.labview import labview_segments
 from mckibben.files.lines import samples
+from mckibben.files.named_values import read_named_values
 from mckibben.files.notices import listed, warn
 from mckibben.files.sniffing import SEPARATORS, Layout, sniff
 from mckibben.files.table import Column, Table
@@ -39,7 +40,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     if os.path.lexists(own.sidecar(path)) and (found := _own(data, path)):
         return [found]
     data = decoded(data, path)
-    if segments := labview(data):
+    if segments := labview_segments(data):
         return [replace(_table(*each, path), name=name) for name, each in segments.items()]
     return [parsed(data, path)]
 
@@ -105,7 +106,7 @@ def parsed(data: bytes, path: Path, separators: Sequence[str | None] = SEPARATOR
         data = b"\n" + data[named.end() :]  # so that lines have the same numbers
     if _ARROW.search(data[:_SNIFFED]):
         data = _ARROW.sub(lambda found: found[1] + (found[2] or b" "), data)
-    if (found := keyed(data)) is not None:
+    if (found := read_named_values(data)) is not None:
         return _table(*found, path)
     rows = data.split(b"\n")
     start = [row[:_SNIFFED].decode("utf-8", "replace") for row in rows[:400]]

@@ -19,22 +19,25 @@ from mckibben.recording import Recording
 FAST = 0.99
 """Quantile of the changes between samples that counts as the fastest."""
 
-STRIDES = (4, 1000)
+SAMPLES_PER_TURN_LIMITS = (4, 1000)
 """Fewest and most samples from one turning point of a random motion to the next."""
 
-SAMPLES, STEP = 100, 0.02
+SAMPLES_PER_RANGE, SAMPLE_TIME = 100, 0.02
 """Of the test motion of a model whose recordings are not at hand: samples in which it goes through the
 range, and the time between them [s].
 """
 
-EVEN = 3.0**0.5
-"""Reach of an even distribution, in standard deviations."""
+UNIFORM_REACH = 3.0**0.5
+"""How far a uniform distribution reaches from its mean, in standard deviations."""
 
 CYCLES = 3
 """Of inputs from end to end, after which outputs repeat."""
 
 TURNS = 24
 """Turning points of a random motion."""
+
+MARGIN = 0.05
+"""Share of a range beyond which a value counts as outside; noise is smaller."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +59,7 @@ class RecordedInputs:
         Lowest and highest along the directions.
     ends : array, shape (2, n)
         Lowest and highest of every input.
-    samples : int
+    samples_per_range : int
         In which the fastest motion runs through the range.
     sample_time : float or None
         [s]
@@ -69,7 +72,7 @@ class RecordedInputs:
     directions: Array
     extent: Array
     ends: Array
-    samples: int
+    samples_per_range: int
     sample_time: float | None
 
     @classmethod
@@ -77,29 +80,28 @@ class RecordedInputs:
         """Return the inputs of recordings."""
         derived = [recording.with_derived(names) for recording in recordings]
         tables = [recording.matrix(names) for recording in derived]
-        every = np.concatenate(tables)
-        low, high = every.min(axis=0), every.max(axis=0)
+        samples = np.concatenate(tables)
+        low, high = samples.min(axis=0), samples.max(axis=0)
         scale = np.where(high > low, high - low, 1.0)
         middle = (low + high) / 2
-        shares = (every - middle) / scale
-        few = len(shares) < len(names)  # whose directions lack some
-        directions = np.linalg.svd(shares - shares.mean(axis=0), full_matrices=few)[2].T
+
+        shares = (samples - middle) / scale
+        directions = _principal_directions(shares)
         along = shares @ directions
-        steps = np.concatenate([np.abs(np.diff(table, axis=0)) / scale for table in tables]).max(
-            axis=1
-        )
-        moving = steps[steps > 0]
+
+        steps = np.concatenate([np.abs(np.diff(table, axis=0)) / scale for table in tables])
+        largest_steps = steps.max(axis=1)
+        moving = largest_steps[largest_steps > 0]
         fastest = float(np.quantile(moving, FAST)) if moving.size else 1.0
-        units = {name: derived[0].units[name] for name in names}
         return cls(
             tuple(names),
-            units,
+            {name: derived[0].units[name] for name in names},
             middle,
             scale,
             directions,
             np.array([along.min(axis=0), along.max(axis=0)]),
             np.array([low, high]),
-            int(np.clip(1.0 / fastest, *STRIDES)),
+            int(np.clip(1.0 / fastest, *SAMPLES_PER_TURN_LIMITS)),
             recordings[0].sample_time,
         )
 
@@ -117,21 +119,17 @@ class RecordedInputs:
         names = tuple(channel.name for channel in block.inputs)
         units = {channel.name: channel.unit for channel in block.inputs}
         ends = np.array([ranges.get(name, (0.0, 0.0)) for name in names]).T
-        step = sample_time or block.sample_time or STEP
+        step = sample_time or block.sample_time or SAMPLE_TIME
         middle, scale = ends.mean(axis=0), np.where(ends[1] > ends[0], ends[1] - ends[0], 1.0)
         directions, extent = np.eye(len(names)), (ends - middle) / scale
         if (drive := drive_of(block)) is not None:
-            centre, n = drive[0], len(drive[0])
-            ways = drive[1] / scale[:n, np.newaxis]
-            own = np.linalg.qr(ways, mode="complete").Q
-            reach = EVEN * np.sqrt(((own.T @ ways) ** 2).sum(axis=1))
-            directions[:n, :n] = own
-            extent[:, :n] = (centre - middle[:n]) / scale[:n] @ own + [-reach, reach]
-        return cls(names, units, middle, scale, directions, extent, ends, SAMPLES, step)
+            n = len(drive[0])
+            directions[:n, :n], extent[:, :n] = _along_balance_drive(*drive, middle[:n], scale[:n])
+        return cls(names, units, middle, scale, directions, extent, ends, SAMPLES_PER_RANGE, step)
 
     def motion(self, slowness: float, seed: int) -> Recording:
         """Return a random motion, so many times slower than the fastest recorded."""
-        pace = int(np.clip(self.samples * slowness, *STRIDES))
+        pace = int(np.clip(self.samples_per_range * slowness, *SAMPLES_PER_TURN_LIMITS))
         low, high = self.extent
         inputs = self._inputs(wander(low, high, np.random.default_rng(seed), pace, TURNS))
         return Recording(dict(zip(self.names, inputs.T, strict=True)), self.sample_time, self.units)
@@ -148,7 +146,7 @@ class RecordedInputs:
         They go from end to end along each direction, in cycles of a duration [s], while all other inputs
         are held; what the first cycles leave behind, and what creeps, has come by the last one.
         """
-        step = block.sample_time or seconds / (2 * SAMPLES)
+        step = block.sample_time or seconds / (2 * SAMPLES_PER_RANGE)
         n = max(round(seconds / step), 4)
         share = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(CYCLES * n + 1) / n)
         others = {name: np.full(share.size, value) for name, value in held.items()}
@@ -167,12 +165,30 @@ class RecordedInputs:
         """Return the share of some inputs, shape (k, n), that are not as the recorded ones."""
         along = (inputs - self.middle) / self.scale @ self.directions
         low, high = self.extent
-        margin = BEYOND * (high - low).max()
+        margin = MARGIN * (high - low).max()
         return float(((along < low - margin) | (along > high + margin)).any(axis=1).mean())
 
 
-BEYOND = 0.05
-"""Share of a range beyond which a value counts as outside; noise is smaller."""
+def _principal_directions(shares: Array) -> Array:
+    """Return the principal directions of samples, shape (k, n), one a column, shape (n, n)."""
+    fewer_samples_than_inputs = len(shares) < shares.shape[1]  # their directions lack some
+    centred = shares - shares.mean(axis=0)
+    return np.asarray(np.linalg.svd(centred, full_matrices=fewer_samples_than_inputs)[2].T)
+
+
+def _along_balance_drive(
+    centre: Array, deviations: Array, middle: Array, scale: Array
+) -> tuple[Array, Array]:
+    """Return the directions in which a balance was driven, and the lowest and highest along them.
+
+    Shapes (n, n) and (2, n). ``centre`` (n,) and ``deviations`` (n, d) are those of `drive_of`; inputs
+    are relative to ``middle`` and ``scale``. An orthonormal basis begins with the driven directions; a
+    uniform distribution with these deviations reaches √3 standard deviations from its mean.
+    """
+    scaled = deviations / scale[:, np.newaxis]
+    directions = np.linalg.qr(scaled, mode="complete").Q
+    reach = UNIFORM_REACH * np.sqrt(((directions.T @ scaled) ** 2).sum(axis=1))
+    return directions, (centre - middle) / scale @ directions + [-reach, reach]
 
 
 def beyond_known(model: Block, recording: Recording) -> list[str]:
@@ -187,7 +203,7 @@ def beyond_known(model: Block, recording: Recording) -> list[str]:
         if channel.name not in known or channel.name not in recording:
             continue
         values, (low, high) = recording[channel.name], known[channel.name]
-        reach = BEYOND * (high - low)
+        reach = MARGIN * (high - low)
         if values.min() < low - reach or values.max() > high + reach:
             ends = " to ".join(numeral(float(end), 3) for end in (values.min(), values.max()))
             notes.append(

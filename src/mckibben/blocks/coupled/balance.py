@@ -49,7 +49,7 @@ from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector, rows
 from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, fill, kernel, step
 from mckibben.blocks.learning import Learnable
-from mckibben.blocks.ranges import unknown
+from mckibben.blocks.ranges import unknown_ranges
 from mckibben.blocks.sample_times import needs_sample_time
 from mckibben.errors import ModelError, ModelWarning
 
@@ -542,7 +542,9 @@ class Balance(Invertible):
     @cached_property
     def known_inputs(self) -> Array:
         """Ranges of coordinates, and of what schedules and loads."""
-        scheduled = np.reshape(self.known, (-1, 2)) if self.known else unknown(len(self.scheduled))
+        scheduled = (
+            np.reshape(self.known, (-1, 2)) if self.known else unknown_ranges(len(self.scheduled))
+        )
         return np.vstack([self.known_coordinates, scheduled])
 
     @cached_property

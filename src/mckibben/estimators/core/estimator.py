@@ -33,7 +33,7 @@ from mckibben.estimators.core.arguments import (
     timed,
 )
 from mckibben.estimators.core.data import TrainingData, training_data
-from mckibben.estimators.core.leaving_out import stepped
+from mckibben.estimators.core.leaving_out import outputs_without_parts
 from mckibben.estimators.core.uncertainty import covariance_of, unknown, vanishing
 from mckibben.numerics.tracker import Progress, Tracker
 from mckibben.recording import REST_LENGTH, Recording, base_name, conversion, is_frame, listed
@@ -641,13 +641,13 @@ class Estimator(ABC):
     def left_out(self, runs: FreeRuns, parts: Sequence[Mask]) -> list[list[Array]] | None:
         """Return the outputs of the model as it would be without each part of its data.
 
-        By a step from the fit, or in closed form; see `mckibben.estimators.core.leaving_out.stepped`. A
-        setting `ridge` is of each parameter's own effect on the output.
+        By a step from the fit, or in closed form; see `mckibben.estimators.core.leaving_out`. A setting
+        `ridge` is of each parameter's own effect on the output.
         """
         block, ridge = runs.block, self.get_params().get("ridge", 0.0)
         fixed = {*self.diagnostics_.at_bounds, *self.fixed(block)}
         free = [place for place in range(block.n_parameters) if place not in fixed]
-        return stepped(runs, free, ridge, parts)
+        return outputs_without_parts(runs, free, ridge, parts)
 
     def held_out(
         self, recordings: Sequence[Recording], parts: Sequence[Sequence[Mask]]

@@ -39,7 +39,7 @@ MOST_ROWS = 20_000
 """Number of outputs, evenly spread, on which slopes are computed."""
 
 
-def stepped(
+def outputs_without_parts(
     runs: FreeRuns, free: Sequence[int], penalty: float, parts: Sequence[Mask]
 ) -> list[list[Array]] | None:
     """Return the outputs of a fitted model as it would be without each part of its data.
@@ -75,9 +75,9 @@ def stepped(
     slopes, units = slopes / effects, relative_sizes(parameters)[places] / effects
     residual, target = runs.residual[kept], runs.scored(runs.modelled) + runs.residual
     gram, slope = slopes.T @ slopes, slopes.T @ residual
-    thinned = residual.size / max(target.size, 1)
+    kept_share = residual.size / max(target.size, 1)
 
-    def moved(step: Array) -> list[Array] | None:
+    def outputs_after(step: Array) -> list[Array] | None:
         """Return the outputs of the model moved by a step; None where it has none."""
         there = parameters.copy()
         there[places] += step * units
@@ -89,19 +89,20 @@ def stepped(
         return tables if all(np.isfinite(table).all() for table in tables) else None
 
     def cost(tables: Sequence[Array], part: Mask) -> float:
-        """Return half the squared error without a part, in the scale of thinned outputs."""
+        """Return half the squared error without a part, in the scale of the kept outputs."""
         error = (target - runs.scored(tables))[~part]
-        return 0.5 * thinned * float(error @ error)
+        return 0.5 * kept_share * float(error @ error)
 
     found = []
     for part in parts:
-        out = slopes[part[kept]]
-        rest, uphill = gram - out.T @ out, out.T @ residual[part[kept]]
+        left_out = part[kept]
+        own = slopes[left_out]
+        rest, uphill = gram - own.T @ own, own.T @ residual[left_out]
         best, before = runs.modelled, cost(runs.modelled, part)
         for damping in DAMPINGS:
-            eased = rest + (damping + penalty) * np.eye(len(rest))
-            step = np.linalg.lstsq(eased, -uphill, rcond=1e-14)[0]
-            tables = moved(step)
+            damped = rest + (damping + penalty) * np.eye(len(rest))
+            step = np.linalg.lstsq(damped, -uphill, rcond=1e-14)[0]
+            tables = outputs_after(step)
             if tables is not None and cost(tables, part) + float(slope @ step) < before:
                 best = tables
                 break

@@ -70,56 +70,86 @@ def covariance_of_balance(runs: FreeRuns, fixed: Sequence[int]) -> tuple[float, 
     free, sizes, slopes = free[usable], sizes[usable], slopes[..., usable]
     ends = np.cumsum([int(rows.sum()) for rows in runs.rows])[:-1]
     pieces = np.split(np.arange(len(errors)), ends)
-    # as much as errors that are independent count, as in the fit
-    model = [autoregression([errors[piece, j] for piece in pieces]) for j in range(m)]
-    fewer = np.mean([len(errors) / one.effective_sample_size(len(errors)) for one in model])
-    likely = fewer * (sizes / natural_scales(block)[free]) ** 2
+
+    samples_per_independent_error = _samples_per_independent_error(errors, pieces)
+    prior_precision = samples_per_independent_error * (sizes / natural_scales(block)[free]) ** 2
     flat = slopes.reshape(-1, free.size)
-    products = flat.T @ flat + np.diag(likely)
+    products = flat.T @ flat + np.diag(prior_precision)
     lowest, highest = np.linalg.eigvalsh(products)[[0, -1]]
     inverse, lost = _inverted(products)
-    blocks = [block for piece in blocks_of(pieces, BLOCKS) for block in piece if block.size]
-    moved = []
-    for one in blocks:  # what a fit without a block is off by
-        own = slopes[one].reshape(-1, free.size)
-        moved.append(_inverted(products - own.T @ own)[0] @ (errors[one].ravel() @ own))
-    few = max(len(blocks) - 1, 1)
-    wider = (student(few) / NORMAL_95) ** 2 * few / len(blocks)
-    spread = wider * np.transpose(moved) @ np.array(moved)
-    shifted = np.einsum("tj,tjk->k", _shift(runs) * weight, slopes)
-    bias = np.outer(shifted, shifted) + fewer * np.diag(likely)
-    found = spread + inverse @ bias @ inverse
-    found[lost] = found[:, lost] = np.nan
-    covariance[np.ix_(free, free)] = found * np.outer(sizes, sizes)
+
+    spread = _block_jackknife(products, errors, slopes, pieces)
+    shift = np.einsum("tj,tjk->k", _output_shift_by_input_noise(runs) * weight, slopes)
+    input_noise_bias = np.outer(shift, shift)
+    # P w w' P with the prior precision P, on average over parameters w of natural size
+    prior_bias = samples_per_independent_error * np.diag(prior_precision)
+    mean_squares = spread + inverse @ (input_noise_bias + prior_bias) @ inverse
+
+    mean_squares[lost] = mean_squares[:, lost] = np.nan
+    covariance[np.ix_(free, free)] = mean_squares * np.outer(sizes, sizes)
     known = usable.all() and lowest > 0.0
     return float(np.sqrt(highest / lowest)) if known else np.inf, covariance
+
+
+def _samples_per_independent_error(errors: Array, pieces: Sequence[Array]) -> float:
+    """Return how many errors, shape (n, m), count as one that is independent, as in the fit.
+
+    ``pieces`` are the rows of every recording.
+    """
+    models = [
+        autoregression([errors[piece, j] for piece in pieces]) for j in range(errors.shape[1])
+    ]
+    n = len(errors)
+    return float(np.mean([n / model.effective_sample_size(n) for model in models]))
+
+
+def _block_jackknife(
+    products: Array, errors: Array, slopes: Array, pieces: Sequence[Array]
+) -> Array:
+    """Return the covariance (k, k) of a fit, by leaving out long blocks of its samples in turn.
+
+    ``products`` (k, k) are those of the ``slopes`` (n, m, k) with the prior; ``errors`` are (n, m).
+    """
+    blocks = [block for piece in blocks_of(pieces, BLOCKS) for block in piece if block.size]
+    shifts_without_block = []
+    for block in blocks:
+        own = slopes[block].reshape(-1, slopes.shape[-1])
+        shifts_without_block.append(
+            _inverted(products - own.T @ own)[0] @ (errors[block].ravel() @ own)
+        )
+    degrees_of_freedom = max(len(blocks) - 1, 1)
+    wider = (student(degrees_of_freedom) / NORMAL_95) ** 2
+    small_sample_factor = wider * degrees_of_freedom / len(blocks)
+    return np.asarray(
+        small_sample_factor * np.transpose(shifts_without_block) @ np.array(shifts_without_block)
+    )
 
 
 def _inverted(products: Array) -> tuple[Array, Mask]:
     """Return the inverse of products of slopes (k, k), and what nothing determines."""
     size = np.sqrt(np.diag(products))
     size[size == 0.0] = 1.0
-    values, ways = np.linalg.eigh(products / np.outer(size, size))
+    values, vectors = np.linalg.eigh(products / np.outer(size, size))
     kept = values > ROUNDING * values[-1]
-    inverse = (ways[:, kept] / values[kept]) @ ways[:, kept].T / np.outer(size, size)
-    return inverse, (ways[:, ~kept] ** 2).sum(axis=1) > LOST
+    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(size, size)
+    return inverse, (vectors[:, ~kept] ** 2).sum(axis=1) > LOST
 
 
-def _shift(runs: FreeRuns) -> Array:
+def _output_shift_by_input_noise(runs: FreeRuns) -> Array:
     """Return by how much outputs move on average, shape (n, m), if noise is added to the inputs."""
-    rng, moved = np.random.default_rng(0), []
+    rng, shifts = np.random.default_rng(0), []
     noises = [noise_of(run.inputs) * rng.standard_normal(run.inputs.shape) for run in runs.runs]
-    for way in (1.0, -1.0):  # so that what is linear in noise is none
+    for sign in (1.0, -1.0):  # what is linear in the noise cancels
         noisy = [
             replace(
                 run,
-                driven=run.driven + way * noise[:, : run.driven.shape[1]],
-                scheduled=run.scheduled + way * noise[:, run.driven.shape[1] :],
+                driven=run.driven + sign * noise[:, : run.driven.shape[1]],
+                scheduled=run.scheduled + sign * noise[:, run.driven.shape[1] :],
             )
             for run, noise in zip(runs.runs, noises, strict=True)
         ]
-        moved.append(replace(runs, runs=noisy).residual - runs.residual)
-    return np.nan_to_num(np.mean(moved, axis=0)).reshape(-1, len(runs.names))
+        shifts.append(replace(runs, runs=noisy).residual - runs.residual)
+    return np.nan_to_num(np.mean(shifts, axis=0)).reshape(-1, len(runs.names))
 
 
 def noise_of(series: Array) -> Array:

@@ -34,6 +34,15 @@ TOLERANCES = {False: "1e-9", True: "1e-4"}
 SHARED = Path(__file__).parent / "server" / "mck.h"
 """Files shared by the C code of all models."""
 
+LEAST_RELATIVE_SPAN, LEAST_SPAN = 1e-4, 1e-9
+"""Smallest range of an output in the self-test: relative to its size, and added to that in its unit."""
+
+SAMPLES_PER_TURN = 400
+"""Mean number of samples between turning points of the inputs on which precisions are compared."""
+
+FLASH_PER_CALL = 32
+"""Estimate of the constants that a call of a kernel takes beside its coefficients [bytes]."""
+
 LONGEST_STEP = 1e6
 """Largest sample time of an exported model [s]."""
 
@@ -146,8 +155,8 @@ def vectors(block: Block, sample_time: float | None, *, single: bool = False) ->
             f"{block.kind!r} gives outputs that are not finite on inputs within its range",
             remedy="identify it again, or give it an input range",
         )
-    # or their size, where they hardly move
-    ranges = np.maximum(np.ptp(outputs, axis=0), 1e-4 * np.abs(outputs).max(axis=0) + 1e-9)
+    least = LEAST_RELATIVE_SPAN * np.abs(outputs).max(axis=0) + LEAST_SPAN
+    ranges = np.maximum(np.ptp(outputs, axis=0), least)
     return {
         "expected": outputs,
         "spans": ranges,
@@ -194,7 +203,7 @@ def described(
     calls = [each for each in steps if isinstance(each, dict)]
     inputs, outputs = _channel_entries(block.inputs), _channel_entries(block.outputs)
     size, n_numbers = 4 if single else 8, max(wiring.n_numbers, 1)
-    constants = sum(call.coefficients.size for call in wiring.calls)
+    n_coefficients = sum(call.coefficients.size for call in wiring.calls)
     return {
         "name": name,
         "version": __version__,
@@ -205,7 +214,7 @@ def described(
         "period": round(1e6 * step) if step else 0,
         "inputs": inputs,
         "outputs": outputs,
-        "constants": _constants(inputs, outputs, step),
+        "macros": _macros(inputs, outputs, step),
         "calls": calls,
         "kinds": [call.block.title for call in wiring.calls],
         "steps": steps,
@@ -224,7 +233,7 @@ def described(
         "shared": (SHARED,),
         "sources": [f"{name}.c"],
         "ram": size * (n_numbers + len(inputs) + len(outputs)) + size,
-        "flash": size * (constants + 2 * len(inputs)) + 32 * len(calls),
+        "flash": size * (n_coefficients + 2 * len(inputs)) + FLASH_PER_CALL * len(calls),
     }
 
 
@@ -250,7 +259,9 @@ def _warn_of_rounding(block: Block, sample_time: float | None) -> None:
     """Compare the same kernel in single and double precision."""
     rng = np.random.default_rng(0)
     samples = min(SAMPLES, MOST_PRODUCTS // max(block.n_states, 1))
-    inputs = wander(*identified_limits(block), rng, 400, samples // 400).astype(np.float32)
+    inputs = wander(
+        *identified_limits(block), rng, SAMPLES_PER_TURN, samples // SAMPLES_PER_TURN
+    ).astype(np.float32)
     single, double = (_run(block, inputs.astype(kind), sample_time) for kind in (np.float32, float))
     off = float(np.abs(single - double).max() / max(np.ptp(double), 1e-300))
     if not off <= NOTICED:
@@ -342,9 +353,10 @@ def _channel_entries(channels: tuple[Channel, ...]) -> list[dict[str, str]]:
     return [{"name": said(channel.name), "unit": said(channel.unit) or "1"} for channel in channels]
 
 
-def _constants(
+def _macros(
     inputs: list[dict[str, str]], outputs: list[dict[str, str]], step: float | None
 ) -> list[tuple[str, str, str]]:
+    """Return the name, value and unit of every macro of a header, without the model's prefix."""
     entries: list[tuple[str, str, str]] = [
         ("N_INPUTS", str(len(inputs)), ""),
         ("N_OUTPUTS", str(len(outputs)), ""),

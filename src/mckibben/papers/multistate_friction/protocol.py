@@ -23,8 +23,8 @@ from mckibben.signals.protocol import PlannedRun, Protocol, Role
 SAMPLE_TIME, LONGEST, HIGHEST = 0.02, 200.0, 6.0
 """Time between samples [s]; length at rest [mm] and highest pressure [bar] of the paper's muscle."""
 
-FIRST = (0.0, 0.8, 1.2, 1.6, 1.9, 2.2, 2.4, 2.7, 3.0)
-LENGTHS = dict(zip(np.arange(200.0, 183.0, -2.0).tolist(), FIRST, strict=True))
+TAUT_PRESSURES = (0.0, 0.8, 1.2, 1.6, 1.9, 2.2, 2.4, 2.7, 3.0)
+LENGTHS = dict(zip(np.arange(200.0, 183.0, -2.0).tolist(), TAUT_PRESSURES, strict=True))
 """Held in the isometric tests [mm], and the pressure from which each starts, where the muscle is just
 taut [bar]: below, it would move. Shorter ones go slack while their friction is being released."""
 
@@ -48,23 +48,28 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
     On another test stand lengths are in proportion to its length at the start, pressures to its highest;
     one of less pressure contracts less, as far as the paper's muscle would at that pressure.
     """
-    wide, strong = 1.0, 1.0
+    length_scale, pressure_scale = 1.0, 1.0
     if rig is not None:
         if "length" not in rig.inputs:
             remedy = "change a copy of the rig mas10-test-stand"
             problem = f"the rig {rig.name!r} does not impose it"
             raise DataError(problem, channel="length", remedy=remedy)
-        wide = rig.start.get("length", rig.limits("length").high) / LONGEST
-        strong = share(rig, "pressure", HIGHEST)
+        length_scale = rig.start.get("length", rig.limits("length").high) / LONGEST
+        pressure_scale = share(rig, "pressure", HIGHEST)
     runs = list[PlannedRun]()
-    weak = min(strong, 1.0)
-    for kind, role, bars, lengths, lead in (*_isometric(weak), *_isobaric(weak)):
-        inputs = {"pressure": strong * bars, "length": wide * lengths}
+    limited_pressure_scale = min(pressure_scale, 1.0)
+    for kind, role, bars, lengths, lead_time in (
+        *_isometric(limited_pressure_scale),
+        *_isobaric(limited_pressure_scale),
+    ):
+        inputs = {"pressure": pressure_scale * bars, "length": length_scale * lengths}
         start = {f"start.{channel}": float(values[0]) for channel, values in inputs.items()}
-        stage, held = ("static", "length") if lead else ("friction", "pressure")
+        stage, held = ("static", "length") if lead_time else ("friction", "pressure")
         labels = {"stage": stage, held: start[f"start.{held}"]}
         name = kind.format(**{channel: values[-1] for channel, values in inputs.items()})
-        runs.append(PlannedRun(name, role, Recording(inputs, SAMPLE_TIME), start, labels, lead))
+        runs.append(
+            PlannedRun(name, role, Recording(inputs, SAMPLE_TIME), start, labels, lead_time)
+        )
     return Protocol(
         name="multistate-friction",
         rig="mas10-test-stand",
@@ -76,36 +81,46 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
 
 
 Planned = tuple[str, Role, Array, Array, float]
-"""Name by its last pressure and length, role, pressures and lengths of the paper's muscle, and lead."""
+"""Name by its last pressure and length, role, pressures and lengths of the paper's muscle, lead time."""
 
 
-def _isometric(weak: float) -> Iterator[Planned]:
+def _isometric(limited_pressure_scale: float) -> Iterator[Planned]:
     """Yield the isometric runs of a stand whose pressure is that share of the paper's."""
-    lead = SWINGS * SWING_PERIOD + VENTING
-    time = _time(lead + RISE)
-    swung = SWING * np.clip(1.0 - time / (SWINGS * SWING_PERIOD), 0.0, 1.0)
-    swinging = swung * np.sin(2 * np.pi * time / SWING_PERIOD)
+    lead_time = SWINGS * SWING_PERIOD + VENTING
+    time = _time(lead_time + RISE)
+    swing_amplitude = SWING * np.clip(1.0 - time / (SWINGS * SWING_PERIOD), 0.0, 1.0)
+    swinging = swing_amplitude * np.sin(2 * np.pi * time / SWING_PERIOD)
     depths = [LONGEST - length for length in LENGTHS]
     for first in LENGTHS.values():
-        length = LONGEST - float(np.interp(weak * first, [*LENGTHS.values()], depths))
-        rising = np.interp(time, (lead - VENTING, lead, lead + RISE), (HIGHEST, first, HIGHEST))
+        length = LONGEST - float(
+            np.interp(limited_pressure_scale * first, [*LENGTHS.values()], depths)
+        )
+        rising = np.interp(
+            time, (lead_time - VENTING, lead_time, lead_time + RISE), (HIGHEST, first, HIGHEST)
+        )
         lengths = np.minimum(length + swinging, LONGEST)
-        yield "isometric-{length:.4g}mm", "train", rising, lengths, lead
+        yield "isometric-{length:.4g}mm", "train", rising, lengths, lead_time
 
 
-def _isobaric(weak: float) -> Iterator[Planned]:
+def _isobaric(limited_pressure_scale: float) -> Iterator[Planned]:
     """Yield the cycles at every pressure, and the minor loops."""
     turns = [0.0, *SHORTEST], [0.0, *(LONGEST - shortest for shortest in SHORTEST.values())]
     for bar in SHORTEST:
-        depth = float(np.interp(weak * bar, *turns))
+        depth = float(np.interp(limited_pressure_scale * bar, *turns))
         period = 2 * depth / SPEED
-        gone = triangle(_time(CYCLES * period), period, depth)
+        shortening = triangle(_time(CYCLES * period), period, depth)
         role: Role = "train" if bar == IDENTIFIED_AT else "test"
-        yield "isobaric-{pressure:.3g}bar", role, np.full(gone.size, bar), LONGEST - gone, 0.0
-    depth = float(np.interp(weak * IDENTIFIED_AT, *turns))
-    gone = irregular_triangle(_time(120.0), 13, depth, seed=4)
-    held = np.full(gone.size, IDENTIFIED_AT)
-    yield "isobaric-minor-loops", "test", held, LONGEST - gone, 0.0
+        yield (
+            "isobaric-{pressure:.3g}bar",
+            role,
+            np.full(shortening.size, bar),
+            LONGEST - shortening,
+            0.0,
+        )
+    depth = float(np.interp(limited_pressure_scale * IDENTIFIED_AT, *turns))
+    shortening = irregular_triangle(_time(120.0), 13, depth, seed=4)
+    held = np.full(shortening.size, IDENTIFIED_AT)
+    yield "isobaric-minor-loops", "test", held, LONGEST - shortening, 0.0
 
 
 def _time(duration: float) -> Array:
@@ -115,16 +130,18 @@ def _time(duration: float) -> Array:
 def recognised(runs: Sequence[Features]) -> list[Labels]:
     """Return stages by what moves; the friction is identified at two thirds of the highest pressure."""
     isometric = [one.moved("pressure") > one.moved("length") for one in runs]
-    held = ["length" if still else "pressure" for still in isometric]
+    held = ["length" if length_held else "pressure" for length_held in isometric]
     levels = [one.level(channel) for one, channel in zip(runs, held, strict=True)]
     cycled = [k for k, one in enumerate(runs) if not isometric[k] and one.regular("length")]
     target = IDENTIFIED_AT / HIGHEST * max((levels[k] for k in cycled), default=0.0)
     chosen = min(cycled, key=lambda k: abs(levels[k] - target), default=None)
     tolerance = {channel: 0.02 * span for channel, span in runs[0].spans.items()}
     found: list[Labels] = []
-    for k, (still, channel) in enumerate(zip(isometric, held, strict=True)):
+    for k, (length_held, channel) in enumerate(zip(isometric, held, strict=True)):
         alike = [level for level, other in zip(levels, held, strict=True) if other == channel]
         level = dict(zip(alike, grouped(alike, tolerance[channel]), strict=True))[levels[k]]
-        role: Role = "train" if still or k == chosen else "test"
-        found.append(Labels(role, {"stage": "static" if still else "friction", channel: level}))
+        role: Role = "train" if length_held or k == chosen else "test"
+        found.append(
+            Labels(role, {"stage": "static" if length_held else "friction", channel: level})
+        )
     return found

@@ -121,7 +121,7 @@ def test_derivatives_by_thresholds_agree_with_differences() -> None:
         theta = np.array([0.9, 0.4, 0.3, 0.2, 0.1, -0.2, 0.05, 0.02, 0.05, 0.22, 0.41, 0.77])
         matrix = estimator.design_matrix(theta, data)
         linear, _ = estimator.solve(matrix, data)
-        slopes = estimator.moves(theta, linear, data)
+        slopes = estimator.output_jacobian(theta, linear, data)
         for place in range(theta.size):
             steps = 1e-6 * (np.arange(theta.size) == place)
             apart = estimator.design_matrix(theta + steps, data) - estimator.design_matrix(

@@ -27,6 +27,6 @@ def test_moves_in_closed_form_are_those_of_finite_differences(name: str) -> None
     lower, upper = estimator.bounds(data)
     theta = 0.999 * np.clip(estimator.guesses(data)[0], lower, upper) + 0.0005 * (lower + upper)
     linear, _ = estimator.solve(estimator.design_matrix(theta, data), data)
-    moves = estimator.moves(theta, linear, data)
-    differences = SeparableEstimator.moves(estimator, theta, linear, data)
+    moves = estimator.output_jacobian(theta, linear, data)
+    differences = SeparableEstimator.output_jacobian(estimator, theta, linear, data)
     np.testing.assert_allclose(moves, differences, atol=2e-4 * np.abs(moves).max())

@@ -81,7 +81,7 @@ def test_overlapping_slices_are_found_where_they_overlap(seed: int) -> None:
     overlap = int(np.random.default_rng(seed).integers(150, 600))
     (found,) = shared_rows([RUN.slice(0, 700), RUN.slice(700 - overlap, 1200)], *CHANNELS)
     assert found.start == pytest.approx(STEP * (700 - overlap), abs=5 * STEP)
-    assert found.begins == pytest.approx(found.start)
+    assert found.start_in_first == pytest.approx(found.start)
     assert found.stop == pytest.approx(STEP * 699)
     assert found.share == pytest.approx(overlap / 700, abs=0.02)
     assert common(RUN.slice(0, 700), RUN.slice(700, 1200)) == []

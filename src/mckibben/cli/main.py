@@ -42,22 +42,23 @@ class Commands(click.Group):
     """The commands; the help lists the first lines of their modules without loading them."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return their names."""
+        """Return the names of all commands."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return one, loaded."""
+        """Return a command by its name, loading its module; None if there is none."""
         if cmd_name not in COMMANDS:
             return None
         if find_spec(f"mckibben.cli.commands.{cmd_name}") is None:
             from mckibben.cli.operations import operation_command
 
             return operation_command(cmd_name)
-        found: click.Command = import_module(f"mckibben.cli.commands.{cmd_name}").__dict__[cmd_name]
-        return found
+        module = import_module(f"mckibben.cli.commands.{cmd_name}")
+        command: click.Command = module.__dict__[cmd_name]
+        return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the list of them."""
+        """Write the list of commands, each with what it does."""
         about = {**_summaries("mckibben.workflow"), **_summaries("mckibben.cli.commands")}
         with formatter.section("Commands"):
             formatter.write_dl([(name, about[name]) for name in COMMANDS])
@@ -65,17 +66,17 @@ class Commands(click.Group):
 
 def _summaries(package: str) -> dict[str, str]:
     """Return the first lines of docstrings of modules and functions, by name, without loading them."""
-    found: dict[str, str] = {}
+    summaries: dict[str, str] = {}
     spec = find_spec(package)
     for folder in () if spec is None else spec.submodule_search_locations or ():
         for path in Path(folder).glob("*.py"):
             tree = ast.parse(path.read_text(encoding="utf-8"))
-            found[path.stem] = (ast.get_docstring(tree) or "").partition("\n")[0]
+            summaries[path.stem] = (ast.get_docstring(tree) or "").partition("\n")[0]
             for node in tree.body:
                 if isinstance(node, ast.FunctionDef):
                     text = ast.get_docstring(node) or ""
-                    found.setdefault(node.name, text.partition("\n")[0])
-    return found
+                    summaries.setdefault(node.name, text.partition("\n")[0])
+    return summaries
 
 
 def _show_version(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
@@ -174,5 +175,5 @@ def _say(message: str, code: int) -> int:
 
 
 def _text(warning: Warning | str) -> str:
-    """Return the text of a warning with parameters as flags."""
+    """Return the text of a warning."""
     return str(warning.args[0] if isinstance(warning, Warning) and warning.args else warning)

@@ -192,7 +192,7 @@ def learned(
         if number == 0:
             return compensator
         rows = tuple(
-            vector(_earlier(lesson.corrections[number], ahead, repeats)) for lesson in lessons
+            vector(_advanced(lesson.corrections[number], ahead, repeats)) for lesson in lessons
         )
         return Series((Repetition(rows, step, channels, channels, repeats), compensator))
 
@@ -260,7 +260,7 @@ class _Lesson:
         lowest, highest = bounds
         low, high = np.minimum(lowest - desired, 0.0), np.maximum(highest - desired, 0.0)
         delay = _delay(desired, measured[0])
-        cutoff, expected = _cutoff(desired, _earlier(desired - measured[0], delay, repeats))
+        cutoff, expected = _cutoff(desired, _advanced(desired - measured[0], delay, repeats))
         # of a Gaussian that is 1/2 there
         width = math.sqrt(2 * math.log(2)) / (2 * math.pi * cutoff)
         errors = np.sqrt(np.mean((desired - measured)[:, settle:] ** 2, axis=1))
@@ -269,7 +269,7 @@ class _Lesson:
         for k, output in enumerate(measured):
             if k and errors[k] >= errors[k - 1]:
                 width *= SLOWER
-            error = _smooth(_earlier(desired - output, delay, repeats), width, repeats)
+            error = _smooth(_advanced(desired - output, delay, repeats), width, repeats)
             if before is not None:
                 gain = np.where(error * before < 0, LESS * gain, np.minimum(MORE * gain, 1.0))
             before = error
@@ -313,7 +313,7 @@ def _cutoff(desired: Array, error: Array) -> tuple[float, float]:
     return float(frequencies[end]), expected
 
 
-def _earlier(samples: Array, late: int, repeats: bool) -> Array:
+def _advanced(samples: Array, late: int, repeats: bool) -> Array:
     """Return samples moved forward in time; the end is held, or is the beginning."""
     places = np.arange(len(samples)) + late
     return samples[places % len(samples) if repeats else np.minimum(places, len(samples) - 1)]

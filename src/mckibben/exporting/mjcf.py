@@ -111,7 +111,7 @@ def mjcf(
     lag: float = 0.0,
 ) -> str:
     """Return the text of `export_mjcf`."""
-    muscle, name = carried(model), identifier(name)
+    muscle, name = require_exportable(model), identifier(name)
     shortest = MM * stroke(muscle)
     require(shortest < rest_length <= 1e5, "rest_length", rest_length, f"{shortest:g} to 100000 mm")
     require(0.0 <= lag <= 10.0, "lag", lag, "0 to 10 s")
@@ -128,13 +128,13 @@ def mjcf(
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
-def carried(model: Block) -> Balance:
-    """Return the balance of a model, if it has nothing that MJCF does not carry.
+def require_exportable(model: Block) -> Balance:
+    """Return the balance of a model that can be exported to MJCF.
 
     Raises
     ------
     ModelError
-        Else, with what is in the way.
+        If it has features that MJCF lacks, with their names.
     """
     again = (
         "fit it with `mckibben fit balance FILES --for mjcf`, under a measured force, or "

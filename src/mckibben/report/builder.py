@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 PLOTLY = "plotly.min.js.xz"
 """What reports use of plotly.js 4.1.1 (MIT), packed by recipe/plotly.mjs: in Python 60 MB."""
 
-FIGURE = re.compile(r"[-−+±<>]? ?\d[\d.,e+−-]*( (to [-−]?\d\S*|\S+))?")
+NUMBER_CELL = re.compile(r"[-−+±<>]? ?\d[\d.,e+−-]*( (to [-−]?\d\S*|\S+))?")
 """A cell that holds a number, perhaps with its unit, or an interval."""
 
 PACKAGES = ("mckibben", "numpy", "scipy", "numba")
@@ -76,12 +76,14 @@ class Table:
         object.__setattr__(self, "rows", rows)
 
     @property
-    def figures(self) -> set[int]:
+    def numeric_columns(self) -> set[int]:
         """Columns of numbers, which are right-aligned."""
 
         def numbers(place: int) -> float:
             cells = [row[place] for row in self.rows if row[place] not in (None, "", "–", "-")]
-            plain = [isinstance(c, int | float) or bool(FIGURE.fullmatch(str(c))) for c in cells]
+            plain = [
+                isinstance(c, int | float) or bool(NUMBER_CELL.fullmatch(str(c))) for c in cells
+            ]
             return sum(plain) / max(len(plain), 1)
 
         return {k for k in range(1, len(self.headings)) if numbers(k) > 0.5}
@@ -100,6 +102,7 @@ class Figure:
     height: float = 0.0
     """Of each plot [rem]; 0 for that of the style sheet."""
     toggled: bool = False
+    """Whether curves of models are shown and hidden by choosing models on the page."""
     kind: str = "figure"
 
 
@@ -223,7 +226,7 @@ def plain(text: str) -> str:
 
 
 def _table(one: Table) -> Iterator[str]:
-    sides = ("---:" if k in one.figures else "---" for k in range(len(one.headings)))
+    sides = ("---:" if k in one.numeric_columns else "---" for k in range(len(one.headings)))
     yield f"| {' | '.join(map(plain, one.headings))} |"
     yield f"|{'|'.join(sides)}|"
     for place, row in enumerate(one.rows):

@@ -22,6 +22,12 @@ MOST_RECORDINGS = 4
 MOST_OUTPUTS = 6
 """Outputs with figures of their own; the others have their numbers."""
 
+MOST_NAMED = 6
+"""Recordings named in the subtitle; the others are counted."""
+
+MOST_TILES = 4
+"""Outputs whose residual is a tile at the top of the page."""
+
 
 def check_json(found: Validation, model_file: str) -> dict[str, Any]:
     """Return a check with its verdict in words, for JSON."""
@@ -51,8 +57,8 @@ def check_page(found: Validation, model_file: str) -> str:
     if found.description is not None:
         sections.append(Section("model", "Model", results.description(found.description)))
     untested = [f"Too short to be tested: {', '.join(found.untested)}."] * bool(found.untested)
-    more = len(found.recordings) - 6
-    listed = ", ".join(found.recordings[:6]) + (f" and {more} more" if more > 0 else "")
+    more = len(found.recordings) - MOST_NAMED
+    listed = ", ".join(found.recordings[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
     return Page(
         f"Check of {found.model}",
         f"{model_file}, running free on {listed}",
@@ -64,14 +70,17 @@ def check_page(found: Validation, model_file: str) -> str:
                 f"RMS, {percent(one.rmse / one.span)} of its range" if one.span else "RMS",
                 f"output-{k}",
             )
-            for k, one in enumerate(found.outputs[:4])
+            for k, one in enumerate(found.outputs[:MOST_TILES])
         ],
         answers=[("Is it right?", words.check_verdict(found, sized=False))],
     ).html()
 
 
 def _output(one: OutputCheck, place: int, runs: list[FreeRun]) -> list[Item]:
-    """Return the sections of an output: finding, residuals, and all tests."""
+    """Return the items of an output: its tests, then figures over time and of the autocorrelation.
+
+    ``place`` is that of the output in the model; from `MOST_OUTPUTS` on there are no figures.
+    """
     items = results.checked(one)
     if place >= MOST_OUTPUTS:
         return items

@@ -34,12 +34,15 @@ if TYPE_CHECKING:
 RECORDED = ("", "virtual rig", "measured", "extracted", "reference")
 """Names of curves that are drawn in ink, as what a muscle did or should do: one of them in a figure."""
 
-DOTS = 40
-"""Most points of a curve that are drawn each."""
+MOST_DOTS = 40
+"""Largest number of points of a curve that are drawn one by one."""
 
-SHARE, LEAST = 0.5, 0.1
-"""Of the highest recorded curve on such an axis: what a panel may show above and below its own, and
-its height at least, so that noise does not fill it."""
+OVERSHOOT_SHARE = 0.5
+"""What a panel shows at least above and below its recorded curve, relative to the height of the highest
+recorded curve on an axis of the same label."""
+
+LEAST_HEIGHT_SHARE = 0.1
+"""Least height of a panel, so that noise does not fill it, relative to the same height."""
 
 
 def heading(one: Table | Figure, *, quick: bool = False) -> str:
@@ -61,10 +64,10 @@ def reproduction_page(found: Reproduction, command: str = "") -> str:
         chart(f"comparison-{k}", comparison(table), heading(table), "tall" * (len(table.rows) > 12))
         for k, table in enumerate(pictured)
     ]
-    drawn = [drawing(one) for one in found.figures]
+    drawings = [drawing(figure) for figure in found.figures]
     figures = [
         chart(f"figure-{k}", one, heading(figure), "square", min(len(one.panels), one.abreast))
-        for k, (one, figure) in enumerate(zip(drawn, found.figures, strict=True))
+        for k, (one, figure) in enumerate(zip(drawings, found.figures, strict=True))
     ]
     quickly = " --quick" * found.quick
     command = command or f"mckibben reproduce {found.name}{quickly} --seed {found.seed}"
@@ -120,22 +123,22 @@ def comparison(table: Table) -> Drawing:
     curves: list[Curve] = []
     series = (f"series-{k + 1}" for k in range(N_COLOURS))
     inks = iter(("measured", "input"))
-    for column in _drawn(table):
+    for column in _plotted_columns(table):
         cells = [row[table.columns.index(column)] for row in table.rows]
-        places = [place for place, cell in enumerate(cells) if isinstance(cell, int | float)]
+        numbered = [row for row, cell in enumerate(cells) if isinstance(cell, int | float)]
         printed = column.endswith("printed")
         colour = (next(inks, "") if printed else "") or next(series)
-        x = np.array([cells[place] for place in places], dtype=float)
+        x = np.array([cells[row] for row in numbered], dtype=float)
         style: Style = "rings" if printed else "dots"
-        curves.append(Curve(x, np.array(places, dtype=float), column, colour, style))
+        curves.append(Curve(x, np.array(numbered, dtype=float), column, colour, style))
     bound = () if table.text.bound is None else (Mark(table.text.bound, "printed: below"),)
     names = tuple(str(row[0]) for row in table.rows)
     label = axis_label(table.text.drawn, table.text.unit)
     return Drawing((Panel(label, "", tuple(curves), marks=bound, categories=names),))
 
 
-def _drawn(table: Table) -> list[str]:
-    """Return the drawn columns: those of the measure, or with a printed figure."""
+def _plotted_columns(table: Table) -> list[str]:
+    """Return the drawn columns: those of the measure, or with a printed number."""
     named = [column for column in table.columns[1:] if table.text.drawn in column]
     printed = {c.removesuffix(", printed") for c in table.columns if c.endswith(", printed")}
     both = [c for c in table.columns[1:] if c.removesuffix(", printed") in printed]
@@ -148,43 +151,64 @@ def drawing(figure: Figure) -> Drawing:
     A curve is named in the first panel that has one of its name.
     """
     names = dict.fromkeys(name for axes in figure.panels.values() for name in axes.curves)
-    ink = next((name for name in names if name in RECORDED), "")
-    others = [name for name in names if name != ink]
-    colours = {name: series_colour(place) for place, name in enumerate(others[:N_COLOURS])}
-    colours = {ink: "measured"} | colours
-    panels, unnamed, shading = list[Panel](), {*colours}, figure.text.shaded
-    for title, axes in figure.panels.items():
-        labels = figure.text.axes.get(axes.key, figure.text)
-        drawn = {name: axes.curves[name] for name in colours if name in axes.curves}
-        under = ink if len(drawn) > 1 else None
-        curves = tuple(
-            Curve(x, y, name * (name in unnamed), colours[name], _style(x, name == under))
-            for name, (x, y) in drawn.items()
-        )
-        marks = tuple(Mark(x, shading * (not k), end) for k, (x, end) in enumerate(axes.shaded))
-        unnamed, shading = unnamed - {*drawn}, shading * (not marks)
-        panels.append(Panel(labels.x, labels.y, curves, title, marks=marks))
-    panels = _within(panels)
-    every = [curve for panel in panels for curve in panel.curves]
-    beyond = {curve.colour for curve in every if curve.style in ("above", "below")}
-    left = [name for name, colour in colours.items() if colour in beyond]
-    leaving = f"Arrow heads: beyond the axis, {'; '.join(left)}." if left else ""
-    note = " ".join(filter(None, (leaving, left_out(others[N_COLOURS:]))))
+    recorded = next((name for name in names if name in RECORDED), "")
+    models = [name for name in names if name != recorded]
+    colours = _colours(recorded, models)
+    panels = _scale_axes(_panels(figure, recorded, colours))
     n = len(panels)
     full = (abreast for abreast in (3, 4, 2) if n > abreast and n % abreast == 0)  # rows
+    note = _note(panels, colours, models[N_COLOURS:])
     return Drawing(tuple(panels), abreast=next(full, 3), note=note)
 
 
-def _within(panels: Sequence[Panel]) -> list[Panel]:
+def _colours(recorded: str, models: Sequence[str]) -> dict[str, str]:
+    """Return the colours by name of the curves that are drawn, the recorded one first."""
+    of_models = {name: series_colour(k) for k, name in enumerate(models[:N_COLOURS])}
+    return {recorded: "measured"} | of_models
+
+
+def _panels(figure: Figure, recorded: str, colours: dict[str, str]) -> list[Panel]:
+    """Return the panels of a figure; names of curves and of shaded parts appear once."""
+    panels, unnamed, shading = list[Panel](), {*colours}, figure.text.shaded
+    for title, axes in figure.panels.items():
+        labels = figure.text.axes.get(axes.key, figure.text)
+        here = {name: axes.curves[name] for name in colours if name in axes.curves}
+        under = recorded if len(here) > 1 else None
+        curves = tuple(
+            Curve(x, y, name if name in unnamed else "", colours[name], _style(x, name == under))
+            for name, (x, y) in here.items()
+        )
+        unnamed -= {*here}
+
+        marks = []
+        for start, end in axes.shaded:
+            marks.append(Mark(start, shading, end))
+            shading = ""
+        panels.append(Panel(labels.x, labels.y, curves, title, marks=tuple(marks)))
+    return panels
+
+
+def _note(panels: Sequence[Panel], colours: dict[str, str], undrawn: Sequence[str]) -> str:
+    """Return what a figure does not show: curves that leave the axes, and models without a colour."""
+    curves = [curve for panel in panels for curve in panel.curves]
+    beyond = {curve.colour for curve in curves if curve.style in ("above", "below")}
+    leaving = [name for name, colour in colours.items() if colour in beyond]
+    heads = f"Arrow heads: beyond the axis, {'; '.join(leaving)}." if leaving else ""
+    return " ".join(filter(None, (heads, left_out(undrawn))))
+
+
+def _scale_axes(panels: Sequence[Panel]) -> list[Panel]:
     """Return panels whose axes go by their recorded curve, and by the highest on such an axis."""
     heights = [float(np.ptp(panel.curves[0].y)) if _recorded(panel) else 0.0 for panel in panels]
-    shown = []
+    scaled = []
     for panel in panels:
         alike = (other.y_label == panel.y_label for other in panels)
-        most = max(height for height, same in zip(heights, alike, strict=True) if same)
-        least = replace(panel, least=LEAST * most)
-        shown.append(within(least, SHARE * most) if _recorded(panel) else panel)
-    return shown
+        highest = max(height for height, same in zip(heights, alike, strict=True) if same)
+        if _recorded(panel):
+            least = replace(panel, least=LEAST_HEIGHT_SHARE * highest)
+            panel = within(least, OVERSHOOT_SHARE * highest)
+        scaled.append(panel)
+    return scaled
 
 
 def _recorded(panel: Panel) -> bool:
@@ -194,7 +218,7 @@ def _recorded(panel: Panel) -> bool:
 
 def _style(x: Array, under: bool) -> Style:
     """Return how a curve is drawn: points, or a line, which is wide where models lie on it."""
-    few = x.size <= DOTS
+    few = x.size <= MOST_DOTS
     if jumps(x):
         return "dots" if few else "specks"
     return "beads" if few else "broad" if under else "line"

@@ -44,7 +44,7 @@ def table(content: Table) -> str:
 
     grid = Grid(box=None, pad_edge=False, header_style="bold")
     for place, heading in enumerate(content.headings):
-        side: Any = "right" if place in content.figures else "left"
+        side: Any = "right" if place in content.numeric_columns else "left"
         grid.add_column(Verbatim(heading), justify=side, overflow="fold")
     for row in content.rows:
         grid.add_row(*(Verbatim(cell(value, 4)) for value in row))

@@ -38,7 +38,7 @@ class System(NamedTuple):
     def as_made(self) -> State:
         """Return the state before switching on: as mounted, stretched or slack."""
         muscles = np.zeros(self.muscles.size, MUSCLE_STATE)
-        muscles["x"] = np.minimum(self.muscles["slack"], 0.0)
+        muscles["x"] = np.minimum(self.muscles["offset"], 0.0)
         return State(muscles, np.zeros(1, MOTION))
 
     def run(

@@ -31,6 +31,9 @@ GRAVE = 0.05
 data.
 """
 
+COPY_SHARE = 1.0 - GRAVE
+"""Shared part of the motion above which a recording counts as a copy of an earlier one."""
+
 _WEIGHTS = np.random.default_rng(0).integers(2**64, size=1024, dtype=np.uint64)  # any will do
 
 
@@ -43,8 +46,8 @@ class Shared(NamedTuple):
         Places of the two in the list; ``first`` is the lower.
     start, stop : float
         Times in the second between which the common rows lie [s]; samples without time.
-    begins : float
-        Time of the first of them in the first.
+    start_in_first : float
+        Time of the first of these rows in the first.
     share : float
         Movements within windows that are in both, over those of the recording that has fewer.
     """
@@ -53,7 +56,7 @@ class Shared(NamedTuple):
     second: int
     start: float
     stop: float
-    begins: float
+    start_in_first: float
     share: float
 
 
@@ -66,30 +69,36 @@ def shared_rows(
     moves = _movements(recordings, inputs, outputs)
     counts = np.array([codes.size for _, codes in moves], dtype=np.int64)
     lengths = np.where(counts < FEWEST_CHANGES, 0, np.clip(counts // 2, FEWEST_CHANGES, WINDOW))
-    found = []
+    shared = []
     for length in np.unique(lengths[lengths > 0]):
+        # a number for every window of so many output changes
         windows = [
             np.convolve(codes, _WEIGHTS[:length], "valid") if codes.size >= length else codes[:0]
             for _, codes in moves
         ]
-        owners = np.repeat(np.arange(len(windows)), [own.size for own in windows])
-        distinct, places = np.unique(np.concatenate(windows), return_inverse=True)
+
+        # the share of windows that each two recordings have in common
+        owners = np.repeat(np.arange(len(windows)), [codes.size for codes in windows])
+        distinct, indices = np.unique(np.concatenate(windows), return_inverse=True)
         shape = distinct.size, len(windows)
-        present = csr_array((np.ones(owners.size), (places, owners)), shape=shape)
+        present = csr_array((np.ones(owners.size), (indices, owners)), shape=shape)
         present.data[:] = 1.0  # however often a periodic motion repeats
         common = (present.T @ present).toarray()
         fewer = np.minimum.outer(common.diagonal(), common.diagonal())
-        share = np.triu(common / np.maximum(fewer, 1.0), 1)
-        share[np.minimum.outer(lengths, lengths) != length] = 0.0
-        for first, second in np.argwhere(share >= GRAVE).tolist():
+        window_share = np.triu(common / np.maximum(fewer, 1.0), 1)
+        window_share[np.minimum.outer(lengths, lengths) != length] = 0.0
+
+        # where the common windows lie, and what share of the motion they cover
+        for first, second in np.argwhere(window_share >= GRAVE).tolist():
             one, other = windows[first], windows[second]
             both = [np.isin(one, other), np.isin(other, one)]
             covered = [np.mean(np.convolve(same, np.ones(length)) > 0.5) for same in both]
+            motion_share = float(max(covered))
             same = np.flatnonzero(both[1])
             start, stop = moves[second][0][[same[0], same[-1] + length - 1]].tolist()
-            begins = float(moves[first][0][np.argmax(one == other[same[0]])])
-            found.append(Shared(first, second, start, stop, begins, float(max(covered))))
-    return sorted(found)
+            start_in_first = float(moves[first][0][np.argmax(one == other[same[0]])])
+            shared.append(Shared(first, second, start, stop, start_in_first, motion_share))
+    return sorted(shared)
 
 
 def check_shared(
@@ -132,7 +141,7 @@ def without_copies(
 ) -> list[Recording]:
     """Return recordings without those that are nearly contained in an earlier one."""
     found = shared_rows(recordings, inputs, outputs)
-    copies = {shared.second for shared in found if shared.share > 1 - GRAVE}
+    copies = {shared.second for shared in found if shared.share > COPY_SHARE}
     return [one for place, one in enumerate(recordings) if place not in copies]
 
 
@@ -147,9 +156,10 @@ def _sentence(shared: Shared, listed: Sequence[tuple[str, Recording]]) -> str:
     what = f"{verb} on data that it was {'fitted to' if role == 'fit' else 'chosen by'}"
     if role == other_role:
         what = f"the same samples would be used twice to {role}"
+    start_in_first = shared.start_in_first - one.start_time
     return (
         f"{what}: {start:.6g} to {stop:.6g} {unit} after the start of {names[1]} are those of "
-        f"{names[0]} from {shared.begins - one.start_time:.6g} {unit} on, {100 * shared.share:.0f} % of "
+        f"{names[0]} from {start_in_first:.6g} {unit} on, {100 * shared.share:.0f} % of "
         "the shorter one's motion"
     )
 

@@ -89,14 +89,9 @@ def fit(
     prior = chosen.prior or settings.get("prior")
     file = claimed(out, paths(data, chosen.residual_of, prior), force)
     kind = registry.load("estimators", model)
-    if chosen.target is not None and chosen.target not in kind.targets:
-        problem = f"{model!r} cannot be fitted for {chosen.target}"
-        raise ModelError(problem, parameter="target", remedy="fit 'balance', or leave it out")
-    if chosen.prior is not None:
-        if "prior" not in kind.__dataclass_fields__:
-            raise ModelError(f"{model!r} has none", parameter="prior", remedy="leave it out")
-        settings["prior"] = chosen.prior
-    settings = {"seed": chosen.seed} | settings
+    settings = _with_options(model, kind, settings, chosen)
+
+    # the recordings, and the channels for the model
     sides = [settings.pop(side, getattr(chosen, side)) for side in ("input", "output")]
     names = [*sides, settings.get("scheduling")]
     (runs,), channels = read_sides([data], lambda some: kind.resolved(some, *names), sides, reading)
@@ -115,24 +110,47 @@ def fit(
     if chosen.target is not None and not any(name.startswith("force") for name in taken):
         problem = f"a model for {chosen.target} is fitted to a measured force"
         raise DataError(problem, channel="force", remedy="give recordings with one")
+
+    # the fit
     with telling(progress, f"fitting {model}") as tell:
         estimator.fit(runs, progress=tell)
-    price = None
+    cost_of_limits = None
     if chosen.target is not None:
-        from mckibben.exporting.mjcf import carried
+        from mckibben.exporting.mjcf import require_exportable
 
-        carried(estimator.model_)
-        free = kind(**{"of_force": True} | settings)
-        with telling(progress, f"fitting {model} without the limits of {chosen.target}") as tell:
-            free.fit(runs, progress=tell)
-        price = Price(*(_force_error(one.model_, runs) for one in (estimator, free)))
-    found: Block = estimator.model_ if base is None else Parallel((base, estimator.model_))
+        require_exportable(estimator.model_)
+        unlimited = kind(**{"of_force": True} | settings)
+        label = f"fitting {model} without the limits of {chosen.target}"
+        with telling(progress, label) as tell:
+            unlimited.fit(runs, progress=tell)
+        cost_of_limits = Price(*(_force_error(one.model_, runs) for one in (estimator, unlimited)))
+    block: Block = estimator.model_ if base is None else Parallel((base, estimator.model_))
     if file is not None:
-        found.save(file)
+        block.save(file)
     notes = list(estimator.diagnostics_.notes)
     if unused := [name for name in (*channels.further, *channels.unused) if name not in taken]:
         notes.append(f"not used: {', '.join(unused)}; name what drives with `input`")
-    return Fit(model, found, estimator, tuple(notes), file, price)
+    return Fit(model, block, estimator, tuple(notes), file, cost_of_limits)
+
+
+def _with_options(
+    model: str, kind: Any, settings: dict[str, Any], chosen: FitOptions
+) -> dict[str, Any]:
+    """Return the settings of an estimator with the options that are settings: seed and prior.
+
+    Raises
+    ------
+    ModelError
+        If the estimator has no such target, or takes no prior.
+    """
+    if chosen.target is not None and chosen.target not in kind.targets:
+        problem = f"{model!r} cannot be fitted for {chosen.target}"
+        raise ModelError(problem, parameter="target", remedy="fit 'balance', or leave it out")
+    if chosen.prior is not None:
+        if "prior" not in kind.__dataclass_fields__:
+            raise ModelError(f"{model!r} has none", parameter="prior", remedy="leave it out")
+        settings = settings | {"prior": chosen.prior}
+    return {"seed": chosen.seed} | settings
 
 
 def _force_error(model: Block, runs: Sequence[Recording]) -> float:
@@ -204,9 +222,14 @@ def compare(
 
     chosen, reading = options_of(CompareOptions, options, reading, keywords)
     sides = train, validation, test
-    with _compared(sides, chosen, reading, out, force, lambda _: LEADERBOARD) as (data, results):
+    opened = _comparison_data(sides, chosen, reading, out, force, lambda _: LEADERBOARD)
+    with opened as (data, results):
         board = rank(
-            **data, options=chosen, clear=False, executor=executor, progress=_standing(progress)
+            **data,
+            options=chosen,
+            clear=False,
+            executor=executor,
+            progress=_comparison_progress(progress),
         )
         if results is not None:
             write_leaderboard(board, results)
@@ -239,12 +262,12 @@ def study(
     from mckibben.studying.study import study as run
 
     chosen, reading = options_of(StudyOptions, options, reading, keywords)
-    ran = {"model": saved(chosen.model), "compensator": saved(chosen.compensator)}
+    loaded_models = {"model": saved(chosen.model), "compensator": saved(chosen.compensator)}
     sides = train, validation, test
-    with _compared(sides, chosen, reading, out, force, study_files) as (data, results):
+    with _comparison_data(sides, chosen, reading, out, force, study_files) as (data, results):
         folder = None if results is None else StudyFolder(results, command, title=chosen.title)
 
-        def pass_on(so_far: Study) -> None:
+        def on_update(so_far: Study) -> None:
             if folder is not None:
                 folder.take(so_far)
             if found is not None:
@@ -252,10 +275,10 @@ def study(
 
         done = run(
             **data,
-            options=replace(chosen, **ran),
+            options=replace(chosen, **loaded_models),
             executor=executor,
-            progress=_standing(progress),
-            found=pass_on,
+            progress=_comparison_progress(progress),
+            found=on_update,
         )
         if folder is not None:
             folder.take(done, last=True)
@@ -272,7 +295,7 @@ def _complete(results: Results) -> None:
     Checkpoints(results.folder).clear()
 
 
-def _standing(progress: Progress) -> Any:
+def _comparison_progress(progress: Progress) -> Any:
     """Return a progress callback for the progress of a comparison."""
     if not callable(progress):
         return progress
@@ -280,7 +303,7 @@ def _standing(progress: Progress) -> Any:
 
 
 @contextmanager
-def _compared(
+def _comparison_data(
     data: Sequence[Data],
     chosen: CompareOptions,
     reading: ReadOptions | None,
@@ -299,15 +322,15 @@ def _compared(
     names = registry.names("estimators") if whole else list(chosen.models or ())
     train, validation, test = data
     files = expanded(files_of(train), files_of(test))
-    runs: Any = (loaded(train), items(validation), loaded(test))
-    sides: list[Data] = [[*some, *more] for some, more in zip(files, runs, strict=True)]
+    others: Any = (loaded(train), items(validation), loaded(test))
+    sides: list[Data] = [[*some, *more] for some, more in zip(files, others, strict=True)]
     logs = [getattr(chosen, name, None) for name in ("model", "compensator")]
     read = paths(train, *sides, logs)
     kind = "study" if isinstance(chosen, StudyOptions) else "compare"
     with results_in(out, written(names), inputs=read, force=force, kind=kind) as results:
         words = chosen.input, chosen.output, chosen.load
-        found, channels = read_sides(sides, lambda some: channels_of(some, *words), words, reading)
-        roles = dict(zip(("train", "validation", "test"), found, strict=True))
+        runs, channels = read_sides(sides, lambda some: channels_of(some, *words), words, reading)
+        roles = dict(zip(("train", "validation", "test"), runs, strict=True))
         yield {**roles, "channels": channels, "folder": out}, results
 
 

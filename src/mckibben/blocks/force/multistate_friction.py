@@ -44,7 +44,7 @@ WAYS = ("lengthening", "shortening")
 QUANTITIES = ("k [N/mm]", "sigma [N s/mm]", "F_c [N]")
 """Parameters of an element in one direction; lengthening first, then shortening."""
 
-PLACES: dict[Direction, tuple[int, ...]] = {
+PARAMETER_POSITIONS: dict[Direction, tuple[int, ...]] = {
     "shared": (0, 1, 2, 4, 5),
     "both": (0, 1, 2, 3, 4, 5),
     "lengthening": (0, 1, 2),
@@ -58,7 +58,7 @@ the other direction, and no F_c.
 LET_GO = 1e-30
 """F_c of a released element where it is inactive [N]: as good as none, where 0 marks unloaded ones."""
 
-SIZES = {element: len(places) for element, places in PLACES.items()}
+SIZES = {element: len(places) for element, places in PARAMETER_POSITIONS.items()}
 ELEVEN: tuple[Direction, ...] = ("shared", "shortening", "shortening")
 EACH_WAY: tuple[Direction, ...] = ("shared", "lengthening", "shortening")
 RELEASED: tuple[Direction, ...] = ("shared", "shortening-released", "shortening-released")
@@ -244,14 +244,14 @@ class MultistateFriction(ForceByLength, Block):
         return [
             (number, -1 if element == "shared" and place == 0 else place // 3, place % 3)
             for number, element in enumerate(self.elements, start=1)
-            for place in PLACES[element]
+            for place in PARAMETER_POSITIONS[element]
         ]
 
     def table(self) -> Array:
         """Return k, sigma and F_c lengthening and shortening, shape (n, 6), F_c 0 where unloaded."""
         table, values = np.full((len(self.elements), 6), np.nan), iter(self.values)
         for row, element in zip(table, self.elements, strict=True):
-            for place in PLACES[element]:
+            for place in PARAMETER_POSITIONS[element]:
                 row[place] = next(values)
         other = np.roll(table, 3, axis=1)
         released = [element.endswith("released") for element in self.elements]

@@ -40,6 +40,9 @@ LEAST_REVERSIBLE = 1e-3
 DIFFERENCE = 1e-7
 """Step of finite differences, relative to the range that a parameter is searched in."""
 
+AT_BOUND = 1.01
+"""Largest linear parameter, relative to its lower bound, that counts as held there."""
+
 WORST = 1e150
 """Cost of parameters whose output overflows; its square is finite."""
 
@@ -94,7 +97,7 @@ class SeparableEstimator(Estimator):
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         """Return the block with these parameters."""
 
-    def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
+    def output_jacobian(self, theta: Array, linear: Array, data: TrainingData) -> Array:
         """Return the derivative of the output by the nonlinear parameters, at fixed linear ones.
 
         Shape (samples that count, m); by finite differences of the basis.
@@ -114,13 +117,14 @@ class SeparableEstimator(Estimator):
         """
         if linear is None:
             return np.zeros((len(matrix), theta.size))
-        moves = self.moves(theta, linear, data)
-        directions = np.linalg.qr(self.free(matrix, linear, data))[0]
+        moves = self.output_jacobian(theta, linear, data)
+        directions = np.linalg.qr(self.free_regressors(matrix, linear, data))[0]
         return np.asarray(moves - directions @ (directions.T @ moves))
 
-    def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
+    def free_regressors(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
         """Return the regressors of linear parameters away from bounds, the offset's first."""
-        free = linear > 1.01 * self.least(matrix, data) if self.solves_nonnegative else linear != 0
+        bounded = self.solves_nonnegative
+        free = linear > AT_BOUND * self.least(matrix, data) if bounded else linear != 0
         offset = [np.ones(len(matrix))] if self.solves_offset else []
         return np.column_stack([*offset, matrix[:, free]])
 
@@ -216,15 +220,19 @@ class SeparableEstimator(Estimator):
         return floor
 
     def _errors(self, data: TrainingData) -> Errors:
-        """Return the function to the errors by nonlinear parameters, linear ones solved for."""
+        """Return the function from nonlinear parameters to errors, linear ones solved for.
+
+        It returns the errors and a function to their derivatives, which cost more and are needed at few
+        points only.
+        """
 
         def errors(theta: Array) -> tuple[Array, Callable[[], Array]]:
             matrix = self.design_matrix(theta, data)
-            linear, left = None, np.full(data.target.size, WORST)
+            linear, residuals = None, np.full(data.target.size, WORST)
             if np.isfinite(matrix).all():
                 linear, offset = self.solve(matrix, data)
-                left = np.asarray(matrix @ linear + offset - data.target)
-            return left, lambda: self.jacobian(theta, matrix, linear, data)
+                residuals = np.asarray(matrix @ linear + offset - data.target)
+            return residuals, lambda: self.jacobian(theta, matrix, linear, data)
 
         return errors
 
@@ -232,11 +240,11 @@ class SeparableEstimator(Estimator):
         self, setting: str, values: Sequence[object], data: TrainingData, tracker: Tracker
     ) -> Block:
         """Return the block of smallest error over the values of a setting."""
-        found = []
-        for place, value in enumerate(values):
-            own = tracker.part(place / len(values), (place + 1) / len(values))
+        fits = []
+        for k, value in enumerate(values):
+            part = tracker.part(k / len(values), (k + 1) / len(values))
             settings = self.get_params() | {setting: value}
-            found.append((type(self)(**settings).identify(data, own), own))
-        block, best = min(found, key=lambda item: item[1].best_cost)
+            fits.append((type(self)(**settings).identify(data, part), part))
+        block, best = min(fits, key=lambda fit: fit[1].best_cost)
         tracker.best_cost, tracker.best = best.best_cost, best.best
         return block

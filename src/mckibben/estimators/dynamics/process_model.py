@@ -126,7 +126,7 @@ class ProcessModelEstimator(SeparableEstimator):
         most = LARGEST_GAIN * data.output_span / data.input_span
         return -most, most
 
-    def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
+    def free_regressors(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
         """Return the responses whose gains are solved for, and not at a bound."""
         return matrix[:, int(linear[0] in self.gain_range(data)) : -1]
 

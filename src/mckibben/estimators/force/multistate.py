@@ -16,7 +16,7 @@ from mckibben.blocks.force.multistate_friction import (
     EACH_WAY,
     EIGHTEEN,
     ELEVEN,
-    PLACES,
+    PARAMETER_POSITIONS,
     RELEASED,
     Direction,
     MultistateFriction,
@@ -40,9 +40,11 @@ STRUCTURES = {
 LEAST_SHARE = 1e-5
 """Smallest force of an element, relative to the range of the output."""
 
-LENGTHS = np.geomspace(0.02, 1.0, 8)
-TIMES = (0.1, 10.0)
-"""Initial break-away lengths of elements, relative to the range, and times [samples]."""
+EXCHANGE_LENGTHS = np.geomspace(0.02, 1.0, 8)
+"""Break-away lengths tried for one element at a time, relative to the range of the input."""
+
+EXCHANGE_TIMES = (0.1, 10.0)
+"""Relaxation times tried with each of these [samples]."""
 
 
 def extract_hysteresis(
@@ -154,29 +156,29 @@ class MultistateEstimator(SeparableEstimator):
         The cost has many local minima, in which elements have changed roles, and rounding decides in
         which of them a search ends.
         """
-        lengths = np.log(data.input_span * LENGTHS)
-        times = np.log(data.timed() * np.array(TIMES))
+        lengths = np.log(data.input_span * EXCHANGE_LENGTHS)
+        times = np.log(data.timed() * np.array(EXCHANGE_TIMES))
         choices = []
         for index, n_pairs in enumerate(self._n_pairs):
             candidates = [
                 np.ravel([(length, time) for length in element])
                 for time, element in product(times, product(lengths, repeat=n_pairs))
             ]
-            choices.append(Choice(self._places(index), np.array(candidates)))
+            choices.append(Choice(self._theta_indices(index), np.array(candidates)))
         return choices
 
-    def _places(self, index: int) -> NDArray[np.intp]:
-        """Return the places of an element in theta."""
+    def _theta_indices(self, index: int) -> NDArray[np.intp]:
+        """Return the indices in theta of the lengths and times of an element."""
         first, n_pairs = sum(self._n_pairs[:index]), self._n_pairs[index]
         return np.arange(2 * first, 2 * (first + n_pairs))
 
     def _unit_element(self, index: int, theta: Array) -> MultistateFriction:
         """Return one element with stiffnesses of 1."""
         direction = self.directions[index]
-        pairs = np.exp(theta[self._places(index)]).reshape(-1, 2).tolist()
+        pairs = np.exp(theta[self._theta_indices(index)]).reshape(-1, 2).tolist()
         # k, sigma and F_c lengthening, then shortening: with k = 1, sigma is the time, F_c the length
         six = [value for length, time in (pairs[0], pairs[-1]) for value in (1.0, time, length)]
-        values = tuple(six[position] for position in PLACES[direction])
+        values = tuple(six[position] for position in PARAMETER_POSITIONS[direction])
         return MultistateFriction((direction,), values, initial=self.starting_rule)
 
     def _forces(self, theta: Array, run: Run) -> Array:
@@ -202,7 +204,7 @@ class MultistateEstimator(SeparableEstimator):
             lengthening = next(remaining)
             shortening = next(remaining) if direction == "both" else lengthening
             unit = self._unit_element(index, theta).values
-            for position, value in zip(PLACES[direction], unit, strict=True):
+            for position, value in zip(PARAMETER_POSITIONS[direction], unit, strict=True):
                 values.append(value * (lengthening if position < 3 else shortening))
         pressure, rule = float(np.median(data.stacked("scheduled"))), self.starting_rule
         channels = self.channels(data)
@@ -246,6 +248,7 @@ class MultistateEstimator(SeparableEstimator):
         """
         if self.elements != "eighteen":
             return super().identify(data, tracker)
+        # given as directions, not by name, eighteen are fitted above without comparison
         return self.best_of("elements", ("eleven", EIGHTEEN), data, tracker)
 
 

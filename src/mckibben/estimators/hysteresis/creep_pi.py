@@ -145,7 +145,7 @@ class CreepPIEstimator(SeparableEstimator):
         above = operators - (low - radii)
         return x, (above - x[:, np.newaxis] * (high - low)) / (top - bottom)
 
-    def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
+    def output_jacobian(self, theta: Array, linear: Array, data: TrainingData) -> Array:
         pieces = PolynomialMap(self.map_size)
         step = RAISED * (np.arange(theta.size) == self.n_operators)
         taus, compliances = self.tail(theta)

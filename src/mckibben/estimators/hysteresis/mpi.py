@@ -243,7 +243,7 @@ class MPIEstimator(SeparableEstimator):
         low, high = self.level(theta, data)
         return self.map.pieces((operators @ self.weights(theta) - low) / (high - low))
 
-    def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
+    def output_jacobian(self, theta: Array, linear: Array, data: TrainingData) -> Array:
         """Return the derivative of the map's argument times the slope of the map."""
         operators, weights = self._operators(theta, data), self.weights(theta)
         columns = operators

@@ -202,7 +202,7 @@ def described(
     ]
     calls = [each for each in steps if isinstance(each, dict)]
     inputs, outputs = _channel_entries(block.inputs), _channel_entries(block.outputs)
-    size, n_numbers = 4 if single else 8, max(wiring.n_numbers, 1)
+    size, n_numbers = 4 if single else 8, max(wiring.memory_size, 1)
     n_coefficients = sum(call.coefficients.size for call in wiring.calls)
     return {
         "name": name,
@@ -226,7 +226,7 @@ def described(
         "clip_counts": [f"numbers[{place}]" for place in wiring.clip_counts],
         "n_signals": wiring.n_signals,
         "n_numbers": n_numbers,
-        "n_memory": wiring.n_numbers,
+        "n_memory": wiring.memory_size,
         "starts": _starts(wiring.calls),
         "kernels": translation.text(),
         "zero": "0.0f" if single else "0.0",

@@ -71,13 +71,13 @@ class Wiring:
 
         self.steps: list[Call | Sum] = []
         self.outputs, self.n_signals = list(named(layout.given)), layout.n_signals - n
-        self.n_numbers, self.clip_counts = 0, list[int]()
+        self.memory_size, self.clip_counts = 0, list[int]()
         for step in layout.steps:
             part, taken, first = step.block, named(step.taken), step.given[0] - n
             if part is None:
                 self.steps.append(Sum(taken, first))
                 continue
-            numbers = part.coefficients(sample_time)
+            coefficients = part.coefficients(sample_time)
             if not part.c_kernels:
                 raise ModelError(
                     f"{part.title!r} has no C",
@@ -86,12 +86,12 @@ class Wiring:
             state = step.state
             if state is None and not isinstance(part.start, str):
                 state = part.initial_state(np.zeros(len(part.inputs)), sample_time=sample_time)
-            self.clip_counts += [self.n_numbers + place for place in part.clip_counts]
+            self.clip_counts += [self.memory_size + place for place in part.clip_counts]
             if state is not None:  # what was clipped before is not counted again
                 state = state.copy()
                 state[[*part.clip_counts]] = 0.0
-            self.steps.append(Call(part, numbers, state, taken, first, self.n_numbers))
-            self.n_numbers += part.n_states + part.n_scratch
+            self.steps.append(Call(part, coefficients, state, taken, first, self.memory_size))
+            self.memory_size += part.n_states + part.n_scratch
         self.calls = [step for step in self.steps if isinstance(step, Call)]
 
 
@@ -102,7 +102,7 @@ def state_of(block: Block, memory: ArrayLike, sample_time: float | None) -> Arra
     ----------
     block : Block
         What was exported.
-    memory : array-like, shape (n_numbers,)
+    memory : array-like, shape (memory_size,)
         ``numbers`` of the C model, as `mckibben.link.Link.memory` reads them.
     sample_time : float or None
         That it was exported with [s].
@@ -117,9 +117,9 @@ def state_of(block: Block, memory: ArrayLike, sample_time: float | None) -> Arra
         If it is the memory of another model.
     """
     wiring, numbers = Wiring(block, sample_time), np.asarray(memory, dtype=np.float64)
-    if numbers.shape != (wiring.n_numbers,):
+    if numbers.shape != (wiring.memory_size,):
         raise DataError(
-            f"the memory has {numbers.size} numbers, that of {block.title!r} {wiring.n_numbers}",
+            f"the memory has {numbers.size} numbers, that of {block.title!r} {wiring.memory_size}",
             remedy="give the block that was exported",
         )
     states = [numbers[c.first_state :][: c.block.n_states] for c in wiring.calls]

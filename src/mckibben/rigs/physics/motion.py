@@ -48,7 +48,7 @@ MOST_ATTEMPTS = 80
 NO_MUSCLE = -1
 
 MM2_PER_NEWTON_PER_BAR = 10.0
-"""A force that grows by 1 N a bar comes from a room that grows by 10 mm³ a mm."""
+"""A force that grows by 1 N per bar comes from a volume that grows by 10 mm³ per mm."""
 
 _EACH, _EVERY_TWO = (MOST_COORDINATES,), (MOST_COORDINATES, MOST_COORDINATES)
 
@@ -63,7 +63,7 @@ MECHANISM = np.dtype(
         ("weight", "f8", _EACH),  # N against it
         ("swing", "f8", _EACH),  # weight times lever of a pendulum [N mm]
         ("hanging", "f8", _EACH),  # where it hangs straight down [rad]
-        ("guide", "f8", _EACH),  # presliding stiffness of the guide's friction [N/mm]
+        ("guide_stiffness", "f8", _EACH),  # presliding, of the guide's friction [N/mm]
         ("guide_limit", "f8", _EACH),  # N
         ("driven", "i8"),
         ("speed_limit", "f8"),  # of the drive [mm/s]
@@ -80,7 +80,7 @@ MOTION = np.dtype(
         ("acceleration", "f8", _EACH),
         ("balance", "f8", _EACH),  # sum of forces against motion [N]
         ("before", "f8", _EACH),  # that of the step before
-        ("guide", "f8", _EACH),  # force of the guide's friction [N]
+        ("guide_force", "f8", _EACH),  # friction of the guide [N]
         # What the solution of a step needs:
         ("tried", "f8", _EACH),
         ("change", "f8", _EACH),
@@ -92,8 +92,8 @@ MOTION = np.dtype(
 
 
 @compiled
-def filled(states: Any, muscle: int) -> float:
-    """Return the pressure of a muscle that acts on what is beside it [bar]; 0 without one."""
+def pressure_of(states: Any, muscle: int) -> float:
+    """Return the gauge pressure of a muscle, for what it acts on [bar]; 0 for `NO_MUSCLE`."""
     if muscle < 0:
         return 0.0
     return max(states[muscle].pressure, 0.0)
@@ -102,7 +102,7 @@ def filled(states: Any, muscle: int) -> float:
 @compiled
 def shortening(muscle: Any, n: int, place: Any) -> float:
     """Return the shortening of a muscle [mm] at given coordinates."""
-    x = muscle.slack
+    x = muscle.offset
     for g in range(n):
         x += muscle.levers[g] * place[g]
     return x
@@ -117,15 +117,17 @@ def resist(
     for g in range(n):
         moved = motion.tried[g] - motion.place[g]
         rub, rub_slope = slip(
-            motion.guide[g],
-            mechanism.guide[g],
+            motion.guide_force[g],
+            mechanism.guide_stiffness[g],
             mechanism.guide_limit[g],
             mechanism.guide_limit[g],
             moved,
         )
         for k in range(n):
             motion.slopes[g, k] = mechanism.stiffness[g, k]
-        motion.slopes[g, g] += mechanism.stiffening[g] * filled(states, mechanism.stiffened_by[g])
+        motion.slopes[g, g] += mechanism.stiffening[g] * pressure_of(
+            states, mechanism.stiffened_by[g]
+        )
         motion.balance[g] = 0.0
         for k in range(n):
             motion.balance[g] += motion.slopes[g, k] * motion.tried[k]
@@ -190,32 +192,38 @@ def inertia(mechanism: Any, motion: Any, g: int, step: float) -> float:
 def move(muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, step: float) -> None:
     """Integrate the coordinates over one step, for pressures at its end."""
     n = mechanism.n
+
+    # predictor: on with the speed and acceleration of the step before
     for g in range(n):
         motion.before[g] = motion.balance[g]
         coast = step * motion.speed[g] + 0.5 * step * step * motion.acceleration[g]
         motion.tried[g] = motion.place[g] + coast
         motion.change[g] = coast
+
+    # Newton's method for the balance of forces at the end of the step
     inert = 1.0 / (BETA * step * step)
-    worst = np.inf
+    last_residual = np.inf
     shrunk = 1.0
     for _ in range(MOST_ATTEMPTS):
-        size = np.inf
+        residual = np.inf
         if within_reach(muscles, n, motion.tried):
             resist(muscles, mechanism, states, motion, loads, step)
-            size = 0.0
+            residual = 0.0
             for g in range(n):
                 off = inertia(mechanism, motion, g, step) + (1.0 + ALPHA) * motion.balance[g]
                 off -= ALPHA * motion.before[g]
-                size += off * off / (inert * mechanism.mass[g, g])
-        if size > worst or size == np.inf:
-            # Too far: halfway back, where Newton's straight line is still near the truth.
+                residual += off * off / (inert * mechanism.mass[g, g])
+
+        # too far: halfway back, where Newton's straight line is still near the truth
+        if residual > last_residual or residual == np.inf:
             shrunk *= 0.5
             if shrunk < 1e-6:
                 break
             for g in range(n):
                 motion.tried[g] -= shrunk * motion.change[g]
             continue
-        worst, shrunk = size, 1.0
+        last_residual, shrunk = residual, 1.0
+
         for g in range(n):
             motion.change[g] = ALPHA * motion.before[g] - (1.0 + ALPHA) * motion.balance[g]
             motion.change[g] -= inertia(mechanism, motion, g, step)
@@ -230,6 +238,8 @@ def move(muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, s
             break
         for g in range(n):
             motion.tried[g] += motion.change[g]
+
+    # speed and acceleration at the end of the step
     for g in range(n):
         acceleration = newmark(motion, g, step)
         mean = (1.0 - GAMMA) * motion.acceleration[g] + GAMMA * acceleration
@@ -257,9 +267,9 @@ def arrive(muscles: Any, mechanism: Any, states: Any, motion: Any, step: float) 
         states[j].tension = pull
         commit(muscles[j], states[j], own, step)
     for g in range(mechanism.n):
-        motion.guide[g], _ = slip(
-            motion.guide[g],
-            mechanism.guide[g],
+        motion.guide_force[g], _ = slip(
+            motion.guide_force[g],
+            mechanism.guide_stiffness[g],
             mechanism.guide_limit[g],
             mechanism.guide_limit[g],
             motion.tried[g] - motion.place[g],
@@ -269,7 +279,7 @@ def arrive(muscles: Any, mechanism: Any, states: Any, motion: Any, step: float) 
 
 @compiled
 def squeeze(mechanism: Any, motion: Any, muscle: int) -> tuple[float, float]:
-    """Return the room that a muscle lost by bending [mm³], and its change [mm³/s]."""
+    """Return the volume that a muscle lost by bending [mm³], and its change [mm³/s]."""
     squeezed, squeezing = 0.0, 0.0
     for g in range(mechanism.n):
         if mechanism.stiffened_by[g] == muscle:
@@ -292,7 +302,7 @@ def breathe(
 ) -> None:
     """Fill or vent a muscle for a step, with its command changing linearly.
 
-    ``squeezed`` is room that the muscle lost by bending [mm³], and ``squeezing`` its change [mm³/s].
+    ``squeezed`` is the volume that the muscle lost by bending [mm³], ``squeezing`` its change [mm³/s].
     """
     dt = step / SUBSTEPS
     half = math.exp(-0.5 * dt / air.valve_time)
@@ -305,12 +315,14 @@ def breathe(
         x = state.x + state.speed * dt * (i + 0.5)
         middle = pressure
         for stage in range(1, 3):
-            room, area, give = chamber(muscle, x, middle)
-            room += air.dead_room - squeezed
+            volume, area, give = chamber(muscle, x, middle)
+            volume += air.dead_room - squeezed
             absolute = middle + ATMOSPHERE
             rate = through(air, opening, middle)[0] * MM3_PER_LITRE
             rate -= absolute * (area * state.speed - squeezing)
-            middle = pressure + 0.5 * stage * dt * rate / (room / air.polytropic + absolute * give)
+            middle = pressure + 0.5 * stage * dt * rate / (
+                volume / air.polytropic + absolute * give
+            )
         pressure = middle
         state.outlet = through(air, state.valve, pressure)[1]
     state.pressure = pressure
@@ -350,7 +362,7 @@ def advance(
                 step,
             )
         for j in range(muscles.size):
-            prepare(muscles[j], states[j], filled(states, muscles[j].beside), step)
+            prepare(muscles[j], states[j], pressure_of(states, muscles[j].beside), step)
         if mechanism.driven:
             target = target_before + end * (target_after - target_before)
             drive(muscles, mechanism, states, motion, target, step)
@@ -371,8 +383,8 @@ def note(muscles: Any, mechanism: Any, states: Any, motion: Any, row: Array) -> 
     for j in range(m):
         row[2 * n + j] = states[j].outlet
         row[2 * n + m + j] = states[j].tension
-        room, _, _ = chamber(muscles[j], states[j].x, states[j].pressure)
-        row[2 * n + 2 * m + j] = room
+        volume, _, _ = chamber(muscles[j], states[j].x, states[j].pressure)
+        row[2 * n + 2 * m + j] = volume
 
 
 @compiled
@@ -395,7 +407,7 @@ def march(
     Commands have shape (n, muscles) [bar], loads (n, coordinates) [N or N mm], targets (n,) [mm].
     Between two samples they go on in straight lines, or are held at the first. Each row of
     ``traces`` takes place and acceleration of every coordinate, then pressure at the regulator, tension
-    and room [mm³] of every muscle.
+    and volume [mm³] of every muscle.
     """
     note(muscles, mechanism[0], states, motion[0], traces[0])
     for i in range(commands.shape[0] - 1):

@@ -69,7 +69,7 @@ MUSCLE = np.dtype(
         ("creep_time", "f8", (MOST_BRANCHES,)),  # s
         ("push", "f8"),  # force that it bears before it buckles [N]
         ("levers", "f8", (MOST_COORDINATES,)),  # shortening by each coordinate
-        ("slack", "f8"),  # shortening where all coordinates are 0 [mm]
+        ("offset", "f8"),  # shortening where all coordinates are 0 [mm]
     ],
     align=True,
 )

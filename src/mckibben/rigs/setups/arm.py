@@ -138,8 +138,8 @@ def in_series(bundles: Sequence[Bundle], payload: float) -> tuple[Records, Recor
         made["stiffening"][0, tilts] = bundle.bending_stiffening
         made["stiffened_by"][0, tilts] = first + i
         made["damping"][0, tilts] = bundle.bending_damping
-        made["guide"][0, EACH * i] = 1.0
-        made["guide"][0, tilts] = bundle.bending_presliding
+        made["guide_stiffness"][0, EACH * i] = 1.0
+        made["guide_stiffness"][0, tilts] = bundle.bending_presliding
         made["guide_limit"][0, tilts] = bundle.bending_friction
     return np.concatenate([*every, extensors]), made
 

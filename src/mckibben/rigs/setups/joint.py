@@ -90,7 +90,7 @@ class Joint(Rig):
         """Return two muscles on one coordinate, the angle, and the arm as a pendulum."""
         muscles = np.concatenate([self.muscle_1.record(), self.muscle_2.record()])
         muscles["levers"][:, 0] = np.multiply(SIGNS, self.radius)
-        muscles["slack"] = self.slack
+        muscles["offset"] = self.slack
         made = np.zeros(1, MECHANISM)
         made["n"] = 1
         made["tolerance"] = TOLERANCE
@@ -99,7 +99,7 @@ class Joint(Rig):
         moment = self.arm_mass * self.arm_centre + self.payload * self.reach
         made["swing"][0, 0] = GRAVITY * moment if self.vertical else 0.0
         made["hanging"][0, 0] = math.radians(self.hanging)
-        made["guide"][0, 0] = self.presliding
+        made["guide_stiffness"][0, 0] = self.presliding
         made["guide_limit"][0, 0] = self.friction
         made["damping"][0, 0] = self.damping
         made["stiffened_by"] = NO_MUSCLE

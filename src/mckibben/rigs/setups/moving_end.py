@@ -55,7 +55,7 @@ class MovingEnd(Rig):
         made["mass"][0, 0, 0] = (self.moved_mass + self.payload) * 1e-3
         hanging = self.payload + (self.moved_mass if self.vertical else 0.0)
         made["weight"][0, 0] = hanging * GRAVITY + self.return_force
-        made["guide"][0, 0] = self.guide_stiffness
+        made["guide_stiffness"][0, 0] = self.guide_stiffness
         made["guide_limit"][0, 0] = self.guide_friction
         made["damping"][0, 0] = self.damping
         made["stiffened_by"] = NO_MUSCLE

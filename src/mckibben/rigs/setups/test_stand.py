@@ -36,7 +36,7 @@ class TestStand(Rig):
         muscles["levers"][0, 0] = 1.0
         made = np.zeros(1, MECHANISM)
         made["n"] = 1
-        made["guide"] = 1.0
+        made["guide_stiffness"] = 1.0
         made["driven"] = 1
         made["speed_limit"] = self.drive_speed
         made["stiffened_by"] = NO_MUSCLE

@@ -104,9 +104,9 @@ BAD = [
     (RIG, "--inputs"),
     (f"{RIG} --signal sine:period=2 --inputs run.csv", "--inputs"),
     (f"{RIG} --signal wobble", "'wobble'"),
-    (f"{RIG} --signal sine", "'period'"),
+    (f"{RIG} --signal sine", "sine:period"),
     (f"{RIG} --signal sine:period=nan", "sine:period: it is nan"),
-    (f"{RIG} --signal sine:tempo=1", "'tempo'"),
+    (f"{RIG} --signal sine:tempo=1", "sine:tempo"),
     (f"{RIG} --signal pressure=sine:period=1", "'pressure'"),
     (f"{RIG} --signal sine:period=1 --set payload=-3", "payload is -3"),
     ("rig record dance --out set", "'dance'"),
@@ -140,7 +140,8 @@ def test_a_defect_is_reported_without_a_traceback(
     monkeypatch.setattr("mckibben.files.read", broken)
     result = cli("characterize", "run.csv")
     assert result.code == 1
-    assert "Internal error" in result.err
+    assert "RuntimeError" in result.err
+    assert "MCKIBBEN_DEBUG" in result.err
     assert "Traceback" not in result.err
 
 

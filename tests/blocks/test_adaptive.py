@@ -184,7 +184,7 @@ def test_clipped_samples_are_counted_as_by_the_inverse_that_does_not_learn(model
     state = block.initial_state(silent[0], sample_time=STEP)
     block.bind(STEP, state, silent, np.empty((400, 1)))()
     assert block.n_clipped(state) == count
-    with pytest.warns(ModelWarning, match=f"^{count} sample"):
+    with pytest.warns(ModelWarning, match=rf"^{count}\b"):
         block.report(state)
     resumed = block.resumed(state)
     assert resumed.n_clipped(resumed.initial_state(silent[0], sample_time=STEP)) == 0

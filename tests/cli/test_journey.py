@@ -14,6 +14,7 @@ from mckibben import Recording, example, load, read, write
 from mckibben.signals import irregular_triangle
 from tests.cli.conftest import Cli
 from tests.estimators.test_balance_prior import moved
+from tests.refusals import mentions
 
 
 def columns(path: Path) -> dict[str, np.ndarray]:
@@ -30,7 +31,6 @@ def model(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> Path:
     result = cli("fit", "gpi", files[0], *channels, "-o", path, *settings)
     assert result.code == 0, result.err
     assert len(load(path).weights) == 6  # type: ignore[attr-defined]
-    assert "Standard error" in result.out
     assert re.search(r"rising slope +\d\S* +\d\S* +1/bar", result.out)
     return path
 
@@ -108,7 +108,7 @@ def test_what_was_assumed_while_reading_reaches_every_result(
     printed = json.loads(done.out)
     for file in (folder / "a.csv", folder / "b.csv"):
         (note,) = printed["notes"][str(file)]
-        assert "pressure in bar, displacement in mm" in note
+        assert mentions(note, ("pressure", "bar", "displacement", "mm"))
         assert f"{file}: {note}" in printed["leaderboard"]["notes"]
         start = f"{file}: {note.partition('`')[0]}"
         assert done.err.count(start) == 1

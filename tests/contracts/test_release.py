@@ -35,8 +35,9 @@ def test_the_version_is_one_everywhere(tmp_path: Path) -> None:
     assert release.agreed_version(ROOT)
     root = copied(tmp_path)
     (root / "CITATION.cff").write_text("version: 0.0.1\n")
-    with pytest.raises(ReleaseError, match=r"CITATION\.cff.*0\.0\.1"):
+    with pytest.raises(ReleaseError, match=r"CITATION\.cff") as caught:
         release.agreed_version(root)
+    assert "0.0.1" in str(caught.value)
 
 
 def test_a_new_version_is_set_everywhere(tmp_path: Path) -> None:

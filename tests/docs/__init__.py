@@ -1,0 +1,1 @@
+"""Laws of the documentation: links lead somewhere, commands and tutorials run, the site is whole."""

@@ -1,3 +1,5 @@
+"""Output maps: sums of pieces that are rising curves, undone exactly."""
+
 import numpy as np
 import pytest
 from hypothesis import given

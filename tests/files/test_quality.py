@@ -12,6 +12,7 @@ import mckibben
 from mckibben import DataError
 from mckibben.registry import load
 from tests.files.made import Cells, one, place, put, refused, several
+from tests.refusals import mentions
 
 N = 400
 K = np.arange(N)
@@ -102,7 +103,7 @@ def test_missing_samples_split(tmp_path: Path, timed: bool) -> None:
     assert second["force"].tolist() == Y[21:].tolist()
     assert second.start_time == pytest.approx(T[21])
     assert (first.name, second.name) == ("run[1]", "run[2]")
-    assert any("1 of 3 " in note for note in first.notes)
+    assert any(mentions(note, (1, 3)) for note in first.notes)
 
 
 @pytest.mark.parametrize("code", [-9999.0, 99999.0, 32767.0, 9.91e37, -9.9e37])

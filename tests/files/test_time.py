@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from mckibben import DataError, Recording
 from mckibben.arrays import Array
 from tests.files.made import Cells, one, place, put, refused
+from tests.refusals import mentions
 
 # Grids ---------------------------------------------------------------------------------
 
@@ -151,7 +152,7 @@ def test_a_row_without_a_date_is_left_out(tmp_path: Path) -> None:
     times[5] = ""
     found = one(written(tmp_path, times), gaps="interpolate")
     assert found.duration == whole.duration
-    assert any("row 7" in note for note in found.notes)
+    assert any(mentions(note, 7) for note in found.notes)
 
 
 # Counts --------------------------------------------------------------------------------

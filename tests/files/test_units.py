@@ -189,7 +189,7 @@ def test_the_rest_length_makes_each_measure_of_a_motion_of_another(
         mckibben.write(found, tmp_path / "own.csv")
         assert one(tmp_path / "own.csv", channels=[*measures])[channel] == pytest.approx(expected)
         if channel not in one(path):
-            assert "rest length" in refused(path, channels=[channel]).remedy
+            assert "rest_length" in refused(path, channels=[channel]).remedy
 
 
 def test_millimetres_called_a_contraction_are_refused_with_what_reads_them(tmp_path: Path) -> None:

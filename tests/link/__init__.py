@@ -1,0 +1,1 @@
+"""Laws of the serial link: nothing wrong is applied, the watchdog acts, and the link goes on."""

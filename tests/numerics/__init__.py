@@ -1,0 +1,1 @@
+"""Laws of the numerical parts: they agree with SciPy, and with the same written out."""

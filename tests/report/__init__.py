@@ -1,0 +1,1 @@
+"""Laws of reports: whole, offline, legible; every number in a sentence is that of the result."""

@@ -1,0 +1,1 @@
+"""Laws of virtual rigs: they keep to physics, repeat by seed, saturate and say so."""

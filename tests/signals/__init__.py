@@ -1,0 +1,1 @@
+"""Laws of signals and recordings: what memory depends on is kept, and copies of data are found."""

@@ -1,0 +1,1 @@
+"""Laws of the templates: they work as they stand, and obey the contract of what they are for."""

@@ -1,0 +1,1 @@
+"""Laws of operations: commands and functions equal each other, and every option has an effect."""

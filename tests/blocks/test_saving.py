@@ -162,7 +162,7 @@ def answer(content: Mapping[str, Any]) -> Any:
     try:
         return saving.from_dict(content)
     except ModelError as error:
-        return error.problem
+        return str(error)
 
 
 def test_inverses_that_had_kinds_of_their_own_still_load() -> None:

@@ -323,7 +323,7 @@ def _refuses_bad_arrays(trial: Trial) -> None:
 def _knows_its_time(trial: Trial) -> None:
     block = trial.block
     if block.rate_dependent:
-        trial.refused(ModelError, "sample time", block.simulate, trial.inputs)
+        trial.refused(ModelError, "sample_time", block.simulate, trial.inputs)
         return
     for sample_time in (None, 7.0):
         outputs = block.simulate(trial.inputs, sample_time=sample_time)

@@ -66,7 +66,7 @@ def test_the_words_are_those_of_the_field() -> None:
     found = []
     for path in sorted(SOURCE.rglob("*.py")):
         place = path.relative_to(SOURCE)
-        if place.parts[0] == "app":
+        if place.parts[0] in ("app", "hints.py"):  # the latter has names of earlier versions
             continue
         tree = ast.parse(path.read_text(encoding="utf-8"))
         names = [name.replace("_", " ") for node in ast.walk(tree) for name in _names(node)]

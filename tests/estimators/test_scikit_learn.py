@@ -335,7 +335,6 @@ def test_arrays_need_no_scikit_learn(tmp_path: Path) -> None:
 import sys
 import numpy as np
 from mckibben import PIEstimator
-from tests.refusals import refused
 sys.modules["sklearn"] = None
 u = np.sin(np.arange(300) / 20)
 estimator = PIEstimator(n_operators=2)

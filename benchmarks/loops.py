@@ -54,10 +54,10 @@ TITLES = {
     STATIC: "static map",
     "pid": "PID",
     "feedforward": "compensator",
-    "feedforward-pid": "compensator and PID",
-    "observer": "compensator and disturbance observer",
-    "predictive": "compensator with preview (MPC)",
-    "learned": f"compensator, after {REPETITIONS} repetitions (ILC)",
+    "feedforward-pid": "+ PID",
+    "observer": "+ observer",
+    "predictive": "+ MPC",
+    "learned": "+ ILC",
 }
 
 
@@ -202,9 +202,11 @@ PAGE = """# Controllers in closed loops
 
 Free motions followed on {count} plants of textbook physics (`tests/plants`), none of which is a model of
 this package. The compensator is the one that `mckibben study` hands over for the plant's training
-recordings; PID is tuned on the fitted model; sensors have the plant's noise. *Error* is the RMSE in per
-cent of the range of the motion, *effort* the RMS rate of the commands [bar/s or V/s], *step* the median
-time of a step in Python. For C on a microcontroller see [its page](../deploy/microcontroller.md).
+recordings; + is what is added to it: PID, a disturbance observer, preview of the motion (MPC), or
+{repetitions} repetitions of it (ILC). PID is tuned on the fitted model; sensors have the plant's noise.
+*Error* is the RMSE in per cent of the range of the motion, *effort* the RMS rate of the commands [bar/s or
+V/s], *step* the median time of a step in Python. For C on a microcontroller see
+[its page](../deploy/microcontroller.md).
 
 Written by `python benchmarks/loops.py`.
 
@@ -251,6 +253,7 @@ def page(found: Mapping[str, list[Result]]) -> str:
     ]
     return PAGE.format(
         count=len(found),
+        repetitions=REPETITIONS,
         laws=" | ".join(TITLES[law] for law in laws),
         dashes="---:|" * len(laws),
         errors="\n".join(each),

@@ -204,8 +204,8 @@ Free motions followed on {count} plants of textbook physics (`tests/plants`), no
 this package. The compensator is the one that `mckibben study` hands over for the plant's training
 recordings; + is what is added to it: PID, a disturbance observer, preview of the motion (MPC), or
 {repetitions} repetitions of it (ILC). PID is tuned on the fitted model; sensors have the plant's noise.
-*Error* is the RMSE in per cent of the range of the motion, *effort* the RMS rate of the commands [bar/s or
-V/s], *step* the median time of a step in Python. For C on a microcontroller see
+*Error* is the RMSE in per cent of the range of the motion, *effort* the RMS rate of the commands
+[bar/s or V/s], *step* the median time of a step in Python. For C on a microcontroller see
 [its page](../deploy/microcontroller.md).
 
 Written by `python benchmarks/loops.py`.

@@ -59,8 +59,8 @@ Written by `python benchmarks/little_data.py FOLDER`, in the environment of `ben
 Least error of this package's models over the least of the other methods; below 1 where a physical
 model wins:
 
-| set | least data | half | all data |
-|---|---:|---:|---:|
+| set | least data | half | all data | all data, all methods of the leaderboard |
+|---|---:|---:|---:|---:|
 {summary}
 
 A model of forces extrapolates only what its terms determine. The first quarter of the recordings of
@@ -120,12 +120,11 @@ def table(rows: pd.DataFrame, unit: str) -> str:
     return f"RMSE [{unit}]:\n\n" + "\n".join(lines)
 
 
-def ratios(rows: pd.DataFrame) -> str:
-    """Return the cells of a line of the summary."""
-    ours = rows["model"].str.startswith("mckibben")
-    least = [rows[side].groupby("seconds")["error"].min() for side in (ours, ~ours)]
-    shares = (least[0] / least[1]).sort_index().iloc[[0, -2, -1]]
-    return " | ".join(numeral(float(x), 2) for x in shares)
+def ratio(rows: pd.DataFrame, error: str) -> pd.Series[float]:
+    """Return this package's least error over that of the others, for every amount of data."""
+    ours = rows["model"].str.startswith("mckibben ")
+    least = [rows[side].groupby("seconds")[error].min() for side in (ours, ~ours)]
+    return (least[0] / least[1]).sort_index()
 
 
 def main() -> None:
@@ -146,7 +145,9 @@ def main() -> None:
         frame = pd.DataFrame(rows, columns=["model", "seconds", "error"])
         heading = ": ".join(filter(None, [one.title, task]))
         unit = part.split.test[0].units[part.channels.outputs[0]]
-        summary.append(f"| {heading} | {ratios(frame)} |")
+        shares = [*ratio(frame, "error").iloc[[0, -2, -1]], *ratio(lines.assign(seconds=0), "rmse")]
+        cells = " | ".join(numeral(float(share), 2) for share in shares)
+        summary.append(f"| {heading} | {cells} |")
         tables.append(f"\n## {heading}\n\n{table(frame, unit)}\n")
     PAGE_FILE.write_text(
         PAGE.format(many=MANY, summary="\n".join(summary), tables="".join(tables)), encoding="utf-8"

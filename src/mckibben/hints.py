@@ -1,11 +1,13 @@
-"""Names that users of other tools try first, and ours for them."""
+"""Names of earlier versions, and those that users of other tools try first, with ours for them."""
 
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
+from typing import NoReturn
 
 MODULE = {
     "report": "write_report",
@@ -14,6 +16,11 @@ MODULE = {
     "TSFNNEstimator": "estimator('tsfnn')",
     "presets": "estimator(NAME); its class is type(estimator(NAME))",
     "simulators": "export(model, FILE, 'mjcf')",
+    "bands": "calibrate, which adds a band to a model",
+    "characterization": "characterize; its results are in mckibben.diagnosis",
+    "excitation": "data_gaps and plan",
+    "ros": "export(model, FOLDER, 'ros2')",
+    "validation": "check",
     "check_rig": "load_rig, which checks what it reads",
     "rig_from_data_sheet": "load_rig of a file that `mckibben rig show NAME -o FILE` writes",
     "concat": "a list of recordings, which are fitted together",
@@ -118,6 +125,9 @@ RECORDING = {
     "filter": "mckibben.signals.low_pass(run, cutoff)",
     "detrend": "mckibben.signals.detrend(run)",
     "interpolate": "run.resample(sample_time)",
+    "known": "run.meta",
+    "processed": "run.with_channels",
+    "continues": "run.start_time",
     "concat": "a list of recordings, which are fitted together",
     "append": "a list of recordings, which are fitted together",
 }
@@ -152,6 +162,9 @@ RESULT = {
     "to_c": "mckibben.export(it, FOLDER)",
     "rmse": "to_dict()['rmse']",
     "score": "simulate(data).metrics",
+    "sentences": "print it, or to_dict()",
+    "verdict": "print it, or to_dict()",
+    "untold": "mckibben.data_gaps(data)",
     "table": "to_frame()",
     "df": "to_frame()",
 }
@@ -174,38 +187,128 @@ BLOCK = {
     "to_c": "mckibben.export(model, FOLDER)",
     "to_fmu": "mckibben.export(model, FILE, 'fmu')",
     "to_json": "save(FILE), or to_dict()",
+    "to_scipy": "to_dict(), whose coefficients scipy.signal takes",
+    "to_control": "to_dict(), whose coefficients control.tf takes",
+    "limits": "input_bounds",
+    "undone": "forward_model",
     "summary": "print it",
 }
 """Attribute that a model might have -> what there is."""
 
-COMMAND_LINE = {
-    "check-block": "In Python: mckibben.check_block",
-    "untold": "Use: mckibben info",
-    "ros": "Use: mckibben export ros2",
-    "rig new": "Use: mckibben rig show NAME -o FILE",
-    "export --overwrite": "Use --force",
-    "export --fmi": "FMUs are FMI 2.0",
-    "export --platforms": "An FMU has the library for this machine, or none with --no-library",
-    "export --adjustable": "Change the model, and export it again",
-    "export --sheet": "Write a rig of the sheet, and export a balance fitted to it",
-    "characterize --beside": "Use --scheduling",
-    "reproduce --train": "Use --data FOLDER",
-    "reproduce --test": "Use --data FOLDER",
-    "fit --method": "Use --set method=...",
-    "simulate --horizon": "All simulations are free runs",
-    "invert --flow-limit": "A limit is of one muscle: --rate-limit",
-    "invert --total-limit": "A limit is of one muscle: --rate-limit",
-    "app --host": "The workbench is for this machine alone",
-    "compare --dask": "In Python: mckibben.compare(..., executor=...)",
-    "compare --folds": "Eight parts of the training data are left out in turn",
-    "compare --n-folds": "Eight parts of the training data are left out in turn",
-    "study --folds": "Eight parts of the training data are left out in turn",
-    "study --n-folds": "Eight parts of the training data are left out in turn",
-    "plan --for": "A plan is for every model",
-    "plan --model": "A plan is for every model",
-    "plan --muscle": "A plan is for every model",
+FORMER_PACKAGES = {
+    "control": {
+        "slow_rise": "slow_cycle, whose middle is the static map",
+        "dead_time_undone": "preview_time",
+        "Feedforward": "control_law('feedforward', compensator, tuned)",
+        "FeedforwardPID": "control_law('feedforward-pid', compensator, tuned)",
+        "PID": "control_law('pid', compensator, tuned)",
+    },
+    "link": {
+        "open_port": "Link(PORT), which opens a port by pyserial",
+        "ByteStream": "Link(PORT), which opens a port by pyserial",
+        "Descriptor": "Link(PORT), which opens a port by pyserial",
+    },
+    "papers": {"reproduce": "mckibben.reproduce"},
+    "report": {"write_reproduction": "mckibben.reproduce(PAPER, out=FOLDER)"},
+    "rigs": {name: f"mckibben.{MODULE[name]}" for name in ("check_rig", "rig_from_data_sheet")},
+    "signals": {
+        "random_steps": "staircase of random levels, or random_wave",
+        "split_time": "run.between(start, stop), twice",
+        "branches_of": "branches, and run.slice(start, stop)",
+    },
+    "stream": {"UDPLink": "run, with functions of a socket that read and write"},
 }
-"""Command, or command and option, of earlier versions -> what to do now."""
+"""Package -> name of earlier versions in it -> what there is instead."""
+
+_EIGHT_PARTS = "leave it out: eight parts of the training data are left out in turn"
+_ONE_PLAN = "leave it out: a plan is for every model"
+_ONE_MUSCLE = "use `rate_limit`: a limit is of one muscle"
+_DRIVEN = "drive the device in Python, by mckibben.link.Link"
+_EXECUTOR = "in Python, give an `executor`, such as one of Dask"
+
+FORMER_OPERATIONS = {
+    "check-block": "in Python, use mckibben.check_block",
+    "untold": "use `info()`",
+    "ros": "use `export()` ros2",
+    "rig new": "use mckibben rig show NAME -o FILE",
+    "--folder": "use `out`",
+    "--path": "give data first, without a name",
+    "--recordings": "give data first, without a name",
+    "--clear": "leave it out: models of an interrupted run are in `out`",
+    "--found": "leave it out: `progress` shows how far it is",
+    "--watch": "leave it out: `progress` shows how far it is",
+    "--notes": "leave it out: notes are those of the recordings",
+    "app --host": "leave it out: the workbench is for this machine alone",
+    "app --token": "leave it out: a new link opens the workbench each time",
+    "characterize --beside": "use `scheduling`",
+    "compare --dask": _EXECUTOR,
+    "compare --folds": _EIGHT_PARTS,
+    "compare --n-folds": _EIGHT_PARTS,
+    "export --adjustable": "change the model, and export it again",
+    "export --fmi": "leave it out: FMUs are FMI 2.0",
+    "export --overwrite": "use `force`",
+    "export --platforms": "leave it out: an FMU has the library for this machine",
+    "export --sheet": "write a rig of the sheet, and export a balance fitted to it",
+    "fit --method": "use `settings[method]=...`, of the models that have it",
+    "fit --validation": "leave it out: fits have no early stopping",
+    "info --model": "use `fit()`, which shows the standard error of every parameter",
+    "invert --flow-limit": _ONE_MUSCLE,
+    "invert --total-limit": _ONE_MUSCLE,
+    **{
+        f"link {flag}": _DRIVEN
+        for flag in ("--set", "--seconds", "--out", "-o", "--every", "--force")
+    },
+    "plan --for": _ONE_PLAN,
+    "plan --goal": _ONE_PLAN,
+    "plan --model": _ONE_PLAN,
+    "plan --progress": "leave it out: a plan takes seconds",
+    "plan --muscle": "give recordings, or `rig`",
+    "reproduce --test": "use `data`, a folder with all recordings",
+    "reproduce --train": "use `data`, a folder with all recordings",
+    "rig record --format": "leave it out: recordings are written as CSV",
+    "simulate --horizon": "leave it out: all simulations are free runs",
+    "study --dask": _EXECUTOR,
+    "study --folds": _EIGHT_PARTS,
+    "study --n-folds": _EIGHT_PARTS,
+}
+"""Command, or operation and option, of earlier versions -> what to do now."""
+
+_NO_SWARM = "leave it out: swarms are in mpi-narmax and sdchm-published alone"
+_TERMS = "use `settings[terms]`, a list of what may be added"
+
+FORMER_SETTINGS = {
+    "balance finest": "use `settings[n_stops]`: the shortest stop is 0.3 % of the stroke",
+    "balance contact": _TERMS,
+    "balance mass": _TERMS,
+    "balance slack": _TERMS,
+    "balance ridge": "leave it out: each term has a scale of its own",
+    "balance-force contact": _TERMS,
+    "cpi settled": "leave it out: all runs begin by one rule",
+    "narx-network activation": "leave it out: units are tanh",
+    "state-network periodic": "leave it out: `meta['periodic']` of a recording decides",
+    "fit_delay": "fit oe or arx, which have a `settings[delay]`, or air, which finds a dead time",
+    "fit_pressure_gain": "leave it out: forces of friction do not depend on pressure",
+    "hold": "leave it out: inputs are straight lines between samples",
+    "method": _NO_SWARM,
+    **{f"pso_{one}": _NO_SWARM for one in ("c1", "c2", "inertia_start", "inertia_end", "iterations",
+                                           "particles")},
+    "spacing": "leave it out: thresholds are spaced evenly",
+}  # fmt: skip
+"""Setting of estimators of earlier versions, of one model or of any -> what to do now."""
+
+_OSCILLATOR = "fit {}, or 'state-network'; saved oscillators still load and run"
+
+FORMER_PLUGINS = {
+    "blocks force-balance": "use 'balance'",
+    "blocks force-balance-inverse": "use 'balance'",
+    "estimators bouc-wen-oscillator": _OSCILLATOR.format("'bouc-wen'"),
+    "estimators duhem-oscillator": _OSCILLATOR.format("'duhem'"),
+    "estimators force-balance": "use 'balance'",
+    "estimators grey-box": "use 'balance'",
+    "protocols multistate": "use 'multistate-friction'",
+    "signals random-steps": "use 'staircase', or 'random-wave'",
+}
+"""Group and name of plug-ins of earlier versions -> what to do now."""
 
 KEYWORDS = {
     "features": "input",
@@ -250,7 +353,12 @@ ALIKE = 0.78
 """Similarity of letters above which one name is taken for another."""
 
 HINTS: Mapping[str, Mapping[str, str]] = MappingProxyType(
-    {"mckibben": MODULE, "recording": RECORDING, "block": BLOCK}
+    {
+        "mckibben": MODULE,
+        "recording": RECORDING,
+        "block": BLOCK,
+        **{f"mckibben.{name}": names for name, names in FORMER_PACKAGES.items()},
+    }
 )
 
 
@@ -267,14 +375,31 @@ def nearest(name: str, known: Iterable[str], hints: Mapping[str, str] | None = N
     return close[0] if close else ""
 
 
-def former(command: Sequence[str], word: str) -> str:
-    """Return what to do instead of a command or an option that there was; empty if there was none.
+def former(
+    place: Sequence[str], name: str, among: Mapping[str, str] = MappingProxyType(FORMER_OPERATIONS)
+) -> str:
+    """Return what to do instead of a name of an earlier version; empty if there was none.
 
-    >>> former(["export", "c"], "--overwrite")
-    'Use --force'
+    >>> former(["export", "c"], "--overwrite"), former(["balance"], "ridge", FORMER_SETTINGS)
+    ('use `force`', 'leave it out: each term has a scale of its own')
     """
-    keys = (" ".join([*command[:n], word]) for n in range(len(command), -1, -1))
-    return next((COMMAND_LINE[key] for key in keys if key in COMMAND_LINE), "")
+    keys = (" ".join([*place[:n], name]) for n in range(len(place), -1, -1))
+    return next((among[key] for key in keys if key in among), "")
+
+
+def lead_on(package: str) -> None:
+    """Make a package lead from names that it has not to what there is instead."""
+    names = vars(sys.modules[package])
+
+    def refuse(name: str) -> NoReturn:
+        own = [
+            each
+            for each, what in names.items()
+            if not isinstance(what, ModuleType) and getattr(what, "__module__", "") != __name__
+        ]
+        raise AttributeError(absent(package, name, own, package), name=name)
+
+    names["__getattr__"] = refuse
 
 
 def absent(owner: str, name: str, known: Iterable[str], kind: str = "") -> str:

@@ -24,7 +24,7 @@ from typing import (
 )
 
 from mckibben.errors import DataError, ModelError
-from mckibben.hints import KEYWORDS, nearest
+from mckibben.hints import KEYWORDS, former, nearest
 from mckibben.parsers import calibration, constant, limits, names, number, pair, setting, span
 
 Options = TypeVar("Options")
@@ -101,11 +101,14 @@ def given_options(
     known = (*base.__dataclass_fields__, *others)
     given = {name if name in known else RENAMED.get(name, name): one for name, one in given.items()}
     if strange := [name for name in given if name not in base.__dataclass_fields__]:
-        hint = nearest(strange[0], known, {k: v for k, v in KEYWORDS.items() if v in known})
+        name = strange[0]
+        hint = nearest(name, known, {k: v for k, v in KEYWORDS.items() if v in known})
         remedy = f"use `{hint}`" if hint else f"use one of {', '.join(known)}"
         if "settings" in known and not hint:
-            remedy = f"if a model has it, give `settings[{strange[0]}]=VALUE`; or {remedy}"
-        raise ModelError(f"there is no option {strange[0]!r}", remedy=remedy)
+            remedy = f"if a model has it, give `settings[{name}]=VALUE`; or {remedy}"
+        place = kind.__name__.removesuffix("Options").casefold()
+        instead = former([place], f"--{name.replace('_', '-')}")
+        raise ModelError(f"there is no option {name!r}", remedy=instead or remedy)
     values: dict[str, Any] = {}
     for name, hint in get_type_hints(kind, include_extras=True).items():
         values[name] = _as_declared(hint, name, given.get(name, getattr(base, name)))

@@ -13,6 +13,7 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from mckibben.errors import ModelError
+from mckibben.hints import FORMER_PLUGINS, former
 
 PLUGINS: dict[str, dict[str, str]] = {
     "blocks": {
@@ -198,12 +199,6 @@ behind.
 OF_MODEL = {"blocks": "", "estimators": "Estimator"}
 """Groups to which a model belongs, and the end of the name that it has there."""
 
-REPLACED: dict[str, dict[str, str]] = {
-    "blocks": {"force-balance": "balance", "force-balance-inverse": "balance"},
-    "estimators": {"force-balance": "balance", "grey-box": "balance"},
-}
-"""Group -> name that was removed -> name of what replaces it."""
-
 
 def names(group: str) -> tuple[str, ...]:
     """Return the names of all plug-ins of a group, in alphabetical order.
@@ -226,11 +221,8 @@ def load(group: str, name: str) -> Any:
     locations = _locations(group)
     if name not in locations:
         kind = group.removesuffix("s")
-        successor = REPLACED.get(group, {}).get(name)
-        if successor is not None:
-            raise ModelError(
-                f"the {kind} {name!r} was removed", remedy=f"use {successor!r} instead"
-            )
+        if hint := former([group], name, FORMER_PLUGINS):
+            raise ModelError(f"the {kind} {name!r} was removed", remedy=hint)
         close = get_close_matches(str(name).lower().replace("_", "-"), locations, 3, 0.65)
         raise ModelError(
             f"there is no {kind} named {name!r:.60}",

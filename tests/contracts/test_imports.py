@@ -58,7 +58,7 @@ LAYERS = (
 )
 """Lowest first."""
 
-BASE = {"arrays", "errors", "printing"}
+BASE = {"arrays", "errors", "hints", "printing"}
 
 STANDS_ON = {
     "numerics": {"numerics", *BASE},

@@ -21,7 +21,7 @@ from mckibben.blocks.hysteresis.envelopes import Envelope
 from mckibben.blocks.parameters import Parametrised
 from mckibben.estimators.catalogue import defaults, full_name, settings_of
 from mckibben.estimators.core.estimator import Estimator
-from mckibben.registry import PLUGINS, REPLACED, load, names
+from mckibben.registry import PLUGINS, load, names
 from mckibben.rigs import Rig
 from tests.refusals import refused
 
@@ -72,15 +72,9 @@ def test_every_public_name_is_there() -> None:
     assert all(getattr(mckibben, name) is not None for name in mckibben.__all__)
 
 
-def test_an_unknown_name_is_refused_and_one_that_is_gone_leads_to_its_successor() -> None:
+def test_an_unknown_name_is_refused() -> None:
     with refused(ModelError, names=("'ip'", "activation-memory")):
         load("blocks", "ip")
-    for group, replaced in REPLACED.items():
-        for name, successor in replaced.items():
-            assert name not in names(group)
-            with refused(ModelError, names=(f"'{name}'", f"'{successor}'")):
-                load(group, name)
-            assert callable(load(group, successor))
 
 
 @pytest.mark.parametrize("name", names("blocks"))

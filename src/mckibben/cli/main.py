@@ -31,6 +31,7 @@ from mckibben.errors import (
     DataWarning,
     MckibbenError,
     ModelWarning,
+    in_terms_of,
     rendered,
 )
 from mckibben.hints import former
@@ -163,7 +164,8 @@ def _usage(error: click.UsageError) -> str:
             command.insert(0, context.info_name or "")
             context = context.parent
         if hint := former(command, found[1]):
-            return f"{found[0]} {hint}."
+            what = in_terms_of(hint, as_flag, as_command)
+            return f"{found[0]} {what[0].upper()}{what[1:]}."
     return message
 
 

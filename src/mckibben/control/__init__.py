@@ -19,3 +19,6 @@ from mckibben.control.uncompensated import Before as Before
 from mckibben.control.uncompensated import before as before
 from mckibben.control.uncompensated import slow_cycle as slow_cycle
 from mckibben.control.uncompensated import uncompensated as uncompensated
+from mckibben.hints import lead_on
+
+lead_on(__name__)

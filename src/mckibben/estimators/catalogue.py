@@ -9,6 +9,7 @@ from typing import Any
 from mckibben import registry
 from mckibben.errors import ModelError
 from mckibben.estimators.core.estimator import Estimator, Purpose
+from mckibben.hints import FORMER_SETTINGS, former
 
 
 @dataclass(frozen=True)
@@ -145,10 +146,11 @@ def settings_of_all(
         ]
         if not takers:
             every = sorted({setting for some in known.values() for setting in some})
+            hints = (former([model], name, FORMER_SETTINGS) for model in estimators)
             raise ModelError(
                 f"{', '.join(estimators)} has no such setting",
                 parameter=key,
-                remedy=f"give one, or MODEL.NAME, of {', '.join(every)}",
+                remedy=next(filter(None, hints), f"give one, or MODEL.NAME, of {', '.join(every)}"),
             )
         for model in takers:
             found[model][name] = value

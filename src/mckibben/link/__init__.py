@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mckibben.hints import lead_on
 from mckibben.link.client import Device as Device
 from mckibben.link.client import Link as Link
 from mckibben.link.client import LinkError as LinkError
@@ -9,3 +10,5 @@ from mckibben.link.client import Note as Note
 from mckibben.link.client import Port as Port
 from mckibben.link.client import State as State
 from mckibben.link.client import Statistics as Statistics
+
+lead_on(__name__)

@@ -14,7 +14,7 @@ import pytest
 
 import mckibben
 from mckibben import errors
-from mckibben.app.terms import message_of
+from mckibben.app.terms import PLACES, message_of
 from mckibben.cli.main import app
 from mckibben.cli.parameters import COMMANDS, Command, as_command, as_flag
 from mckibben.errors import DataError, KernelError, MckibbenError, ModelError, rendered
@@ -145,8 +145,8 @@ def test_each_face_renders_in_its_own_terms() -> None:
         assert part in terminal
     page = message_of(ERROR)
     assert not re.search(r"`|\(\)", page)
-    assert "“Plan the next recording”" in page
-    assert message_of(ModelError("it is None")) == "It is None"
+    assert PLACES["plan"] in page
+    assert message_of(ModelError("none")) == "None"
 
 
 @pytest.mark.parametrize("read", [description, parsed, fields_of])

@@ -14,6 +14,7 @@ import pytest
 
 from mckibben import example
 from mckibben.app.jobs import CANCELLED, DONE, FAILED, INTERRUPTED, RUNNING, WAITING, Jobs
+from mckibben.app.terms import GAPS
 from mckibben.app.workspace import Workspace
 from tests.app import work
 
@@ -40,11 +41,11 @@ def test_a_job_reports_and_leaves_its_result(workspace: Workspace) -> None:
     job = jobs.submit(work.count, "counting", to=3)
     assert jobs.submit(work.count, "counting", to=3) is job  # the same is not done twice
     holds(lambda: finished(jobs))
-    assert (job.state, job.message, job.kind) == (DONE, "counted to 3", "count")
+    assert (job.state, job.message, job.kind) == (DONE, "3", "count")
     assert job.progress[0][1] == 0.0
     assert workspace.read("runs", "count-3") == {"to": 3}
     kept = Jobs(Workspace(workspace.folder)).jobs[job.name]
-    assert (kept.state, kept.message, kept.title) == (DONE, "counted to 3", "counting")
+    assert (kept.state, kept.message, kept.title) == (DONE, "3", "counting")
 
 
 def test_errors_are_in_terms_of_controls_and_deaths_are_noticed(workspace: Workspace) -> None:
@@ -52,7 +53,7 @@ def test_errors_are_in_terms_of_controls_and_deaths_are_noticed(workspace: Works
     refused, died = jobs.submit(work.refuse, "refused"), jobs.submit(work.die, "died")
     holds(lambda: finished(jobs))
     assert (refused.state, died.state) == (FAILED, FAILED)
-    assert "“Split there”" in refused.message
+    assert GAPS["split"] in refused.message
     assert died.message
 
 
@@ -71,6 +72,7 @@ def test_jobs_wait_for_their_turn_and_can_be_cancelled(workspace: Workspace) -> 
 SERVER = """
 import sys, time
 from mckibben.app.jobs import Jobs
+from mckibben.app.terms import GAPS
 from mckibben.app.workspace import Workspace
 from tests.app import work
 jobs = Jobs(Workspace(sys.argv[1]))

@@ -15,7 +15,7 @@ Tell = Callable[..., None]
 def count(workspace: Workspace, tell: Tell, *, to: int) -> str:
     tell(0.5, "half")
     workspace.write("runs", f"count-{to}", {"to": to})
-    return f"counted to {to}"
+    return str(to)
 
 
 def refuse(workspace: Workspace, tell: Tell) -> str:

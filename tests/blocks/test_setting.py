@@ -55,7 +55,7 @@ def test_beyond_what_was_identified_it_warns_and_what_was_is_refused() -> None:
     assert mentions(str(caught[0].message), ("frequency", "3.00", "0.500", "2.00"))
     with refused(ModelError, parameter="gamma", names=("frequency", "rate_time_constant")):
         with_fields(model, {"gamma": (0.0, 1.0)})
-    with refused(ModelError, parameter="frequency"):
+    with refused(ModelError, parameter="frequency", names=("'activation-pressure'", 0, -1.0)):
         with_fields(model, {"frequency": -1.0})
-    with refused(ModelError, parameter="frequency"):
+    with refused(ModelError, parameter="frequency", names="'affine'"):
         with_fields(Affine.example(), {"frequency": 1.0})

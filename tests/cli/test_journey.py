@@ -30,8 +30,13 @@ def model(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> Path:
     channels = ["--input", "pressure", "--output", "displacement"]
     result = cli("fit", "gpi", files[0], *channels, "-o", path, *settings)
     assert result.code == 0, result.err
-    assert len(load(path).weights) == 6  # type: ignore[attr-defined]
-    assert re.search(r"rising slope +\d\S* +\d\S* +1/bar", result.out)
+    block = load(path)
+    assert len(block.weights) == 6  # type: ignore[attr-defined]
+    shown = re.search(r"rising slope +(\d\S*) +(\d\S*) +1/bar", result.out)
+    assert shown is not None
+    value, error = map(float, shown.groups())
+    assert value == pytest.approx(block.rising.slope, rel=1e-3)  # type: ignore[attr-defined]
+    assert 0.0 < error < 0.1 * value
     return path
 
 

@@ -339,7 +339,7 @@ def test_an_estimate_is_made_of_what_it_names(seen: Seen) -> None:
         assert seen.given[id(estimate)][t] == pytest.approx(found["displacement"][t] / length)
         assert seen.given[id(block)][t][1] == pytest.approx(40.0)
     voltage = Affine(1.0, 0.0, Channel("voltage", "V"), Channel("force", "N"))
-    with refused(DataError, channel="voltage"):
+    with refused(DataError, channel="voltage", names="displacement"):
         closed(EstimatedLoad(BlockController(block), voltage), plant, reference)
 
 
@@ -347,22 +347,24 @@ def test_an_estimate_is_made_of_what_it_names(seen: Seen) -> None:
     ("block", "plant", "channel", "told"),
     [
         (named(PI.example(), "pressure", "contraction").inverse(), "twin of unknown length",
-         "contraction", "rest_length"),
-        (named(PI.example(), "voltage", "displacement").inverse(), "twin", "voltage", "V"),
-        (PI.example().inverse(), "twin of voltage", "pressure", "bar"),
+         "contraction", ("rest_length", "displacement")),
+        (named(PI.example(), "voltage", "displacement").inverse(), "twin", "voltage",
+         ("V", "pressure")),
+        (PI.example().inverse(), "twin of voltage", "pressure", ("bar", "voltage")),
         (replace(PI.example(), output=Channel("displacement", "cm")).inverse(), "twin",
-         "displacement", "mm"),
+         "displacement", ("cm", "mm")),
         (replace(PI.example(), input=Channel("pressure", "kPa")).inverse(), "twin", "pressure",
-         "bar"),
+         ("kPa", "bar")),
         (replace(PI.example(), output=Channel("angle", "rad")).inverse(), "twin", "angle",
-         "rad"),
-        (pair(1, 2).inverse(), "twin", "displacement_1", "mm"),
-        (PI.example().inverse(), "twin of two", "displacement", "mm"),
-        (PI.example(), "twin", "pressure", "bar"),
+         ("rad", "displacement")),
+        (pair(1, 2).inverse(), "twin", "displacement_1", ("mm", "displacement")),
+        (PI.example().inverse(), "twin of two", "displacement",
+         ("mm", "displacement_1", "displacement_2")),
+        (PI.example(), "twin", "pressure", ("bar", "displacement")),
     ],
 )  # fmt: skip
 def test_refusals_name_the_channel_and_a_remedy(
-    block: Block, plant: str, channel: str, told: str, seen: Seen
+    block: Block, plant: str, channel: str, told: tuple[str, ...], seen: Seen
 ) -> None:
     there = PLANTS[plant]()
     with refused(DataError, channel=channel, names=told):
@@ -373,7 +375,7 @@ def test_refusals_name_the_channel_and_a_remedy(
 def test_a_reference_that_only_a_rest_length_makes_measured_is_refused_without_one() -> None:
     plant = PLANTS["twin of unknown length"]()
     reference = wanted(plant, "contraction")
-    with refused(DataError, names="rest_length"):
+    with refused(DataError, names=("displacement", "rest_length")):
         closed(PI.example().inverse(), plant, reference)
     found = closed(PI.example().inverse(), plant, reference.with_meta(rest_length=200.0))
     assert found.recording["reference_displacement"][-1] == pytest.approx(20.0)

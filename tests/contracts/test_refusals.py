@@ -41,7 +41,7 @@ ARM = replace(BALANCE, pressure_range=(0.0, 6.0))
 NO_MODEL: list[tuple[str, dict[str, Any], Fields]] = [
     ("play", {"threshold": -0.1}, {"parameter": "threshold", "names": "'play'"}),
     ("pi", {"thresholds": (), "weights": ()}, {"parameter": "thresholds", "names": "'pi'"}),
-    ("pi", {"weights": (1.0, 2.0)}, {"parameter": "weights"}),
+    ("pi", {"weights": (1.0, 2.0)}, {"parameter": "weights", "names": ("'pi'", 4, 2)}),
     ("pi", {"thresholds": (0.0, 0.0, 1.0, 2.0)}, {"parameter": "thresholds"}),
     ("pi", {"input_range": (5.0, 5.0)}, {"parameter": "input_range"}),
     ("eupi", {"falling_slope": 0.0}, {"parameter": "falling_slope", "names": "'eupi'"}),
@@ -52,8 +52,12 @@ NO_MODEL: list[tuple[str, dict[str, Any], Fields]] = [
         {"knots": (0.0, 0.0), "values": OPEN},
         {"parameter": "knots", "names": "'piecewise-linear'"},
     ),
-    ("piecewise-linear", {"knots": OPEN, "values": (1.0, 1.0)}, {"names": "'piecewise-linear'"}),
-    ("bouc-wen", {"exponent": 3}, {"parameter": "exponent"}),
+    (
+        "piecewise-linear",
+        {"knots": OPEN, "values": (1.0, 1.0)},
+        {"parameter": "values", "names": "'piecewise-linear'"},
+    ),
+    ("bouc-wen", {"exponent": 3}, {"parameter": "exponent", "names": ("'bouc-wen'", 3)}),
     ("generalized-bouc-wen", {"shape": (0.5, 0.5, 0.1, 0.0, 0.0)}, {"parameter": "shape"}),
     (
         "duhem-oscillator",
@@ -81,7 +85,11 @@ NO_MODEL: list[tuple[str, dict[str, Any], Fields]] = [
         {"parts": (PI.example(), replace(PI.example(), output=Channel("displacement", "N")))},
         {"channel": "displacement"},
     ),
-    ("per-channel", {"parts": (PI.example(), example("eupi"))}, {"names": "'per-channel'"}),
+    (
+        "per-channel",
+        {"parts": (PI.example(), example("eupi"))},
+        {"names": ("'per-channel'", "pressure")},
+    ),
     (
         "load-estimate",
         {"forward": replace(BALANCE, loads=((), ()), scheduled=BALANCE.scheduled[:1])},
@@ -114,7 +122,7 @@ NO_MODEL: list[tuple[str, dict[str, Any], Fields]] = [
     ("balance", {"areas": ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0))}, {"parameter": "areas"}),
     ("balance", {"springs": ((1.0,), (1.0,))}, {"parameter": "springs", "names": (2, 6)}),
     ("balance", {"hull": ((0.0, 50.0), (50.0, 0.0))}, {"parameter": "hull"}),
-    ("balance", {"driven": (Channel("force", "N"),) * 2}, {"names": "name"}),
+    ("balance", {"driven": (Channel("force", "N"),) * 2}, {"names": ("'balance'", "force")}),
 ]
 
 CROSSED = {
@@ -131,7 +139,7 @@ NO_INVERSE: dict[str, tuple[Any, Fields]] = {
     **{
         f"gpi: crossed {name}": (
             example("gpi", rising=rising, falling=falling),
-            {"names": "envelope"},
+            {"names": ("'gpi'", "bar")},
         )
         for name, (rising, falling) in CROSSED.items()
     },
@@ -154,7 +162,10 @@ NO_INVERSE: dict[str, tuple[Any, Fields]] = {
         load("blocks", "rate-dependent-pi")((0.0,), (0.0,), (-1.0,), input_range=OPEN),
         {"names": -1},
     ),
-    "preisach": (example("preisach").unpack([0.0] * 15 + [1.0]), {"names": "diagonal"}),
+    "preisach": (
+        example("preisach").unpack([0.0] * 15 + [1.0]),
+        {"names": ("'preisach'", "diagonal")},
+    ),
     "polynomial: range": (example("polynomial", input_range=None), {"parameter": "input_range"}),
     **{
         f"polynomial: {c}": (
@@ -174,10 +185,16 @@ NO_INVERSE: dict[str, tuple[Any, Fields]] = {
     "narx": (example("narx-polynomial"), {"names": "'narx-polynomial'"}),
     "coupling": (Coupling(((1.0, 1.0), (1.0, 1.0)), PAIR, PAIR), {"names": "singular"}),
     "force": (printed("multistate-static-force"), {"names": "ForceFeedforward"}),
-    "mpi-narmax": (printed("mpi-narmax-mpi"), {"names": "inverse"}),
+    "mpi-narmax": (
+        printed("mpi-narmax-mpi"),
+        {"parameter": "input_range", "names": "'polynomial'"},
+    ),
 }
 
 RATED = example("rate-dependent-pi")
+
+NOISE, TIMES = ("2.6e-08", "2.6e+04"), (0.001, "1e+09")
+"""Limits of the noise of the example of PI, in its unit, and of the time constant of what learns [s]."""
 
 OTHERS: dict[str, tuple[Make, Fields]] = {
     "other states": (
@@ -196,7 +213,7 @@ OTHERS: dict[str, tuple[Make, Fields]] = {
     ),
     "too late": (
         lambda: ProcessModel(2.0, (0.3,), delay=5.0).simulate(U, sample_time=0.01),
-        {"names": 254},
+        {"names": (5, 500, 254)},
     ),
     "too fast": (
         lambda: example("state-network").simulate(U, sample_time=1.0),
@@ -211,10 +228,22 @@ OTHERS: dict[str, tuple[Make, Fields]] = {
         lambda: adaptive(example("adaptive"), 20.0, 0.02),
         {"names": "'pi-adaptive'"},
     ),
-    "noise of nothing": (lambda: adaptive(PI.example(), 20.0, 1e-300), {"parameter": "noise"}),
-    "noise of all": (lambda: adaptive(PI.example(), 20.0, 1e160), {"parameter": "noise"}),
-    "learns at once": (lambda: adaptive(PI.example(), 1e-9, 0.02), {"parameter": "time"}),
-    "learns never": (lambda: adaptive(Series.example(), 1e12, 0.02), {"parameter": "time"}),
+    "noise of nothing": (
+        lambda: adaptive(PI.example(), 20.0, 1e-300),
+        {"parameter": "noise", "names": NOISE},
+    ),
+    "noise of all": (
+        lambda: adaptive(PI.example(), 20.0, 1e160),
+        {"parameter": "noise", "names": NOISE},
+    ),
+    "learns at once": (
+        lambda: adaptive(PI.example(), 1e-9, 0.02),
+        {"parameter": "time", "names": TIMES},
+    ),
+    "learns never": (
+        lambda: adaptive(Series.example(), 1e12, 0.02),
+        {"parameter": "time", "names": TIMES},
+    ),
 }
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import UnionType
 from typing import (
+    TYPE_CHECKING,
     Annotated,
     Any,
     Literal,
@@ -27,7 +28,10 @@ from mckibben.errors import DataError, ModelError
 from mckibben.hints import KEYWORDS, former, nearest
 from mckibben.parsers import calibration, constant, limits, names, number, pair, setting, span
 
-Options = TypeVar("Options")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Options = TypeVar("Options", bound="DataclassInstance")
 
 RENAMED = {"inputs": "input", "outputs": "output"}
 """Option of an earlier version -> its name."""

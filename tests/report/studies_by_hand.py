@@ -21,7 +21,7 @@ from mckibben.diagnosis.branch_gaps import Memory
 from mckibben.metrics import score
 from mckibben.recording import Recording
 from mckibben.signals import triangle
-from mckibben.studying.inverting import Compensation, checked
+from mckibben.studying.inverting import Compensation, check_inverse
 from mckibben.studying.recorded_inputs import RecordedInputs
 from mckibben.studying.study import Study
 
@@ -162,7 +162,7 @@ def compensated(row: Row, recording: Recording) -> Compensation:
     """Return what is expected of the compensator of a row."""
     assert row.block is not None
     space = RecordedInputs.of([recording], [channel.name for channel in row.block.inputs])
-    check = checked(row.block, space, model=row.model)
+    check = check_inverse(row.block, space, model=row.model)
     error, ends = row.test_error, row.rmse_interval
     return Compensation(row.model, check.inverse, "mm", error, ends, 10 * error, check, ())
 

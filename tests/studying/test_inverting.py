@@ -15,7 +15,7 @@ from mckibben.blocks.memoryless import Affine
 from mckibben.registry import load
 from mckibben.signals import triangle
 from mckibben.splits import given_split
-from mckibben.studying.inverting import checked, made, static_error, static_map
+from mckibben.studying.inverting import build_compensator, check_inverse, static_error, static_map
 from mckibben.studying.recorded_inputs import RecordedInputs
 from tests.blocks.balances import CROWDED
 
@@ -33,7 +33,7 @@ TRAIN, TEST = recorded(RISE), recorded(RISE[::-1], 1)
 
 @pytest.mark.parametrize("block", [PI.example(), GPI.example()], ids=lambda b: b.kind)
 def test_the_check_covers_the_recorded_inputs(block: Block) -> None:
-    check = checked(block, RecordedInputs.of([TRAIN], ["pressure"]))
+    check = check_inverse(block, RecordedInputs.of([TRAIN], ["pressure"]))
     assert check.error <= 1e-12
     assert np.ptp(check.pressure) > 0.9 * np.ptp(TRAIN["pressure"])
     assert np.all((check.pressure >= -1e-9) & (check.pressure <= 5 + 1e-9))
@@ -44,16 +44,16 @@ def test_the_check_keeps_names_and_units() -> None:
         PiecewiseLinear.example(), input=Channel("stroke", "mm"), output=Channel("pull", "N")
     )
     recording = Recording({"stroke": TRAIN["displacement"]}, 0.02, units={"stroke": "mm"})
-    check = checked(block, RecordedInputs.of([recording], ["stroke"]))
+    check = check_inverse(block, RecordedInputs.of([recording], ["stroke"]))
     assert check.error <= 1e-12
 
 
 def test_an_inverse_that_is_wrong_at_speed_is_refused() -> None:
     slow = replace(RateDependentPI.example(), rate_time_constant=0.0)
     fast = replace(slow, rate_weights=(-2.0, *slow.rate_weights[1:]))
-    assert made(slow) == slow.inverse()
+    assert build_compensator(slow) == slow.inverse()
     with pytest.raises(ModelError):
-        made(fast)
+        build_compensator(fast)
 
 
 def test_what_is_expected_is_the_error_on_the_test() -> None:
@@ -113,7 +113,7 @@ def test_a_model_is_inverted_along_the_line_on_which_it_was_driven() -> None:
     ways = np.array(drive)[:, 1:]
     np.testing.assert_allclose(away @ np.linalg.svd(ways)[0][:, 2], 0.0, atol=1e-12)
     assert (np.ptp(away, axis=0) > np.sqrt(3.0) * np.abs(ways).max(axis=1)).all()
-    assert made(model) == model.inverse()
+    assert build_compensator(model) == model.inverse()
 
 
 def test_few_lengths_determine_no_high_degree() -> None:
@@ -130,7 +130,7 @@ def test_few_lengths_determine_no_high_degree() -> None:
 
 def test_commands_end_at_the_recorded_inputs_also_of_linear_models() -> None:
     estimator = load("estimators", "arx")().fit([TRAIN])
-    stream = made(estimator.model_).stream(0.02)
+    stream = build_compensator(estimator.model_).stream(0.02)
     commands = np.array([stream.step(y)[0] for y in (10.0, 25.0, 5.0, 25.0)])
     ends = TRAIN["pressure"].min(), TRAIN["pressure"].max()
     assert stream.status == stream.CLIPPED

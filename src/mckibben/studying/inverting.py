@@ -162,7 +162,7 @@ def _of_row(
             remedy="record more, or use the static map",
         )
     space = RecordedInputs.of(split.train, [channel.name for channel in block.inputs])
-    check = checked(block, space, model=row.model, seed=seed)
+    check = check_inverse(block, space, model=row.model, seed=seed)
     _refuse_unrecorded(check.inverse, split)
     return Compensation(
         row.model,
@@ -178,7 +178,7 @@ def _of_row(
     )
 
 
-def checked(
+def check_inverse(
     block: Block, space: RecordedInputs, *, model: str | None = None, seed: int = 0
 ) -> InverseCheck:
     """Return the compensator of a model, tested on a random motion within a space, slow and fast.
@@ -201,7 +201,7 @@ def checked(
     return checks[0]
 
 
-def made(block: Block, sample_time: float | None = None) -> Block:
+def build_compensator(block: Block, sample_time: float | None = None) -> Block:
     """Return the compensator of a model, tested within its identified inputs where it knows them.
 
     It is tested at a sample time [s], by default the model's own, or 20 ms.
@@ -209,10 +209,10 @@ def made(block: Block, sample_time: float | None = None) -> Block:
     Raises
     ------
     ModelError
-        As `checked`.
+        As `check_inverse`.
     """
     space = None if block.inverts else RecordedInputs.known(block, sample_time)
-    return compensator(block) if space is None else checked(block, space).inverse
+    return compensator(block) if space is None else check_inverse(block, space).inverse
 
 
 def _check(

@@ -36,7 +36,7 @@ from mckibben.workflow.examining import (
     simulate,
 )
 from mckibben.workflow.identifying import compare, estimator, fit, models, study
-from mckibben.workflow.operation import OPERATIONS, Operation, saved
+from mckibben.workflow.operation import OPERATIONS, Operation, load_model
 
 __all__ = [
     "OPERATIONS",
@@ -52,12 +52,12 @@ __all__ = [
     "info",
     "invert",
     "learn",
+    "load_model",
     "models",
     "plan",
     "plot",
     "reproduce",
     "review",
-    "saved",
     "simulate",
     "study",
     "track",

@@ -41,12 +41,12 @@ from mckibben.recording import Recording, reading_notes
 from mckibben.system.progress import telling
 from mckibben.workflow.operation import (
     Progress,
-    claimed,
+    claim_output,
+    load_model,
     operation,
     options_of,
     paths,
-    saved,
-    unread,
+    refuse_reading,
 )
 
 if TYPE_CHECKING:
@@ -78,8 +78,8 @@ def info(
     """
     from mckibben.reading import contents
 
-    chosen, reading = options_of(ChannelOptions, options, reading, keywords)
-    return contents(data, reading, chosen.input, chosen.output)
+    options, reading = options_of(ChannelOptions, options, reading, keywords)
+    return contents(data, reading, options.input, options.output)
 
 
 @operation({"data": FILES}, CharacterizeOptions)
@@ -98,13 +98,13 @@ def characterize(
         See `mckibben.workflow`; options are those of `mckibben.options.CharacterizeOptions`. What is
         measured is described in `mckibben.diagnosis.characterize`.
     """
-    from mckibben.diagnosis.characterization import characterize as find
+    from mckibben.diagnosis.characterization import characterize as measure
 
-    chosen, reading = options_of(CharacterizeOptions, options, reading, keywords)
-    others = tuple(chosen.scheduling)
-    recordings, *pair = read_loop(data, chosen.input, chosen.output, reading, others)
-    found = find(recordings, *pair, scheduling=others)
-    return replace(found, notes=reading_notes(recordings))
+    options, reading = options_of(CharacterizeOptions, options, reading, keywords)
+    scheduling = tuple(options.scheduling)
+    recordings, *names = read_loop(data, options.input, options.output, reading, scheduling)
+    characterization = measure(recordings, *names, scheduling=scheduling)
+    return replace(characterization, notes=reading_notes(recordings))
 
 
 def data_gaps(
@@ -125,14 +125,14 @@ def data_gaps(
         On which a model is to be used.
     """
     from mckibben.channels import channels_of
-    from mckibben.diagnosis.data_gaps import data_gaps as find
+    from mckibben.diagnosis.data_gaps import data_gaps as find_gaps
 
-    chosen, reading = options_of(ChannelOptions, options, reading, keywords)
-    words = chosen.input, chosen.output
-    (runs, used), _ = read_sides(
+    options, reading = options_of(ChannelOptions, options, reading, keywords)
+    words = options.input, options.output
+    (runs, test_runs), _ = read_sides(
         [data, tests], lambda some: channels_of(some, *words), words, reading
     )
-    return find(runs, *words, tests=used)
+    return find_gaps(runs, *words, tests=test_runs)
 
 
 @operation(
@@ -163,7 +163,7 @@ def check(
     data, reading, out, force, progress
         See `mckibben.workflow`.
     """
-    from mckibben.diagnosis.check import check as find
+    from mckibben.diagnosis.check import check as validate
     from mckibben.diagnosis.description import describe
     from mckibben.files.sources import expanded
     from mckibben.outputs import results_in
@@ -173,15 +173,15 @@ def check(
     runs: Data = [*loaded(data), *expanded([], files_of(data))[2]]
     names = ["validation.json", "report.html"]
     with results_in(out, names, inputs=paths(model, runs), force=force, kind="check") as results:
-        block = saved(model)
+        block = load_model(model)
         needed = dict.fromkeys(channel.name for channel in (*block.inputs, *block.outputs))
         recordings = read_files(runs, list(needed), reading)
-        found = find(block, recordings, progress=progress)
-        found = replace(found, description=describe(block, recordings, fitted=False))
+        validation = validate(block, recordings, progress=progress)
+        validation = replace(validation, description=describe(block, recordings, fitted=False))
         if results is not None:
-            write_check(results, found, next(map(str, paths(model)), block.title))
+            write_check(results, validation, next(map(str, paths(model)), block.title))
             results.commit()
-    return found
+    return validation
 
 
 @operation(
@@ -212,16 +212,18 @@ def calibrate(
     data, options, reading, out, force, progress
         See `mckibben.workflow`; options are those of `mckibben.options.CalibrateOptions`.
     """
-    from mckibben.diagnosis.bands import calibrate as find
+    from mckibben.diagnosis.bands import calibrate as calibrate_band
 
-    chosen, reading = options_of(CalibrateOptions, options, reading, keywords)
-    file = claimed(out, paths(model, *files_of(data), *files_of(chosen.fitted)), force)
-    fitted = read_files(chosen.fitted, None, reading)
-    block, runs = saved(model), read_files(data, None, reading)
-    found = find(block, runs, exchangeable=chosen.exchangeable, fitted=fitted, progress=progress)
+    options, reading = options_of(CalibrateOptions, options, reading, keywords)
+    file = claim_output(out, paths(model, *files_of(data), *files_of(options.fitted)), force)
+    fitted = read_files(options.fitted, None, reading)
+    block, runs = load_model(model), read_files(data, None, reading)
+    calibration = calibrate_band(
+        block, runs, exchangeable=options.exchangeable, fitted=fitted, progress=progress
+    )
     if file is not None:
-        found.model.save(file)
-    return found
+        calibration.model.save(file)
+    return calibration
 
 
 @operation(
@@ -254,17 +256,17 @@ def simulate(
     from mckibben.files import write
     from mckibben.studying.simulating import simulated
 
-    chosen, reading = options_of(SimulateOptions, options, reading, keywords)
-    file = claimed(out, [*paths(model), *files_of(data)], force, recording=True)
-    found = simulated(
-        saved(model, chosen.fields),
+    options, reading = options_of(SimulateOptions, options, reading, keywords)
+    file = claim_output(out, [*paths(model), *files_of(data)], force, recording=True)
+    simulation = simulated(
+        load_model(model, options.fields),
         lambda names: read_files(data, names, reading),
-        initial=None if chosen.initial == "measured" else chosen.initial,
-        interval=chosen.interval,
+        initial=None if options.initial == "measured" else options.initial,
+        interval=options.interval,
     )
     if file is not None:
-        write(found.recording.with_meta(model=", ".join(map(str, paths(model)))), file)
-    return found
+        write(simulation.recording.with_meta(model=", ".join(map(str, paths(model)))), file)
+    return simulation
 
 
 @operation(
@@ -292,17 +294,17 @@ def plan(
         See `mckibben.workflow`; options are those of `mckibben.options.PlanOptions`.
     """
     from mckibben.files import write
-    from mckibben.planning.planner import plan as make
+    from mckibben.planning.planner import plan as design_experiment
 
-    chosen, reading = options_of(PlanOptions, options, reading, keywords)
-    arguments = {one.name: getattr(chosen, one.name) for one in fields(chosen)}
+    options, reading = options_of(PlanOptions, options, reading, keywords)
+    arguments = {option.name: getattr(options, option.name) for option in fields(options)}
     if not items(data):
-        unread(reading, "a plan without recordings is one of a rig")
-    file = claimed(out, paths(data, chosen.rig), force, recording=True)
-    found = make(read_files(data, None, reading), **arguments)
+        refuse_reading(reading, "a plan without recordings is one of a rig")
+    file = claim_output(out, paths(data, options.rig), force, recording=True)
+    experiment = design_experiment(read_files(data, None, reading), **arguments)
     if file is not None:
-        write(found.recording, file)
-    return found
+        write(experiment.recording, file)
+    return experiment
 
 
 @operation({"log": FILES}, ReviewOptions)
@@ -323,12 +325,12 @@ def review(
     log, options, reading
         See `mckibben.workflow`; options are those of `mckibben.options.ReviewOptions`.
     """
-    from mckibben.diagnosis.review import review as find
+    from mckibben.diagnosis.review import review as review_log
 
-    chosen, reading = options_of(ReviewOptions, options, reading, keywords)
-    ran = {"model": saved(chosen.model), "compensator": saved(chosen.compensator)}
+    options, reading = options_of(ReviewOptions, options, reading, keywords)
+    blocks = {"model": load_model(options.model), "compensator": load_model(options.compensator)}
     recordings = read_files(log, None, reading)
-    return find(recordings, refit=chosen.refit, seed=chosen.seed, **ran)
+    return review_log(recordings, refit=options.refit, seed=options.seed, **blocks)
 
 
 @operation(
@@ -364,31 +366,41 @@ def plot(
     from mckibben.report.figures import write_figure
     from mckibben.report.printed import format_of
 
-    chosen, reading = options_of(PlotOptions, options, reading, keywords)
+    options, reading = options_of(PlotOptions, options, reading, keywords)
     if out is not None:
         format_of(Path(out))  # another ending is refused now
-    file = claimed(out, paths(data, chosen.model), force)
+    file = claim_output(out, paths(data, options.model), force)
+    subject, kind, choices = _plotted(data, options, reading)
+    if file is None:
+        return draw(subject, kind, None, choices)
+    write_figure(subject, file, kind, **choices)
+    return None
+
+
+def _plotted(
+    data: Any, options: PlotOptions, reading: ReadOptions
+) -> tuple[Any, str | None, dict[str, Any]]:
+    """Return what is plotted, the kind of plot and its settings.
+
+    That is a result or a model in memory, the recordings in data, or a saved model on these.
+    """
+    subject, kind = data, options.kind
     choices: dict[str, Any] = {}
-    thing, kind = data, chosen.kind
-    own = hasattr(data, "face") and not isinstance(data, Recording)
-    if own:
-        unread(reading, "a result is drawn")
-    for name in ("input", "output", *(["model"] if own else [])):
-        if getattr(chosen, name) is not None and (own or chosen.model is not None):
+    is_result = hasattr(data, "face") and not isinstance(data, Recording)
+    if is_result:
+        refuse_reading(reading, "a result is drawn")
+    for name in ("input", "output", *(["model"] if is_result else [])):
+        if getattr(options, name) is not None and (is_result or options.model is not None):
             problem = "a model, or a result, has its own"
             raise ModelError(problem, parameter=name, remedy="leave it out")
-    if not own and chosen.model is None:
-        recordings, given, moved = read_loop(data, chosen.input, chosen.output, reading)
-        thing, choices = recordings, {"input": given, "output": moved}
-    elif not own:
-        thing, kind = saved(chosen.model), kind or "fit"
-        needed = [channel.name for channel in (*thing.inputs, *thing.outputs)]
-        choices = {"recording": read_files(data, needed, reading)}
-    choices["width"] = chosen.width
-    if file is None:
-        return draw(thing, kind, None, choices)
-    write_figure(thing, file, kind, **choices)
-    return None
+    if not is_result and options.model is None:
+        recordings, driving, driven = read_loop(data, options.input, options.output, reading)
+        subject, choices = recordings, {"input": driving, "output": driven}
+    elif not is_result:
+        subject, kind = load_model(options.model), kind or "fit"
+        names = [channel.name for channel in (*subject.inputs, *subject.outputs)]
+        choices = {"recording": read_files(data, names, reading)}
+    return subject, kind, {**choices, "width": options.width}
 
 
 def reproduce(
@@ -421,19 +433,19 @@ def reproduce(
     """
     from mckibben.report.rerun import rerun
 
-    chosen, reading = options_of(ReproduceOptions, options, reading, keywords)
+    options, reading = options_of(ReproduceOptions, options, reading, keywords)
     if data is None:
-        unread(reading, "the rig is recorded")
+        refuse_reading(reading, "the rig is recorded")
     with telling(progress, paper, lines=True) as tell:
         return rerun(
             paper,
             None if data is None else Path(data),
             reading,
-            rig=chosen.rig,
+            rig=options.rig,
             out=None if out is None else Path(out),
-            quick=chosen.quick,
-            seed=chosen.seed,
-            jobs=chosen.jobs,
+            quick=options.quick,
+            seed=options.seed,
+            jobs=options.jobs,
             force=force,
             progress=tell,
             recognised=recognised,

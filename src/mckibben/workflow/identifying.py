@@ -27,20 +27,21 @@ from mckibben.options import (
 from mckibben.reading import files_of, loaded, read_sides
 from mckibben.recording import Recording
 from mckibben.studying.results import Fit, Price
-from mckibben.system.progress import telling
+from mckibben.system.progress import Tell, telling
 from mckibben.workflow.operation import (
     Progress,
-    claimed,
+    claim_output,
+    load_model,
     operation,
     options_of,
     paths,
-    saved,
 )
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from mckibben.blocks.base import Block
+    from mckibben.channels import Channels
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.estimators.core.estimator import Estimator
     from mckibben.outputs import Results
@@ -77,64 +78,101 @@ def fit(
         See `mckibben.workflow`; options are those of `mckibben.options.FitOptions`.
     """
     from mckibben.blocks.compose import Parallel
-    from mckibben.comparison.planning import Candidate, refusals
     from mckibben.estimators.catalogue import settings_of
-    from mckibben.signals.shared_rows import check_shared
 
     if not isinstance(model, str):
         problem = f"a model is named, and this is {type(model).__name__}"
         raise ModelError(problem, parameter="model", remedy="give its short name, then the data")
-    chosen, reading = options_of(FitOptions, options, reading, keywords)
-    settings = settings_of(model, chosen.settings)
-    prior = chosen.prior or settings.get("prior")
-    file = claimed(out, paths(data, chosen.residual_of, prior), force)
+    options, reading = options_of(FitOptions, options, reading, keywords)
+    settings = settings_of(model, options.settings)
+    prior = options.prior or settings.get("prior")
+    file = claim_output(out, paths(data, options.residual_of, prior), force)
     kind = registry.load("estimators", model)
-    settings = _with_options(model, kind, settings, chosen)
+    settings = _with_options(model, kind, settings, options)
 
-    # the recordings, and the channels for the model
-    sides = [settings.pop(side, getattr(chosen, side)) for side in ("input", "output")]
-    names = [*sides, settings.get("scheduling")]
-    (runs,), channels = read_sides([data], lambda some: kind.resolved(some, *names), sides, reading)
-    if refused := refusals({model: Candidate(model)}, runs, channels):
-        problem = f"{model!r} does not apply to {', '.join(channels.sides)}: {refused[model]}"
-        remedy = "name channels with `input=NAME` and `output=NAME`, or fit another model"
-        raise DataError(problem, remedy=remedy)
+    sides = [settings.pop(side, getattr(options, side)) for side in ("input", "output")]
+    runs, channels = _fit_data(model, kind, data, [*sides, settings.get("scheduling")], reading)
     settings = kind.channel_settings(channels) | settings
-    estimator = kind(**{**kind.targets.get(chosen.target, {}), **settings})
-    base = saved(chosen.residual_of)
+    estimator = kind(**{**kind.targets.get(options.target, {}), **settings})
+    base = load_model(options.residual_of)
     if base is not None:
         runs = _residuals(base, estimator, runs)
-    used = estimator.data(runs)
-    check_shared({"fit": runs}, *([one.name for one in of] for of in (used.inputs, used.outputs)))
-    taken = [one.name for one in (*used.inputs, *used.outputs, *used.scheduled)]
-    if chosen.target is not None and not any(name.startswith("force") for name in taken):
-        problem = f"a model for {chosen.target} is fitted to a measured force"
-        raise DataError(problem, channel="force", remedy="give recordings with one")
+    names = _fitted_channels(estimator, runs, options.target)
 
-    # the fit
     with telling(progress, f"fitting {model}") as tell:
         estimator.fit(runs, progress=tell)
-    cost_of_limits = None
-    if chosen.target is not None:
-        from mckibben.exporting.mjcf import require_exportable
-
-        require_exportable(estimator.model_)
+    price = None
+    if options.target is not None:
         unlimited = kind(**{"of_force": True} | settings)
-        label = f"fitting {model} without the limits of {chosen.target}"
+        label = f"fitting {model} without the limits of {options.target}"
         with telling(progress, label) as tell:
-            unlimited.fit(runs, progress=tell)
-        cost_of_limits = Price(*(_force_error(one.model_, runs) for one in (estimator, unlimited)))
+            price = _price_of_limits(estimator, unlimited, runs, tell)
     block: Block = estimator.model_ if base is None else Parallel((base, estimator.model_))
     if file is not None:
         block.save(file)
     notes = list(estimator.diagnostics_.notes)
-    if unused := [name for name in (*channels.further, *channels.unused) if name not in taken]:
+    if unused := [name for name in (*channels.further, *channels.unused) if name not in names]:
         notes.append(f"not used: {', '.join(unused)}; name what drives with `input`")
-    return Fit(model, block, estimator, tuple(notes), file, cost_of_limits)
+    return Fit(model, block, estimator, tuple(notes), file, price)
+
+
+def _fit_data(
+    model: str, kind: Any, data: Data, names: Sequence[Any], reading: ReadOptions
+) -> tuple[list[Recording], Channels]:
+    """Return recordings, and the channels of a kind of estimator by the names of the user.
+
+    The names are those of input, output and scheduling.
+
+    Raises
+    ------
+    DataError
+        If the model does not apply to these channels.
+    """
+    from mckibben.comparison.planning import Candidate, refusals
+
+    (runs,), channels = read_sides(
+        [data], lambda some: kind.resolved(some, *names), names[:2], reading
+    )
+    if refused := refusals({model: Candidate(model)}, runs, channels):
+        problem = f"{model!r} does not apply to {', '.join(channels.sides)}: {refused[model]}"
+        remedy = "name channels with `input=NAME` and `output=NAME`, or fit another model"
+        raise DataError(problem, remedy=remedy)
+    return runs, channels
+
+
+def _fitted_channels(estimator: Estimator, runs: list[Recording], target: str | None) -> list[str]:
+    """Return the names of the channels that an estimator fits to; raise an error if they do not do.
+
+    Raises
+    ------
+    DataError
+        If inputs or outputs are the same data in two recordings, or a target needs a force.
+    """
+    from mckibben.signals.shared_rows import check_shared
+
+    data = estimator.data(runs)
+    sides = [[channel.name for channel in side] for side in (data.inputs, data.outputs)]
+    check_shared({"fit": runs}, *sides)
+    names = [*sides[0], *sides[1], *(channel.name for channel in data.scheduled)]
+    if target is not None and not any(name.startswith("force") for name in names):
+        problem = f"a model for {target} is fitted to a measured force"
+        raise DataError(problem, channel="force", remedy="give recordings with one")
+    return names
+
+
+def _price_of_limits(
+    limited: Estimator, unlimited: Estimator, runs: list[Recording], tell: Tell | None
+) -> Price:
+    """Return the errors of the force with the limits of an export format, and of a fit without them."""
+    from mckibben.exporting.mjcf import require_exportable
+
+    require_exportable(limited.model_)
+    unlimited.fit(runs, progress=tell)
+    return Price(*(_force_error(estimator.model_, runs) for estimator in (limited, unlimited)))
 
 
 def _with_options(
-    model: str, kind: Any, settings: dict[str, Any], chosen: FitOptions
+    model: str, kind: Any, settings: dict[str, Any], options: FitOptions
 ) -> dict[str, Any]:
     """Return the settings of an estimator with the options that are settings: seed and prior.
 
@@ -143,14 +181,14 @@ def _with_options(
     ModelError
         If the estimator has no such target, or takes no prior.
     """
-    if chosen.target is not None and chosen.target not in kind.targets:
-        problem = f"{model!r} cannot be fitted for {chosen.target}"
+    if options.target is not None and options.target not in kind.targets:
+        problem = f"{model!r} cannot be fitted for {options.target}"
         raise ModelError(problem, parameter="target", remedy="fit 'balance', or leave it out")
-    if chosen.prior is not None:
+    if options.prior is not None:
         if "prior" not in kind.__dataclass_fields__:
             raise ModelError(f"{model!r} has none", parameter="prior", remedy="leave it out")
-        settings = settings | {"prior": chosen.prior}
-    return {"seed": chosen.seed} | settings
+        settings = settings | {"prior": options.prior}
+    return {"seed": options.seed} | settings
 
 
 def _force_error(model: Block, runs: Sequence[Recording]) -> float:
@@ -163,7 +201,9 @@ def _force_error(model: Block, runs: Sequence[Recording]) -> float:
         block.simulate(run.matrix(names), sample_time=run.sample_time)[:, 0] - run[force]
         for run in runs
     ]
-    return math.sqrt(sum(float(e @ e) for e in errors) / sum(e.size for e in errors))
+    return math.sqrt(
+        sum(float(error @ error) for error in errors) / sum(error.size for error in errors)
+    )
 
 
 def _residuals(base: Block, estimator: Any, runs: list[Recording]) -> list[Recording]:
@@ -220,13 +260,13 @@ def compare(
     from mckibben.comparison.ranking import compare as rank
     from mckibben.report.results_folder import LEADERBOARD, write_leaderboard
 
-    chosen, reading = options_of(CompareOptions, options, reading, keywords)
+    options, reading = options_of(CompareOptions, options, reading, keywords)
     sides = train, validation, test
-    opened = _comparison_data(sides, chosen, reading, out, force, lambda _: LEADERBOARD)
-    with opened as (data, results):
+    data_and_results = _comparison_data(sides, options, reading, out, force, lambda _: LEADERBOARD)
+    with data_and_results as (data, results):
         board = rank(
             **data,
-            options=chosen,
+            options=options,
             clear=False,
             executor=executor,
             progress=_comparison_progress(progress),
@@ -261,11 +301,14 @@ def study(
     from mckibben.report.results_folder import StudyFolder, study_files
     from mckibben.studying.study import study as run
 
-    chosen, reading = options_of(StudyOptions, options, reading, keywords)
-    loaded_models = {"model": saved(chosen.model), "compensator": saved(chosen.compensator)}
+    options, reading = options_of(StudyOptions, options, reading, keywords)
+    loaded_models = {
+        "model": load_model(options.model),
+        "compensator": load_model(options.compensator),
+    }
     sides = train, validation, test
-    with _comparison_data(sides, chosen, reading, out, force, study_files) as (data, results):
-        folder = None if results is None else StudyFolder(results, command, title=chosen.title)
+    with _comparison_data(sides, options, reading, out, force, study_files) as (data, results):
+        folder = None if results is None else StudyFolder(results, command, title=options.title)
 
         def on_update(so_far: Study) -> None:
             if folder is not None:
@@ -275,7 +318,7 @@ def study(
 
         done = run(
             **data,
-            options=replace(chosen, **loaded_models),
+            options=replace(options, **loaded_models),
             executor=executor,
             progress=_comparison_progress(progress),
             found=on_update,
@@ -305,30 +348,30 @@ def _comparison_progress(progress: Progress) -> Any:
 @contextmanager
 def _comparison_data(
     data: Sequence[Data],
-    chosen: CompareOptions,
+    options: CompareOptions,
     reading: ReadOptions | None,
     out: str | Path | None,
     force: bool,
-    written: Callable[[Sequence[str]], Sequence[str]],
+    result_files: Callable[[Sequence[str]], Sequence[str]],
 ) -> Iterator[tuple[dict[str, Any], Results | None]]:
     """Claim the output files of a comparison, and return its data: to fit, to choose and to test."""
     from mckibben.files.sources import expanded
     from mckibben.outputs import results_in
     from mckibben.system import workers
 
-    if chosen.jobs != 1:
+    if options.jobs != 1:
         workers.prepare()
-    whole = chosen.models in ("all", "quick")
-    names = registry.names("estimators") if whole else list(chosen.models or ())
+    all_models = options.models in ("all", "quick")
+    names = registry.names("estimators") if all_models else list(options.models or ())
     train, validation, test = data
     files = expanded(files_of(train), files_of(test))
     others: Any = (loaded(train), items(validation), loaded(test))
     sides: list[Data] = [[*some, *more] for some, more in zip(files, others, strict=True)]
-    logs = [getattr(chosen, name, None) for name in ("model", "compensator")]
+    logs = [getattr(options, name, None) for name in ("model", "compensator")]
     read = paths(train, *sides, logs)
-    kind = "study" if isinstance(chosen, StudyOptions) else "compare"
-    with results_in(out, written(names), inputs=read, force=force, kind=kind) as results:
-        words = chosen.input, chosen.output, chosen.load
+    kind = "study" if isinstance(options, StudyOptions) else "compare"
+    with results_in(out, result_files(names), inputs=read, force=force, kind=kind) as results:
+        words = options.input, options.output, options.load
         runs, channels = read_sides(sides, lambda some: channels_of(some, *words), words, reading)
         roles = dict(zip(("train", "validation", "test"), runs, strict=True))
         yield {**roles, "channels": channels, "folder": out}, results

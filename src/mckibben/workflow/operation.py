@@ -80,28 +80,30 @@ def options_of(
     keywords: Mapping[str, Any],
 ) -> tuple[Options, ReadOptions]:
     """Return options of an operation and of reading, either with fields given by name."""
-    names = [one.name for one in fields(ReadOptions) if one.name not in get_type_hints(kind)]
-    read = {name: value for name, value in keywords.items() if name in names}
-    rest = {name: value for name, value in keywords.items() if name not in read}
+    names = [
+        option.name for option in fields(ReadOptions) if option.name not in get_type_hints(kind)
+    ]
+    read_settings = {name: value for name, value in keywords.items() if name in names}
+    settings = {name: value for name, value in keywords.items() if name not in read_settings}
     return (
-        given_options(kind, options, rest, [*names, *ARGUMENTS]),
-        given_options(ReadOptions, reading, read),
+        given_options(kind, options, settings, [*names, *ARGUMENTS]),
+        given_options(ReadOptions, reading, read_settings),
     )
 
 
-def unread(reading: ReadOptions, reason: str) -> None:
+def refuse_reading(reading: ReadOptions, reason: str) -> None:
     """Raise an error for options of reading where nothing is read.
 
     ``reason`` is a phrase, such as "a rig is driven".
     """
-    plain = ReadOptions()
-    for one in fields(plain):
-        if getattr(reading, one.name) != getattr(plain, one.name):
+    defaults = ReadOptions()
+    for option in fields(defaults):
+        if getattr(reading, option.name) != getattr(defaults, option.name):
             problem = f"nothing is read, as {reason}"
-            raise ModelError(problem, parameter=one.name, remedy="leave it out")
+            raise ModelError(problem, parameter=option.name, remedy="leave it out")
 
 
-def saved(model: Any, settings: Mapping[str, Any] | None = None) -> Any:
+def load_model(model: Any, settings: Mapping[str, Any] | None = None) -> Any:
     """Return a model, also from a file or a result of `fit` or `invert`, with some fields set."""
     from mckibben.blocks.base import Block
     from mckibben.blocks.saving import load
@@ -110,8 +112,8 @@ def saved(model: Any, settings: Mapping[str, Any] | None = None) -> Any:
     if model is None:
         return None
     if isinstance(model, Result):
-        own = getattr(model, "model", None)
-        model = own if isinstance(own, Block) else model
+        block = getattr(model, "model", None)
+        model = block if isinstance(block, Block) else model
     model = load(model) if isinstance(model, str | Path) else model
     if not isinstance(model, Block):
         problem = f"a model is needed here, and this is {type(model).__name__}"
@@ -119,18 +121,18 @@ def saved(model: Any, settings: Mapping[str, Any] | None = None) -> Any:
     return with_fields(model, settings or {})
 
 
-def paths(*given: Any) -> list[Path]:
+def paths(*arguments: Any) -> list[Path]:
     """Return the files among arguments, also in lists."""
-    found: list[Path] = []
-    for one in given:
-        if isinstance(one, str | Path):
-            found.append(Path(one))
-        elif isinstance(one, list | tuple):
-            found += paths(*one)
-    return found
+    files: list[Path] = []
+    for argument in arguments:
+        if isinstance(argument, str | Path):
+            files.append(Path(argument))
+        elif isinstance(argument, list | tuple):
+            files += paths(*argument)
+    return files
 
 
-def claimed(
+def claim_output(
     out: str | Path | None, read: Sequence[Path], force: bool, *, recording: bool = False
 ) -> Path | None:
     """Raise an error for a path that is an input or a user's file, before any work; return the path."""

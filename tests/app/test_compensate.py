@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mckibben import PI, workflow
-from mckibben.app import following, modelling
+from mckibben.app import compensators, loops, modelling, motions
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
 from mckibben.files import write
@@ -38,9 +38,9 @@ def workspace(folder: Path) -> Workspace:
 
 
 def stored(workspace: Workspace, kind: str = "triangle") -> str:
-    points = {"displacement": following.motion(kind, 10.0, 5.0, 20.0, 1)}
-    return following.stored(
-        workspace, following.reference(points, {}, 0.02, {"displacement": "mm"})
+    points = {"displacement": motions.ready_made_points(kind, 10.0, 5.0, 20.0, 1)}
+    return loops.store_reference(
+        workspace, motions.reference_from_points(points, {}, 0.02, {"displacement": "mm"})
     )
 
 
@@ -60,53 +60,55 @@ def test_a_fit_has_the_error_to_expect_of_its_compensator_or_why_there_is_none(
 
 
 def test_motions_are_between_their_ends_and_what_is_none_is_refused() -> None:
-    for kind in following.MOTIONS:
-        times, values = np.transpose(following.motion(kind, 12.0, 3.0, 9.0, 2))
+    for kind in motions.MOTIONS:
+        times, values = np.transpose(motions.ready_made_points(kind, 12.0, 3.0, 9.0, 2))
         assert (times[0], times[-1], values[0]) == (0.0, 12.0, 3.0)
         assert (np.diff(times) > 0).all()
         assert values.min() >= 3.0
         assert 5.0 < values.max() <= 9.0
-    run = following.reference({"a": [(0, 1), (2, 3)], "b": [(0, 0), (1, 1)]}, {"c": 5.0}, 0.5, {})
+    run = motions.reference_from_points(
+        {"a": [(0, 1), (2, 3)], "b": [(0, 0), (1, 1)]}, {"c": 5.0}, 0.5, {}
+    )
     assert run.matrix(["a", "b", "c"])[[1, 4]].tolist() == [[1.5, 0.5, 5.0], [3.0, 1.0, 5.0]]
     for points in ([], [(0.0, 1.0), (0.0, 2.0)]):
         with pytest.raises(DataError):
-            following.reference({"a": points}, {}, 0.5, {})
+            motions.reference_from_points({"a": points}, {}, 0.5, {})
     with pytest.raises(DataError):
-        following.motion("sine", 10.0, 1.0, 1.0, 2)
+        motions.ready_made_points("sine", 10.0, 1.0, 1.0, 2)
     with pytest.raises(DataError):
-        following.of_file(run, ["d"])
+        motions.points_of_recording(run, ["d"])
 
 
 def test_what_a_model_is_used_as_and_reaches(workspace: Workspace) -> None:
-    assert following.having(workspace, "inverse") == ["pi"]
-    assert {"inverse", "adaptive", "predictive"} <= following.uses(workspace, "pi").keys()
+    assert compensators.models_usable_as(workspace, "inverse") == ["pi"]
+    assert {"inverse", "adaptive", "predictive"} <= compensators.uses(workspace, "pi").keys()
     moved = np.concatenate([run["displacement"] for run in workspace.with_role("train")])
-    ((low, high),) = following.reach(workspace, "pi", {}).values()
+    ((low, high),) = motions.reach(workspace, "pi", {}).values()
     assert abs(low - moved.min()) < 0.2 * np.ptp(moved) > abs(high - moved.max())
-    wish, inverse = following.wish(workspace, "pi"), workspace.model("pi").inverse()
-    asked = following.reference(
-        following.points_of(wish), wish["held"], wish["step"], {"displacement": "mm"}
+    wish, inverse = motions.default_motion(workspace, "pi"), workspace.model("pi").inverse()
+    asked = motions.reference_from_points(
+        motions.motion_points(wish), wish["held"], wish["step"], {"displacement": "mm"}
     )
     assert np.ptp(asked["displacement"]) > 0.5 * np.ptp(moved)
     assert inverse.n_clipped(inverse.final_state(asked)) == 0
-    first, second, *plants = following.plants(workspace, "pi")
+    first, second, *plants = loops.plants(workspace, "pi")
     assert (first, second) == ("model p2z", "model pi")  # other muscles last
     assert "rig soft-arm" not in plants
-    assert "feedforward" in following.laws(workspace, "pi", "model p2z")
+    assert "feedforward" in loops.laws(workspace, "pi", "model p2z")
 
 
 def test_a_loop_is_beside_no_compensation(workspace: Workspace) -> None:
     name = stored(workspace)
     given: dict[str, Any] = {"model": "pi", "form": "inverse", "settings": {}, "reference": name}
     options = {"noise": 0.1, "approach": 5.0}
-    following.loop(
+    loops.loop(
         workspace, silent, name="a",
         asked=given | {"controller": "feedforward-pid", "plant": "model p2z", "options": options},
     )  # fmt: skip
-    one = following.newest(workspace, "runs")["a"]
+    one = loops.newest(workspace, "runs")["a"]
     assert one["rmse"]["displacement"] < one["uncompensated"]["rmse"]["displacement"]
     assert {"reference_displacement", "uncompensated_displacement", "command_pressure"} <= {
-        *following.read_run(workspace, "a.csv").channels
+        *loops.read_run(workspace, "a.csv").channels
     }
     assert modelling.restored(one)
 
@@ -114,15 +116,15 @@ def test_a_loop_is_beside_no_compensation(workspace: Workspace) -> None:
 def test_a_log_is_reviewed_and_a_force_estimated(workspace: Workspace) -> None:
     given: dict[str, Any] = {"model": "pi", "form": "inverse", "settings": {}}
     given["reference"] = stored(workspace, "sine")
-    following.loop(
+    loops.loop(
         workspace, silent, name="c",
         asked=given | {"controller": "feedforward", "plant": "model p2z", "options": {}},
     )  # fmt: skip
-    write(following.read_run(workspace, "c.csv"), workspace.path("uploads", "log.csv"))
-    following.review(workspace, silent, name="log", asked=given | {"log": "log.csv"})
-    one = following.newest(workspace, "reviews")["log"]
+    write(loops.read_run(workspace, "c.csv"), workspace.path("uploads", "log.csv"))
+    loops.review(workspace, silent, name="log", asked=given | {"log": "log.csv"})
+    one = loops.newest(workspace, "reviews")["log"]
     assert one["outputs"][0]["achieved"] == pytest.approx(
-        following.newest(workspace, "runs")["c"]["rmse"]["displacement"], rel=0.3
+        loops.newest(workspace, "runs")["c"]["rmse"]["displacement"], rel=0.3
     )
     assert {item.kind for item in modelling.restored(one) if item} == {"text", "figure"}
 
@@ -134,8 +136,8 @@ def test_a_log_is_reviewed_and_a_force_estimated(workspace: Workspace) -> None:
         "pi", [workspace.recording("isometric")], input=("pressure",), output=("force",)
     )
     fitted.model.save(workspace.path("models", "of-force.json"))
-    assert "of-force" in following.having(workspace, "force")
-    found = following.estimate(workspace, "of-force", "isometric")
+    assert "of-force" in compensators.models_usable_as(workspace, "force")
+    found = compensators.estimate_force(workspace, "of-force", "isometric")
     assert found.metrics["force"]["rmse"] < 0.2 * np.ptp(force)
     workspace.delete("models", "of-force")
     workspace.remove("isometric")
@@ -165,7 +167,7 @@ def bench(folder: Path) -> Iterator[Workbench]:
 def test_a_motion_is_followed_in_chromium_and_the_commands_taken(
     browser: Any, bench: Workbench, workspace: Workspace
 ) -> None:
-    for name in following.newest(workspace, "runs"):
+    for name in loops.newest(workspace, "runs"):
         workspace.delete("runs", name)
     with visited(browser, bench) as page:
         seen(page, "tab-compensate").click()
@@ -179,10 +181,10 @@ def test_a_motion_is_followed_in_chromium_and_the_commands_taken(
             timeout=SLOW,
         )
         assert "command_pressure" in seen(page, "motion-plot").inner_text()
-        made = following.newest(workspace, "runs")
+        made = loops.newest(workspace, "runs")
         assert {one["controller"] for one in made.values()} == {"feedforward", "feedforward-pid"}
         (reference,) = {one["reference"] for one in made.values()}
-        wanted = following.read_run(workspace, reference)["displacement"]
+        wanted = loops.read_run(workspace, reference)["displacement"]
         assert wanted.max() == pytest.approx(15.0, abs=0.1)
         page.reload()
         seen(page, "runs")  # what was done is there again

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mckibben.app.guard import BODY, HEAD
+from mckibben.app.guard import MOST_BODY_BYTES, MOST_HEAD_BYTES
 from tests.app.browsing import Workbench, workbench
 
 
@@ -83,7 +83,7 @@ def test_heads_are_bounded_before_the_token(bench: Workbench) -> None:
         link.sendall(b"GET / HTTP/1.1\r\nX-Long: ")
         sent = 0
         try:
-            while sent < 4 * HEAD:
+            while sent < 4 * MOST_HEAD_BYTES:
                 link.sendall(b"a" * 4096)
                 sent += 4096
             answer = link.recv(100)
@@ -95,7 +95,7 @@ def test_heads_are_bounded_before_the_token(bench: Workbench) -> None:
 def test_bodies_are_bounded(bench: Workbench, cookie: str) -> None:
     with socket.create_connection(("127.0.0.1", bench.port), timeout=30) as link:
         head = f"POST / HTTP/1.1\r\nHost: 127.0.0.1:{bench.port}\r\nCookie: {cookie}\r\n"
-        link.sendall(f"{head}Content-Length: {BODY + 1}\r\n\r\n".encode())
+        link.sendall(f"{head}Content-Length: {MOST_BODY_BYTES + 1}\r\n\r\n".encode())
         assert link.recv(100).startswith(b"HTTP/1.1 413")
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from mckibben.app import following, modelling
+from mckibben.app import compensators, loops, modelling, motions
 from mckibben.app.modelling import comparable, offered, sides_of
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
@@ -48,11 +48,13 @@ def test_models_of_other_recordings_stay_and_come_last(workspace: Workspace) -> 
     workspace.split(train, len(workspace.recording(train)) // 2)
     modelling.fit(workspace, silent, model="gpi", **GIVEN)
     assert workspace.path("models", "gpi.json").read_bytes() == first
-    assert following.having(workspace, "inverse") == ["gpi-2", "gpi"]
+    assert compensators.models_usable_as(workspace, "inverse") == ["gpi-2", "gpi"]
     for entry in workspace.entries():
         workspace.remove(entry.name)
-    assert following.having(workspace, "inverse") == []  # no recording has its channels
-    assert following.reach(workspace, "gpi", {})  # of what it was identified on
+    assert (
+        compensators.models_usable_as(workspace, "inverse") == []
+    )  # no recording has its channels
+    assert motions.reach(workspace, "gpi", {})  # of what it was identified on
 
 
 def test_commands_are_tried_on_models_that_they_drive(workspace: Workspace) -> None:
@@ -62,8 +64,8 @@ def test_commands_are_tried_on_models_that_they_drive(workspace: Workspace) -> N
         of_command = written.replace('"pressure"', '"command_pressure"')
         workspace.path("models", f"{name}.json").write_text(of_command, encoding="utf-8")
     assert workspace.model("first").inputs[0].name == "command_pressure"
-    assert "model first" in following.plants(workspace, "first")
-    assert "model second" in following.plants(workspace, "first")
+    assert "model first" in loops.plants(workspace, "first")
+    assert "model second" in loops.plants(workspace, "first")
 
 
 def test_jobs_write_results_that_compare(workspace: Workspace) -> None:

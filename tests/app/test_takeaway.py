@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import mckibben
-from mckibben.app import taking
+from mckibben.app import downloads
 from mckibben.app.workspace import Workspace
 from tests.app.browsing import Workbench, seen, visited, workbench
 from tests.app.simulated import with_example
@@ -37,7 +37,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 
 def test_code_and_recordings_are_written(workspace: Workspace) -> None:
     def take(key: str, file: str, of: Any = OF, **options: Any) -> None:
-        thing = taking.THINGS[key]
+        thing = downloads.THINGS[key]
         thing.work(workspace, silent, file=file, options=options, of=of, **thing.more)
 
     take("c", "a-c.zip", single=True)
@@ -61,7 +61,7 @@ def test_code_and_recordings_are_written(workspace: Workspace) -> None:
 
 def test_the_script_repeats_the_work(workspace: Workspace) -> None:
     script = workspace.folder / "script.py"
-    script.write_text(taking.script(workspace, OF), encoding="utf-8")
+    script.write_text(downloads.script(workspace, OF), encoding="utf-8")
     done = subprocess.run(
         [sys.executable, script], cwd=workspace.folder, capture_output=True, text=True, check=False
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben.app.steps import LARGEST, Reading, Step
+from mckibben.app.steps import LARGEST_UPLOAD, Reading, Step
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
 
@@ -146,7 +146,7 @@ class TestFiles:
         assert received(workspace, given, b"x") == kept
         assert received(workspace, given, b"x") != kept  # nothing is written over
 
-    @pytest.mark.parametrize(("name", "size"), [("a.csv", 0), ("a.csv", LARGEST + 1)])
+    @pytest.mark.parametrize(("name", "size"), [("a.csv", 0), ("a.csv", LARGEST_UPLOAD + 1)])
     def test_empty_and_large_files_are_refused(
         self, workspace: Workspace, name: str, size: int
     ) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, PI, Recording
-from mckibben.app import following
+from mckibben.app import loops
 from mckibben.app.workspace import Workspace
 from mckibben.report import page as report
 from tests.app.browsing import seen, workbench
@@ -85,7 +85,7 @@ def received(folder: Path) -> None:
     (entry,) = workspace.entries()
     workspace.put(entry.model_copy(update={"origin": SCRIPTS[0], "notes": [*SCRIPTS]}))
     PI.example().save(workspace.path("models", "mine.json"))
-    reference = following.stored(workspace, given.select(["displacement"]))
+    reference = loops.store_reference(workspace, given.select(["displacement"]))
     for number, text in enumerate(SCRIPTS):
         asked = {"title": text, "model": text, "name": text, ":x": text}
         job = {"kind": "fit", "state": "failed", "message": text, "given": asked}

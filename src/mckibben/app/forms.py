@@ -17,7 +17,7 @@ from mckibben.options import Option, parsed
 UNITS = {"S": "[s]", "SECONDS": "[s]", "MM": "[mm]", "HZ": "[Hz]"}
 """Units that metavariables are."""
 
-FIXED: Mapping[str, Iterable[str]] = MappingProxyType({})
+NO_CHOICES: Mapping[str, Iterable[str]] = MappingProxyType({})
 """No choices but those that are declared."""
 
 
@@ -26,7 +26,7 @@ def fields(
     names: Iterable[str],
     values: dict[str, Any],
     *,
-    choices: Mapping[str, Iterable[str]] = FIXED,
+    choices: Mapping[str, Iterable[str]] = NO_CHOICES,
     changed: Callable[[], Any] | None = None,
 ) -> None:
     """Make controls of some fields of a dataclass, bound to values of their names; see `given`.
@@ -36,28 +36,30 @@ def fields(
     """
     hints, defaults = get_type_hints(kind, include_extras=True), kind()
     for name in names:
-        of, option = _option(hints[name])
+        value_type, option = _option(hints[name])
         default = getattr(defaults, name)
-        plain = default is None or isinstance(default, bool | int | float | str)
-        values.setdefault(name, default if plain else "")
+        is_simple = default is None or isinstance(default, bool | int | float | str)
+        values.setdefault(name, default if is_simple else "")
         label = _label(name, option)
-        if of is bool:
-            made: Any = ui.switch(LABELS.get(name, option.help.rstrip(".")))
-        elif get_origin(of) is Literal:
+        if value_type is bool:
+            control: Any = ui.switch(LABELS.get(name, option.help.rstrip(".")))
+        elif get_origin(value_type) is Literal:
             labels = GAPS if name == "gaps" else {}
-            made = ui.select({one: labels.get(one, one) for one in get_args(of)}, label=label)
+            control = ui.select(
+                {choice: labels.get(choice, choice) for choice in get_args(value_type)}, label=label
+            )
         elif name in choices:
-            made = ui.select([*choices[name]], label=label).props("clearable")
-        elif {int, float} & {of, *get_args(of)} and not option.parse:
-            made = ui.number(label)
+            control = ui.select([*choices[name]], label=label).props("clearable")
+        elif {int, float} & {value_type, *get_args(value_type)} and not option.parse:
+            control = ui.number(label)
         else:
-            made = ui.input(label, placeholder=option.metavar or None)
-        made.bind_value(values, name)
+            control = ui.input(label, placeholder=option.metavar or None)
+        control.bind_value(values, name)
         if changed is not None:
-            made.on_value_change(changed).props("debounce=600")
-        if of is not bool:
-            made.props("dense outlined").classes("option")
-        mark(made, f"option-{name}").tooltip(option.help)
+            control.on_value_change(changed).props("debounce=600")
+        if value_type is not bool:
+            control.props("dense outlined").classes("option")
+        mark(control, f"option-{name}").tooltip(option.help)
 
 
 def given(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -66,23 +68,25 @@ def given(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
     `DataError` on a text that is not of the form of its option.
     """
     hints, defaults = get_type_hints(kind, include_extras=True), kind()
-    found: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     for name, value in values.items():
-        of, option = _option(hints[name])
+        value_type, option = _option(hints[name])
         default = getattr(defaults, name)
-        plain = get_origin(of) is Literal or (str in {of, *get_args(of)} and not option.parse)
-        if isinstance(value, str) and not plain:
+        is_text = get_origin(value_type) is Literal or (
+            str in {value_type, *get_args(value_type)} and not option.parse
+        )
+        if isinstance(value, str) and not is_text:
             value = _parsed(option, name, value.strip())
-        elif isinstance(value, float) and int in {of, *get_args(of)}:
+        elif isinstance(value, float) and int in {value_type, *get_args(value_type)}:
             value = int(value)
         if value not in (None, "", {}, ()) and value != default:
-            found[name] = value
-    return found
+            settings[name] = value
+    return settings
 
 
 def _option(hint: Any) -> tuple[Any, Option]:
-    of, *more = get_args(hint)
-    return of, next(one for one in more if isinstance(one, Option))
+    value_type, *metadata = get_args(hint)
+    return value_type, next(entry for entry in metadata if isinstance(entry, Option))
 
 
 def _label(name: str, option: Option) -> str:
@@ -90,8 +94,8 @@ def _label(name: str, option: Option) -> str:
     if name in LABELS:
         return LABELS[name]
     unit = re.search(r"\[(s|bar|bar/s|mm or N)\]", option.help)
-    known = unit[0] if unit else UNITS.get(option.metavar, "")
-    return f"{name.replace('_', ' ').capitalize()} {known}".rstrip()
+    unit_text = unit[0] if unit else UNITS.get(option.metavar, "")
+    return f"{name.replace('_', ' ').capitalize()} {unit_text}".rstrip()
 
 
 def _parsed(option: Option, name: str, text: str) -> Any:

@@ -56,15 +56,15 @@ def values(text: str, t: Array) -> Array:
     """
     try:
         with np.errstate(all="ignore"):
-            found = _value(ast.parse(text.replace("^", "**"), mode="eval").body, t)
-        found = np.asarray(found, dtype=float) + np.zeros_like(t)
+            result = _value(ast.parse(text.replace("^", "**"), mode="eval").body, t)
+        result = np.asarray(result, dtype=float) + np.zeros_like(t)
     except (SyntaxError, ValueError, TypeError, KeyError, ArithmeticError, RecursionError):
         problem = f"{text!r:.60} is no formula of t"
         remedy = f"write one such as 5 + 3*sin(2*pi*t/10), of {', '.join(FUNCTIONS)}"
         raise DataError(problem, remedy=remedy) from None
-    if not np.isfinite(found).all():
+    if not np.isfinite(result).all():
         raise DataError(f"{text!r:.60} is not finite at all times", remedy="write another formula")
-    return found
+    return result
 
 
 def _value(node: ast.expr, t: Array) -> Any:

@@ -13,12 +13,12 @@ from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from mckibben.app.steps import LARGEST
+from mckibben.app.steps import LARGEST_UPLOAD
 
-HEAD = 2**16
+MOST_HEAD_BYTES = 2**16
 """Bytes of the head of a request, which the server bounds before anything here."""
 
-BODY = LARGEST + 2**20
+MOST_BODY_BYTES = LARGEST_UPLOAD + 2**20
 """Bytes of the body of a request: of a file, and what is around it."""
 
 HOSTS = ["127.0.0.1", "localhost"]
@@ -56,17 +56,17 @@ class Guard:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or answer it."""
-        known = scope["type"] in ("http", "websocket")
-        answer = self._answer(HTTPConnection(scope)) if known else None
+        is_request = scope["type"] in ("http", "websocket")
+        answer = self._answer(HTTPConnection(scope)) if is_request else None
         await (answer or self.app)(scope, receive, send)
 
-    def _answer(self, asked: HTTPConnection) -> Response | None:
+    def _answer(self, request: HTTPConnection) -> Response | None:
         """Return the answer to a request that is not passed on."""
-        host, token = asked.headers["host"], asked.cookies.get(self.cookie, "")
-        if asked.headers.get("origin", f"http://{host}") != f"http://{host}":
+        host, token = request.headers["host"], request.cookies.get(self.cookie, "")
+        if request.headers.get("origin", f"http://{host}") != f"http://{host}":
             return PlainTextResponse("Another page may not use the workbench.", 403)
-        entering = asked.url.path == ENTER
-        if entering and self.links.use(asked.query_params.get("key", "")):
+        entering = request.url.path == ENTER
+        if entering and self.links.use(request.query_params.get("key", "")):
             answer = RedirectResponse("/", 303)
             answer.set_cookie(self.cookie, self.links.token, httponly=True, samesite="lax")
             return answer
@@ -75,8 +75,8 @@ class Guard:
             return PlainTextResponse(text, 403)
         if entering:
             return RedirectResponse("/", 303)
-        length = asked.headers.get("content-length", "0")  # which the server holds clients to
-        if int(length) > BODY or "transfer-encoding" in asked.headers:
-            text = f"This is more than {LARGEST // 2**20} MiB; use the command line."
+        length = request.headers.get("content-length", "0")  # which the server holds clients to
+        if int(length) > MOST_BODY_BYTES or "transfer-encoding" in request.headers:
+            text = f"This is more than {LARGEST_UPLOAD // 2**20} MiB; use the command line."
             return PlainTextResponse(text, 413)
         return None

@@ -16,7 +16,7 @@ from typing import Any
 
 from pydantic import Field, ValidationError
 
-from mckibben.app.steps import Plain
+from mckibben.app.steps import StoredModel
 from mckibben.app.terms import message_of
 from mckibben.app.workspace import Workspace
 from mckibben.errors import MckibbenError, MckibbenWarning, unforeseen
@@ -26,10 +26,10 @@ from mckibben.system.workers import context, end_with_parent, prepare
 WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
 CANCELLED, INTERRUPTED = "cancelled", "interrupted"
 
-KINDNESS = 5
+NICENESS = 5
 """Niceness of jobs, so that the page stays quick."""
 
-SPACING = 0.2
+REPORT_INTERVAL = 0.2
 """Least time between two reports of progress [s]."""
 
 PRELOADED = "mckibben.app.preloaded"
@@ -41,7 +41,7 @@ Tell = Callable[..., None]
 Work = Callable[..., str]
 
 
-class Job(Plain):
+class Job(StoredModel):
     """A job: ``kind`` is the name of its work, ``given`` the arguments of that, ``title`` for people.
 
     ``progress`` has seconds, shares, and words or costs; ``message`` says how it went.
@@ -179,14 +179,14 @@ def _run(folder: str, job: Job, work: Work, pipe: Any) -> None:
     """Do the work; this runs in the job's process."""
     end_with_parent()
     if hasattr(os, "nice"):
-        os.nice(KINDNESS)
+        os.nice(NICENESS)
     os.umask(0o077)
-    started, last = time.monotonic(), -SPACING
+    started, last = time.monotonic(), -REPORT_INTERVAL
 
     def tell(share: float, what: str | float = "", *_: Any) -> None:
         nonlocal last
         now = time.monotonic()
-        if now - last >= SPACING or share >= 1:
+        if now - last >= REPORT_INTERVAL or share >= 1:
             last = now
             pipe.send((now - started, float(share), what))
 

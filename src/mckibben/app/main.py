@@ -19,7 +19,7 @@ from nicegui import app, context, ui
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from mckibben.app import jobs, widgets
-from mckibben.app.guard import HEAD, HOSTS, Guard, Links
+from mckibben.app.guard import HOSTS, MOST_HEAD_BYTES, Guard, Links
 from mckibben.app.jobs import Jobs
 from mckibben.app.pages import compensate, data, look, models, takeaway
 from mckibben.app.state import State, view
@@ -40,12 +40,12 @@ HOST = HOSTS[0]
 TICK = 0.3
 """How often jobs are asked how far they are [s]."""
 
-LEFT = """addEventListener("unhandledrejection", (event) => {
+IGNORE_UNDRAWN_PLOTS = """addEventListener("unhandledrejection", (event) => {
     if (`${event.reason}`.includes("displayed plot div")) event.preventDefault();
 });"""
 """A page that is left before its plots are drawn: they are measured once more, in vain."""
 
-ABSENCE = 30.0
+RECONNECT_TIME = 30.0
 """How long a page that has lost the server is kept as it was [s]."""
 
 
@@ -107,18 +107,18 @@ def serve(
             show=False,
             reload=False,
             show_welcome_message=False,
-            reconnect_timeout=ABSENCE,
+            reconnect_timeout=RECONNECT_TIME,
             favicon="🦾",
             gzip_middleware_factory=None,
             http="h11",
-            h11_max_incomplete_event_size=HEAD,
+            h11_max_incomplete_event_size=MOST_HEAD_BYTES,
         )
 
 
 def build(state: State) -> None:
     """Build the frame of a window, and the page that its address names."""
     ui.add_css(widgets.style())
-    ui.add_head_html(f"<script>{LEFT}</script>")
+    ui.add_head_html(f"<script>{IGNORE_UNDRAWN_PLOTS}</script>")
     ui.dark_mode().bind_value_from(widgets.theme, "dark")
     router = context.client.sub_pages_router
     with ui.header().classes("bar"):
@@ -131,8 +131,8 @@ def build(state: State) -> None:
         widgets.icon_button("contrast", "Light or dark", lambda: _switch(state))
 
     def choose(path: str) -> None:
-        for each, tab in tabs.items():
-            tab.classes(**{"add" if each == path.partition("?")[0] else "remove": "chosen"})
+        for page_path, tab in tabs.items():
+            tab.classes(**{"add" if page_path == path.partition("?")[0] else "remove": "chosen"})
 
     router.on_path_changed(choose)
     choose(router.current_path)

@@ -26,10 +26,10 @@ from mckibben.report.builder import Figure, Item, Table, Text
 from mckibben.splits import split_of, tested_from
 from mckibben.studying.inverting import compensation
 
-VALIDATED = 1.2
+TIME_WITH_VALIDATION = 1.2
 """Time of a fit with its cross-validation, relative to that of the fit."""
 
-LEAST = 2000
+FEWEST_SAMPLES = 2000
 """Samples below which a fit gets no quicker."""
 
 PLAN = "next-recording"
@@ -51,23 +51,23 @@ def sides_of(
 def comparable(workspace: Workspace, sides: Channels) -> list[Json]:
     """Return the results of models of these channels, best first: other errors do not compare."""
     named = tuple(map(", ".join, (sides.inputs, sides.outputs, sides.scheduling)))
-    told = ("input", "output", "load")
-    return [r for r in workspace.results() if tuple(r.get(key, "") for key in told) == named]
+    keys = ("input", "output", "load")
+    return [row for row in workspace.results() if tuple(row.get(key, "") for key in keys) == named]
 
 
 def against(rows: Sequence[Json]) -> str:
     """Return why no model of these is recommended; empty where one is."""
 
-    def judged(row: Json) -> Any:
+    def as_scores(row: Json) -> Any:
         error = (row.get("test") or {}).get("rmse", float("inf"))
         return SimpleNamespace(reason=None, skill_least=row.get("skill_least"), test_error=error)
 
     current = [row for row in rows if row["current"] and row.get("constant")]
     for first in current[:1]:
         mean = first["constant"]
-        where = recommended([*map(judged, current)], judged(mean))[1]
-        if where is not None:
-            return words.not_recommended(where, first, mean, first["unit"])
+        problem = recommended([*map(as_scores, current)], as_scores(mean))[1]
+        if problem is not None:
+            return words.not_recommended(problem, first, mean, first["unit"])
     return ""
 
 
@@ -117,12 +117,22 @@ def offered(workspace: Workspace, sides: Channels) -> Offered:
         split = split_of(train, test, sides)
         fitted, described = split.train, split.described
     items = {name: Candidate(name) for name in names}
-    no = objections(items, [*train, *test], sides)
-    no |= objections({n: item for n, item in items.items() if n not in no}, fitted, sides)
-    left = (replace(n, models=tuple(m for m in n.models if m not in no)) for n in needs())
-    others = {full_name(name): why for name, why in no.items()}
-    work = max(sum(map(len, train)), LEAST) * len(sides.inputs) * len(sides.outputs) * VALIDATED
-    return Offered(tuple(need for need in left if need.models), others, described, work)
+    reasons = objections(items, [*train, *test], sides)
+    reasons |= objections(
+        {need: item for need, item in items.items() if need not in reasons}, fitted, sides
+    )
+    remaining = (
+        replace(need, models=tuple(model for model in need.models if model not in reasons))
+        for need in needs()
+    )
+    others = {full_name(name): why for name, why in reasons.items()}
+    work = (
+        max(sum(map(len, train)), FEWEST_SAMPLES)
+        * len(sides.inputs)
+        * len(sides.outputs)
+        * TIME_WITH_VALIDATION
+    )
+    return Offered(tuple(need for need in remaining if need.models), others, described, work)
 
 
 def parts(workspace: Workspace, sides: Channels) -> dict[str, tuple[Recording, int | None, str]]:
@@ -131,12 +141,14 @@ def parts(workspace: Workspace, sides: Channels) -> dict[str, tuple[Recording, i
     Each with its first sample that is tested on where it was fitted before that, and its use.
     """
     train, test = workspace.train_and_test()
-    found: dict[str, tuple[Recording, int | None, str]] = {}
+    runs: dict[str, tuple[Recording, int | None, str]] = {}
     with suppress(DataError):
         split = split_of(train, test, sides)
         for run, rows in zip(split.test, split.test_rows, strict=True):
-            found[run.name] = run, tested_from(rows), "test"
-    return found | {r.name: (r, None, "train") for r in [*test, *train] if r.name not in found}
+            runs[run.name] = run, tested_from(rows), "test"
+    return runs | {
+        run.name: (run, None, "train") for run in [*test, *train] if run.name not in runs
+    }
 
 
 # -- jobs ------------------------------------------------------------------------------------------
@@ -166,34 +178,36 @@ def fit(
         raise ModelError((row.reason or "it gave no model: try other settings").rstrip("."))
     about: Json = {"model": model, "input": board.input, "output": board.output, "data": data}
     about["load"] = ", ".join(board.loads)
-    olds = {name: workspace.read("results", name) or {} for name in workspace.names("results")}
-    same = (n for n, old in olds.items() if all(old.get(key) == about[key] for key in about))
-    name = next(same, None) or workspace.new_name("models", model)
-    whole = board.to_dict()
+    earlier = {name: workspace.read("results", name) or {} for name in workspace.names("results")}
+    same_names = (
+        n for n, result in earlier.items() if all(result.get(key) == about[key] for key in about)
+    )
+    name = next(same_names, None) or workspace.new_name("models", model)
+    board_numbers = board.to_dict()
     copied = ("unit", "split", "chosen_by", "not_recommended", "shared")
-    told = {key: whole[key] for key in copied}
-    told["constant"] = None if board.constant is None else board.constant.to_dict()
-    undone, refused = compensation(board, plan.data.split, seed)
-    told["compensator"] = None if undone is None else undone.to_dict()
-    told["no_compensator"] = refused.get(row.model, "")
-    told["notes"] = [*board.notes, *row.diagnostics.get("notes", ())]
-    workspace.save_model(name, row.block, row.to_dict() | about | told)
-    by = "fit" if row.validation_rmse is None else board.chosen_by
+    numbers = {key: board_numbers[key] for key in copied}
+    numbers["constant"] = None if board.constant is None else board.constant.to_dict()
+    compensator, refusals = compensation(board, plan.data.split, seed)
+    numbers["compensator"] = None if compensator is None else compensator.to_dict()
+    numbers["no_compensator"] = refusals.get(row.model, "")
+    numbers["notes"] = [*board.notes, *row.diagnostics.get("notes", ())]
+    workspace.save_model(name, row.block, row.to_dict() | about | numbers)
+    chosen_by = "fit" if row.validation_rmse is None else board.chosen_by
     errors = [f"{numeral(x, 3)} {board.unit}".strip() for x in (row.chosen_by, row.test_error)]
-    return f"{words.CHOICES[by][0]} {errors[0]}, test RMSE {errors[1]}"
+    return f"{words.CHOICES[chosen_by][0]} {errors[0]}, test RMSE {errors[1]}"
 
 
 def check(workspace: Workspace, tell: Tell, *, name: str) -> str:
     """Test whether a model is right on the test recordings, or else on those of its training."""
     train, tests = workspace.train_and_test()
-    on = "test" if tests else "train"
+    role = "test" if tests else "train"
     try:
-        found = workflow.check(workspace.model(name), tests or train, progress=tell)
+        validation = workflow.check(workspace.model(name), tests or train, progress=tell)
     except DataError:  # a short test tells too little
         if not (tests and train):
             raise
-        on, found = "train", workflow.check(workspace.model(name), train, progress=tell)
-    return _add(workspace, name, "check", results.check(found), on)
+        role, validation = "train", workflow.check(workspace.model(name), train, progress=tell)
+    return _add(workspace, name, "check", results.check(validation), role)
 
 
 def _add(workspace: Workspace, name: str, what: str, items: Sequence[Item], on: str) -> str:
@@ -203,19 +217,19 @@ def _add(workspace: Workspace, name: str, what: str, items: Sequence[Item], on: 
     return next(one.sentences[0] for one in items if isinstance(one, Text))
 
 
-def plan(workspace: Workspace, tell: Tell, **given: Any) -> str:
+def plan(workspace: Workspace, tell: Tell, **options: Any) -> str:
     """Plan what to record next, and write its commands as a file of inputs over time."""
     train, test = workspace.train_and_test()
     out = workspace.path("takeaway", f"{PLAN}.csv")
-    found = workflow.plan([*train, *test], out=out, force=True, **given)
-    workspace.write("takeaway", PLAN, {"items": stored_items(results.plan(found))})
-    return words.plan_sentences(found)[0]
+    experiment = workflow.plan([*train, *test], out=out, force=True, **options)
+    workspace.write("takeaway", PLAN, {"items": stored_items(results.plan(experiment))})
+    return words.plan_sentences(experiment)[0]
 
 
 def last_plan(workspace: Workspace) -> tuple[Json, Path] | None:
     """Return the last plan, and the file of its commands."""
-    said, path = workspace.read("takeaway", PLAN), workspace.path("takeaway", f"{PLAN}.csv")
-    return (said, path) if said and path.is_file() else None
+    content, path = workspace.read("takeaway", PLAN), workspace.path("takeaway", f"{PLAN}.csv")
+    return (content, path) if content and path.is_file() else None
 
 
 # -- what is shown of results, in files ------------------------------------------------------------
@@ -225,12 +239,12 @@ KINDS: Mapping[str, type[Text | Table | Figure]] = {"text": Text, "table": Table
 
 def stored_items(items: Iterable[Item]) -> list[Json]:
     """Return what is shown of a result as JSON."""
-    return [asdict(one) for one in items if one is not None and one.kind in KINDS]
+    return [asdict(item) for item in items if item is not None and item.kind in KINDS]
 
 
-def restored(found: Mapping[str, Any]) -> list[Item]:
+def restored(stored: Mapping[str, Any]) -> list[Item]:
     """Return what `stored_items` wrote."""
     try:
-        return [KINDS[one["kind"]](**one) for one in found["items"]]
+        return [KINDS[item["kind"]](**item) for item in stored["items"]]
     except (KeyError, TypeError):
         raise DataError("its file is damaged", remedy="do it again") from None

@@ -20,7 +20,7 @@ from mckibben.errors import DataError
 
 _VIEWS: list[Any] = []
 
-PATIENCE = 1.0
+READING_TIME = 1.0
 """How long a page waits until the folder is read; after that it comes without [s]."""
 
 
@@ -76,7 +76,7 @@ class State:
 
         Of a folder that is long to read at first, it goes on in the background; see `view`.
         """
-        if self.ready.wait(PATIENCE):
+        if self.ready.wait(READING_TIME):
             self._settle()
 
     def _settle(self) -> None:
@@ -94,9 +94,9 @@ class State:
         choose(self.inputs, self.outputs)
         if known and not (self.inputs and self.outputs):  # what is chosen stays
             with suppress(DataError):
-                used = [one.select(known) for one in self.workspace.used().values()]
-                found = channels_of(used, self.inputs or None, self.outputs or None)
-                choose(found.inputs, found.outputs)
+                runs = [run.select(known) for run in self.workspace.used().values()]
+                sides = channels_of(runs, self.inputs or None, self.outputs or None)
+                choose(sides.inputs, sides.outputs)
 
     @property
     def sides(self) -> Channels:
@@ -112,5 +112,5 @@ class State:
         """Build every `view` again, in all windows; call it after the folder or a choice has changed."""
         if self.ready.is_set():
             self._settle()
-        for one in _VIEWS:
-            one.refresh()
+        for part in _VIEWS:
+            part.refresh()

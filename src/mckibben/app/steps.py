@@ -19,11 +19,11 @@ from mckibben.recording import Recording
 
 Role = Literal["train", "test", "unused"]
 
-LARGEST = 512 * 2**20
-"""Bytes of an uploaded file."""
+LARGEST_UPLOAD = 512 * 2**20
+"""Largest uploaded file [bytes]."""
 
 
-class Plain(BaseModel):
+class StoredModel(BaseModel):
     """Anything in a folder; fields that are not known are ignored."""
 
     model_config = ConfigDict(extra="ignore")
@@ -37,8 +37,8 @@ class Reading(ReadOptions):
 
     def given(self) -> dict[str, Any]:
         """Return the options that are not as they are by default."""
-        every = {each.name: getattr(self, each.name) for each in fields(self)}
-        return {name: value for name, value in every.items() if value != getattr(UNTOUCHED, name)}
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {name: value for name, value in values.items() if value != getattr(UNTOUCHED, name)}
 
 
 UNTOUCHED = Reading()
@@ -55,7 +55,7 @@ FUNCTIONS = {
 """Step -> its function in `mckibben`, and what that takes after the recording."""
 
 
-class Step(Plain):
+class Step(StoredModel):
     """What is done to a recording after it was read."""
 
     do: Literal["slice", "low_pass", "detrend", "resample", "zero"]
@@ -78,8 +78,8 @@ class Step(Plain):
     def apply(self, recording: Recording) -> Recording:
         """Return a recording after it; errors are those of the function."""
         function, values = self._call()
-        found: Recording = attrgetter(function)(mckibben)(recording, *values)
-        return found
+        result: Recording = attrgetter(function)(mckibben)(recording, *values)
+        return result
 
     def code(self, recording: str) -> str:
         """Return the Python that does it to an expression."""
@@ -87,17 +87,17 @@ class Step(Plain):
         return f"mckibben.{function}({', '.join([recording, *map(repr, values)])})"
 
     def __str__(self) -> str:
-        of = f" of {', '.join(self.channels)}" if self.channels else ""
+        channels = f" of {', '.join(self.channels)}" if self.channels else ""
         return {
             "slice": f"Keep samples {self.start} to {self.stop}",
-            "low_pass": f"Low-pass {self.cutoff or 0:g} Hz{of}",
-            "detrend": f"Remove drift{of}",
+            "low_pass": f"Low-pass {self.cutoff or 0:g} Hz{channels}",
+            "detrend": f"Remove drift{channels}",
             "resample": f"Resample to {self.sample_time or 0:g} s",
-            "zero": f"Zero{of} where {self.over} is lowest",
+            "zero": f"Zero{channels} where {self.over} is lowest",
         }[self.do]
 
 
-class Entry(Plain):
+class Entry(StoredModel):
     """A recording of the folder: recording number ``part`` of the raw file ``upload``."""
 
     name: str = ""
@@ -110,11 +110,11 @@ class Entry(Plain):
     def code(self) -> str:
         """Return the Python that reads it and repeats its steps, in the folder."""
         words = [f"{name}={value!r}" for name, value in self.reading.given().items()]
-        given = ", ".join([repr(f"uploads/{self.upload}"), "informative=False", *words])
-        found = f"mckibben.read({given})[{self.part}]"
+        arguments = ", ".join([repr(f"uploads/{self.upload}"), "informative=False", *words])
+        expression = f"mckibben.read({arguments})[{self.part}]"
         for step in self.steps:
-            found = step.code(found)
-        return found
+            expression = step.code(expression)
+        return expression
 
 
 def applied(recording: Recording, steps: Sequence[Step]) -> Recording:
@@ -126,7 +126,10 @@ def applied(recording: Recording, steps: Sequence[Step]) -> Recording:
 
 def understand(path: Path, reading: Reading) -> tuple[list[Recording], list[Seen]]:
     """Return the recordings of a file, and its columns; errors are those of `mckibben.read`."""
-    found, columns = look(path, reading, reading.channels, LARGEST)
-    if (chosen := reading.channels) is not None:
-        found = [one.select([name for name in one.channels if name in chosen]) for one in found]
-    return found, columns
+    recordings, columns = look(path, reading, reading.channels, LARGEST_UPLOAD)
+    if (channels := reading.channels) is not None:
+        recordings = [
+            recording.select([name for name in recording.channels if name in channels])
+            for recording in recordings
+        ]
+    return recordings, columns

@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from nicegui import binding, context, events, run, ui
 
-from mckibben.app.steps import LARGEST
+from mckibben.app.steps import LARGEST_UPLOAD
 from mckibben.app.terms import message_of
 from mckibben.arrays import Array
 from mckibben.errors import MckibbenError, unforeseen
@@ -33,7 +33,7 @@ from mckibben.report.mathematics import mathml
 
 Json = dict[str, Any]
 
-SIZE = 12
+TEXT_SIZE = 12
 """Of text in plots [px]."""
 
 
@@ -57,10 +57,12 @@ def colours(dark: bool) -> dict[str, str]:
     """Return the report's colours by name."""
     style = resources.files("mckibben.report").joinpath("templates/report.css").read_text("utf-8")
     light, _, rest = style.partition("@media")
-    found = dict(re.findall(r"--([\w-]+):\s*(#[0-9a-fA-F]{3,8})", light))
+    colours_by_name = dict(re.findall(r"--([\w-]+):\s*(#[0-9a-fA-F]{3,8})", light))
     if dark:
-        found |= dict(re.findall(r"--([\w-]+):\s*(#[0-9a-fA-F]{3,8})", rest.partition("@media")[0]))
-    return found
+        colours_by_name |= dict(
+            re.findall(r"--([\w-]+):\s*(#[0-9a-fA-F]{3,8})", rest.partition("@media")[0])
+        )
+    return colours_by_name
 
 
 def style() -> str:
@@ -68,12 +70,12 @@ def style() -> str:
     sheets = []
     for body, dark in (("body", False), ("body.body--dark", True)):
         named = "; ".join(f"--{name}: {colour}" for name, colour in colours(dark).items())
-        on = "#10161b" if dark else "#ffffff"
+        text_colour = "#10161b" if dark else "#ffffff"
         brand = "; ".join(
-            f"--q-{name}: {colours(dark)[of]} !important"
-            for name, of in {"primary": "accent", "negative": "warn", "warning": "warn"}.items()
+            f"--q-{name}: {colours(dark)[colour]} !important"
+            for name, colour in {"primary": "accent", "negative": "warn", "warning": "warn"}.items()
         )
-        sheets.append(f"{body} {{ {named}; --on: {on}; {brand} }}")
+        sheets.append(f"{body} {{ {named}; --on: {text_colour}; {brand} }}")
     sheet = resources.files("mckibben.app").joinpath("style.css").read_text("utf-8")
     return "\n".join([*sheets, sheet])
 
@@ -103,11 +105,11 @@ def heading(title: str, explanation: str = "") -> None:
 
 def card(title: str = "") -> Any:
     """Make a card; what is made with it is in it."""
-    found = ui.element("section").classes("card")
+    section = ui.element("section").classes("card")
     if title:
-        with found:
+        with section:
             ui.label(title).classes("subtitle").props('role=heading aria-level="3"')
-    return found
+    return section
 
 
 def row(classes: str = "") -> Any:
@@ -124,36 +126,36 @@ def details(title: str) -> Any:
 @contextmanager
 def dialog(title: str) -> Iterator[Any]:
     """Make and open a dialog; it is deleted when it closes. Yields it, with ``close()``."""
-    with ui.dialog() as found, ui.element("div").classes("card dialog"):
+    with ui.dialog() as window, ui.element("div").classes("card dialog"):
         with ui.element("div").classes("controls spread"):
             ui.label(title).classes("subtitle").props('role=heading aria-level="3"')
-            ui.button(icon="close", on_click=found.close).props(
+            ui.button(icon="close", on_click=window.close).props(
                 'flat round dense aria-label="Close"'
             )
-        yield found
-    found.on("hide", found.delete)
-    found.open()
+        yield window
+    window.on("hide", window.delete)
+    window.open()
 
 
 def sure(title: str, text: str, act: Callable[[], Any]) -> None:
     """Ask whether to delete something, and ``act`` if so."""
-    with dialog(title) as asked:
+    with dialog(title) as window:
         ui.label(text)
 
         def yes() -> None:
             act()
-            asked.close()
+            window.close()
 
         mark(primary("Delete", yes), "delete-sure")
 
 
 def empty(icon: str, title: str, text: str) -> Any:
     """Show what a place is for while there is nothing in it; add a button with ``with``."""
-    with ui.element("div").classes("empty") as found:
+    with ui.element("div").classes("empty") as place:
         ui.icon(icon).classes("large")
         ui.label(title).classes("subtitle")
         ui.label(text).classes("muted")
-    return found
+    return place
 
 
 def next_step(text: str, page: str, path: str) -> None:
@@ -170,12 +172,12 @@ def guarded(action: Callable[..., Any]) -> Callable[..., Awaitable[None]]:
     """Make an action show its errors; it may be a coroutine, and take an event or nothing."""
 
     @wraps(action)  # so that it is called with an event if the action takes one
-    async def act(*given: Any) -> None:
+    async def act(*arguments: Any) -> None:
         with context.client:  # what was clicked may be gone before this is done
             try:
-                found = action(*given)
-                if inspect.iscoroutine(found):
-                    await found
+                result = action(*arguments)
+                if inspect.iscoroutine(result):
+                    await result
             except MckibbenError as error:
                 error_toast(error)
             except Exception as error:
@@ -189,9 +191,9 @@ def shielded(build: Callable[..., None]) -> Callable[..., None]:
     """Let a part of a page show its error in its place, such as that of a damaged model."""
 
     @wraps(build)
-    def built(*given: Any) -> None:
+    def built(*arguments: Any) -> None:
         try:
-            build(*given)
+            build(*arguments)
         except MckibbenError as error:
             error_box(error)
 
@@ -239,18 +241,20 @@ def upload(
     text: str, action: Callable[[events.UploadEventArguments], Any], endings: str = ""
 ) -> Any:
     """Make a place to drop files, which are streamed to the disk, or to choose them."""
-    large = f"A file has more than {LARGEST // 2**20} MiB"
-    refused = f"A file is not {endings.replace(',', ', ')}, or {large[2:]}" if endings else large
-    found = ui.upload(
+    too_large = f"A file has more than {LARGEST_UPLOAD // 2**20} MiB"
+    refused = (
+        f"A file is not {endings.replace(',', ', ')}, or {too_large[2:]}" if endings else too_large
+    )
+    element = ui.upload(
         label=f"{text}, or click to choose",
         multiple=True,
         auto_upload=True,
-        max_file_size=LARGEST,
+        max_file_size=LARGEST_UPLOAD,
         on_upload=guarded(action),
         on_rejected=partial(error_toast, refused),
     )
     accepted = f' accept="{endings}"' if endings else ""
-    return found.props(f"flat{accepted}").classes("upload")
+    return element.props(f"flat{accepted}").classes("upload")
 
 
 async def download(path: Path) -> None:
@@ -263,7 +267,9 @@ async def download(path: Path) -> None:
 
 def plot(drawing: Drawing, *, height: int = 320, dragged: str = "zoom") -> list[Any]:
     """Show a drawing of `mckibben.report.figures.draw`; return its plots, one for each plane."""
-    return [plot_of(one, height=height, dragged=dragged) for one in interactive.plots(drawing)]
+    return [
+        plot_of(figure, height=height, dragged=dragged) for figure in interactive.plots(drawing)
+    ]
 
 
 def plot_of(figure: Json, *, height: int = 320, dragged: str = "zoom") -> Any:
@@ -274,37 +280,44 @@ def plot_of(figure: Json, *, height: int = 320, dragged: str = "zoom") -> Any:
     for key in [key for key in layout if key.startswith(("xaxis", "yaxis"))]:
         layout[key] = axis | layout[key]
         _place_title(layout, key, height)
-    lifted = any(one.get("y") == 1 for one in layout.get("annotations", ()))  # a title at the top
+    lifted = any(
+        annotation.get("y") == 1 for annotation in layout.get("annotations", ())
+    )  # a title at the top
     layout |= {
         "height": height,
         "dragmode": dragged,
         "margin": {"l": 56, "r": 16, "t": 32 if "title" in layout or lifted else 16, "b": 40},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"color": "--ink", "family": "system-ui, sans-serif", "size": SIZE},
+        "font": {"color": "--ink", "family": "system-ui, sans-serif", "size": TEXT_SIZE},
         "legend": {"orientation": "h", "x": 0, "y": 1 + lifted * 20 / height, "yanchor": "bottom"},
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": "--muted", "activecolor": "--accent"},
         "uirevision": "same",
     }
     config = interactive.CLOSED | {"displayModeBar": "hover", "responsive": True}
-    plain = interactive.resolved({"data": figure["data"], "layout": layout}, colours(theme.dark))
-    return ui.plotly(plain | {"config": config}).classes("plot")
+    resolved = interactive.resolved({"data": figure["data"], "layout": layout}, colours(theme.dark))
+    return ui.plotly(resolved | {"config": config}).classes("plot")
 
 
 def _place_title(layout: Json, key: str, height: int) -> None:
     """Put the title of an axis near it, or over its panel where that is too low for it."""
     title = layout[key].get("title")
     text = title.get("text", "") if isinstance(title, dict) else title or ""
-    layout[key]["title"] = {"text": text, "font": {"size": SIZE}, "standoff": 8}
+    layout[key]["title"] = {"text": text, "font": {"size": TEXT_SIZE}, "standoff": 8}
     low, high = layout[key].get("domain", (0, 1))
-    if key[0] == "y" and 0.55 * SIZE * len(text) > (high - low) * height:
-        at = {"xref": "paper", "x": 0, "yref": "paper", "y": high, "text": text}
-        at |= {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "font": {"size": SIZE}}
-        layout["annotations"] = [*layout.get("annotations", ()), at]
+    if key[0] == "y" and 0.55 * TEXT_SIZE * len(text) > (high - low) * height:
+        annotation = {"xref": "paper", "x": 0, "yref": "paper", "y": high, "text": text}
+        annotation |= {
+            "xanchor": "left",
+            "yanchor": "bottom",
+            "showarrow": False,
+            "font": {"size": TEXT_SIZE},
+        }
+        layout["annotations"] = [*layout.get("annotations", ()), annotation]
         layout[key]["title"] = {"text": ""}
 
 
-POINTS = 160
+MOST_OVERLAY_POINTS = 160
 """Points of a small picture: the least and the largest of each part, so that no peak is lost."""
 
 
@@ -313,9 +326,9 @@ def overlay(traces: Mapping[str, Array]) -> None:
     lines = []
     for place, samples in enumerate(traces.values(), start=1):
         finite = samples[np.isfinite(samples)]
-        parts = np.array_split(finite, min(POINTS // 2, len(finite)))
+        parts = np.array_split(finite, min(MOST_OVERLAY_POINTS // 2, len(finite)))
         rows = [sorted((part.argmin(), part.argmax())) for part in parts]
-        ends = np.concatenate([part[each] for part, each in zip(parts, rows, strict=True)])
+        ends = np.concatenate([part[row] for part, row in zip(parts, rows, strict=True)])
         heights = 30 - 28 * (ends - ends.min()) / (np.ptp(ends) or 1.0)
         across = np.linspace(0, 100, len(ends))
         points = " ".join(f"{x:.4g},{y:.4g}" for x, y in zip(across, heights, strict=True))
@@ -344,18 +357,18 @@ def table(
     Numbers are to the right and have three digits. A cell that is callable makes its own elements.
     """
     scrolls = "wide" if on_choose is None else "wide list"
-    with ui.element("div").classes(scrolls), ui.element("table").classes("table") as found:
+    with ui.element("div").classes(scrolls), ui.element("table").classes("table") as element:
         with ui.element("thead"), ui.element("tr"):
             for name, first in zip(columns, rows[0] if rows else columns, strict=True):
                 with ui.element("th").classes("number" * isinstance(first, int | float)):
                     _titled(name, definition(name))
         with ui.element("tbody"):
-            for at, cells in enumerate(rows):
+            for index, cells in enumerate(rows):
                 line = ui.element("tr")
                 if on_choose is not None:
-                    choose = guarded(partial(on_choose, at))
-                    line.classes("choosable" + " chosen" * (at == chosen)).props("tabindex=0")
-                    if at == chosen:
+                    choose = guarded(partial(on_choose, index))
+                    line.classes("choosable" + " chosen" * (index == chosen)).props("tabindex=0")
+                    if index == chosen:
                         ui.run_javascript(SCROLL % line.id)
                     line.on("click", choose, []).on("keydown.enter.self", choose, [])
                 for cell in cells:
@@ -365,12 +378,12 @@ def table(
                             cell()
                         else:
                             ui.label(typeset(as_text(cell)) if number else as_text(cell))
-    return found
+    return element
 
 
-def items(found: Sequence[Item]) -> None:
+def items(parts: Sequence[Item]) -> None:
     """Show what is shown of a result everywhere (`mckibben.report.results`); tables may be folded."""
-    for item in filter(None, found):
+    for item in filter(None, parts):
         if isinstance(item, Text):
             for sentence in item.sentences:
                 label = ui.label(typeset_within(message_of(sentence)))

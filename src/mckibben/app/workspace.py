@@ -23,7 +23,16 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from mckibben.app.steps import LARGEST, UNTOUCHED, Entry, Reading, Role, Step, applied, understand
+from mckibben.app.steps import (
+    LARGEST_UPLOAD,
+    UNTOUCHED,
+    Entry,
+    Reading,
+    Role,
+    Step,
+    applied,
+    understand,
+)
 from mckibben.errors import DataError, MckibbenError
 from mckibben.system.atomic import PART, replacing, write_json, written
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
@@ -113,16 +122,16 @@ class Workspace:
     def read(self, kind: str, name: str) -> dict[str, Any] | None:
         """Return the content of a JSON file; None if it is missing or damaged."""
         try:
-            found = json.loads(read_bytes(self.path(kind, f"{name}.json"), most=DESCRIPTION))
+            content = json.loads(read_bytes(self.path(kind, f"{name}.json"), most=DESCRIPTION))
         except (DataError, ValueError, RecursionError):
             return None
-        return found if isinstance(found, dict) else None
+        return content if isinstance(content, dict) else None
 
     def names(self, kind: str) -> list[str]:
         """Return the names of the JSON files of a kind; empty files only reserve one."""
-        found = [path for path in (self.folder / kind).glob("*.json") if not path.is_symlink()]
-        plain = [p.stem for p in found if NAME.fullmatch(p.stem) and p.stat().st_size]
-        return sorted(name for name in plain if not name.endswith("-metadata"))
+        paths = [path for path in (self.folder / kind).glob("*.json") if not path.is_symlink()]
+        usable = [path.stem for path in paths if NAME.fullmatch(path.stem) and path.stat().st_size]
+        return sorted(name for name in usable if not name.endswith("-metadata"))
 
     def delete(self, kind: str, name: str) -> None:
         """Delete a JSON file."""
@@ -134,12 +143,14 @@ class Workspace:
 
         `DataError` if it is empty or too large.
         """
-        given = Path(name.replace("\\", "/"))
-        ending = re.sub(r"[^.\w]", "", given.suffix.casefold())[:10]
-        if not 0 < size <= LARGEST:
-            problem = f"{given.name!r:.80} is empty, or has more than {LARGEST // 2**20} MiB"
+        uploaded = Path(name.replace("\\", "/"))
+        ending = re.sub(r"[^.\w]", "", uploaded.suffix.casefold())[:10]
+        if not 0 < size <= LARGEST_UPLOAD:
+            problem = (
+                f"{uploaded.name!r:.80} is empty, or has more than {LARGEST_UPLOAD // 2**20} MiB"
+            )
             raise DataError(problem, remedy="give another file")
-        path = self.path("uploads", self.new_name("uploads", given.stem, ending) + ending)
+        path = self.path("uploads", self.new_name("uploads", uploaded.stem, ending) + ending)
         try:
             with replacing(path) as new:
                 yield new, path
@@ -151,9 +162,9 @@ class Workspace:
 
     def entry(self, name: str) -> Entry:
         """Return a recording's description; `DataError` if it is missing or damaged."""
-        found = self.read("recordings", name) or {}
+        content = self.read("recordings", name) or {}
         try:
-            return Entry.model_validate(found | {"name": name})
+            return Entry.model_validate(content | {"name": name})
         except ValidationError:
             problem = "its description is missing or damaged"
             file = self.folder / "recordings" / f"{name}.json"
@@ -161,11 +172,11 @@ class Workspace:
 
     def entries(self) -> list[Entry]:
         """Return all recordings whose descriptions can be read, by name."""
-        found = []
+        entries = []
         for name in self.names("recordings"):
             with suppress(DataError):
-                found.append(self.entry(name))
-        return found
+                entries.append(self.entry(name))
+        return entries
 
     def put(self, entry: Entry) -> None:
         """Write a recording's description."""
@@ -179,7 +190,7 @@ class Workspace:
     def _parts(self, path: Path, reading: Reading) -> list[Recording]:
         return self.cached(path, repr(reading), lambda: understand(path, reading)[0])
 
-    def _made(self, entry: Entry) -> Recording:
+    def _apply_steps(self, entry: Entry) -> Recording:
         def make() -> Recording:
             path = self.raw_path(entry)
             if entry.part >= len(parts := self._parts(path, entry.reading)):
@@ -187,27 +198,27 @@ class Workspace:
                 raise DataError(problem, file=path, remedy="remove this recording")
             return applied(parts[entry.part], entry.steps).with_meta(name=entry.name)
 
-        found: Recording = self._of(entry, "", make)
-        return found
+        recording: Recording = self._derived(entry, "", make)
+        return recording
 
-    def _of(self, entry: Entry, what: str, make: Callable[[], Any]) -> Any:
+    def _derived(self, entry: Entry, what: str, make: Callable[[], Any]) -> Any:
         """Return what is made of a recording, until its raw file or description change."""
         key = what + entry.model_dump_json(exclude={"role"})
         return self.cached(self.raw_path(entry), key, make)
 
     def recording(self, name: str) -> Recording:
         """Return a recording after its steps; it is read once. Errors are those of reading."""
-        return self._made(self.entry(name))
+        return self._apply_steps(self.entry(name))
 
     def add(
         self, upload: str, *, name: str = "", role: Role = "train", reading: Reading | None = None
     ) -> list[str]:
         """Add the recordings of an uploaded file, and return their names."""
-        path, names, way = self.path("uploads", upload), [], reading or UNTOUCHED
-        for part, one in enumerate(self._parts(path, way)):
-            chosen = self.new_name("recordings", name or one.name or path.stem)
-            self.put(Entry(name=chosen, role=role, upload=upload, part=part, reading=way))
-            names.append(chosen)
+        path, names, settings = self.path("uploads", upload), [], reading or UNTOUCHED
+        for part, recording in enumerate(self._parts(path, settings)):
+            free_name = self.new_name("recordings", name or recording.name or path.stem)
+            self.put(Entry(name=free_name, role=role, upload=upload, part=part, reading=settings))
+            names.append(free_name)
         return names
 
     def join(self, uploads: Sequence[str]) -> str:
@@ -217,7 +228,7 @@ class Workspace:
         """
         from mckibben.files import read
 
-        readings = {one.upload: one.reading for one in self.entries()}
+        readings = {entry.upload: entry.reading for entry in self.entries()}
         parts = [
             part
             for upload in uploads
@@ -243,7 +254,7 @@ class Workspace:
         with self._lock:
             after = self.entry(name).model_copy(update=fields)
             if fields.keys() != {"role"}:
-                self._made(after)
+                self._apply_steps(after)
             self.put(after)
 
     def do(self, name: str, step: Step) -> None:
@@ -261,19 +272,19 @@ class Workspace:
         """Split a recording before a sample, and return the name of the new second part, for testing."""
         entry, end = self.entry(name), len(self.recording(name))
         second = [*entry.steps, Step(do="slice", start=at, stop=end)]
-        self._made(entry.model_copy(update={"steps": second}))
+        self._apply_steps(entry.model_copy(update={"steps": second}))
         self.do(name, Step(do="slice", start=0, stop=at))
-        chosen = self.new_name("recordings", name)
-        self.put(entry.model_copy(update={"name": chosen, "role": "test", "steps": second}))
-        return chosen
+        new_name = self.new_name("recordings", name)
+        self.put(entry.model_copy(update={"name": new_name, "role": "test", "steps": second}))
+        return new_name
 
     def rename(self, name: str, wish: str) -> str:
         """Give a recording a name like the one wished for, and return that."""
         entry = self.entry(name)
-        chosen = self.new_name("recordings", wish)
-        self.put(entry.model_copy(update={"name": chosen}))
+        new_name = self.new_name("recordings", wish)
+        self.put(entry.model_copy(update={"name": new_name}))
         self.delete("recordings", name)
-        return chosen
+        return new_name
 
     def remove(self, name: str) -> None:
         """Take a recording out; its raw file stays, and so does its description, in the history."""
@@ -287,7 +298,7 @@ class Workspace:
 
     def with_role(self, role: Role) -> list[Recording]:
         """Return the recordings of a role."""
-        return [self.recording(one.name) for one in self.entries() if one.role == role]
+        return [self.recording(entry.name) for entry in self.entries() if entry.role == role]
 
     def train_and_test(self) -> tuple[list[Recording], list[Recording]]:
         """Return the recordings to fit to, and those to test on."""
@@ -295,27 +306,27 @@ class Workspace:
 
     def used(self) -> dict[str, Recording]:
         """Return the recordings in use that can be read, by name."""
-        found = {}
+        recordings = {}
         for entry in self.entries():
             with suppress(MckibbenError):
                 if entry.role != "unused":
-                    found[entry.name] = self.recording(entry.name)
-        return found
+                    recordings[entry.name] = self.recording(entry.name)
+        return recordings
 
     def channels(self) -> list[str]:
         """Return the channels that all recordings in use have."""
-        used = list(self.used().values())
-        every = used[0].channels if used else ()
-        return [name for name in every if all(name in one for one in used)]
+        recordings = list(self.used().values())
+        names = recordings[0].channels if recordings else ()
+        return [name for name in names if all(name in recording for recording in recordings)]
 
     def digest(self) -> str:
         """Return what changes whenever what is trained or tested on does; see `results`."""
-        used, found = self.used(), []
+        recordings, digests = self.used(), []
         for entry in self.entries():
-            if run := used.get(entry.name):
-                digest = self._of(entry, "digest", partial(_digest, run))
-                found.append(f"{entry.role} {digest}")
-        return hashlib.sha256("\n".join(sorted(found)).encode()).hexdigest()[:16]
+            if run := recordings.get(entry.name):
+                digest = self._derived(entry, "digest", partial(_digest, run))
+                digests.append(f"{entry.role} {digest}")
+        return hashlib.sha256("\n".join(sorted(digests)).encode()).hexdigest()[:16]
 
     # -- models and what came of them ------------------------------------------------------------
 
@@ -343,18 +354,18 @@ class Workspace:
         """
         from mckibben.comparison.leaderboard import order
 
-        def place(row: dict[str, Any]) -> tuple[Any, ...]:
+        def rank(row: dict[str, Any]) -> tuple[Any, ...]:
             errors = row.get("validation_rmse"), (row.get("train") or {}).get("rmse")
             doubted = bool(row.get("doubted"))
-            known = order(row["model"], *errors, row.get("skill_least"), doubted=doubted)
-            return not row["current"], *known
+            ranked = order(row["model"], *errors, row.get("skill_least"), doubted=doubted)
+            return not row["current"], *ranked
 
-        now, found, known = self.digest(), [], self.names("models")
+        digest, rows, ranked = self.digest(), [], self.names("models")
         for name in self.names("results"):
             row = {"model": ""} | (self.read("results", name) or {})
-            if row.get("status") == "ok" and name in known:
-                found.append(row | {"name": name, "current": row.get("data", "") in ("", now)})
-        return sorted(found, key=place)
+            if row.get("status") == "ok" and name in ranked:
+                rows.append(row | {"name": name, "current": row.get("data", "") in ("", digest)})
+        return sorted(rows, key=rank)
 
     def on_other_data(self) -> set[str]:
         """Return the models that were fitted to recordings that are no longer these."""
@@ -367,13 +378,13 @@ class Workspace:
         except OSError as error:
             problem = f"it cannot be read ({error.strerror})"
             raise DataError(problem, file=path, remedy="import it again") from None
-        at = path, key, stat.st_mtime_ns, stat.st_size
-        made = self._cache[at] if at in self._cache else make()
+        file_key = path, key, stat.st_mtime_ns, stat.st_size
+        value = self._cache[file_key] if file_key in self._cache else make()
         with self._lock:  # not for the making, which takes seconds
-            self._cache[at] = self._cache.pop(at, made)  # the last used goes last
+            self._cache[file_key] = self._cache.pop(file_key, value)  # the last used goes last
             while len(self._cache) > MOST_CACHED:
                 del self._cache[next(iter(self._cache))]
-        return made
+        return value
 
 
 def _digest(recording: Recording) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from nicegui import events, run, ui
 
-from mckibben.app import following, forms, modelling, widgets
-from mckibben.app.pages import parts, trying
+from mckibben.app import compensators, forms, loops, modelling, motions, widgets
+from mckibben.app.pages import force_and_log, parts
 from mckibben.app.state import State
 from mckibben.app.widgets import mark
 from mckibben.errors import DataError, MckibbenError
@@ -38,20 +38,20 @@ TEXTS = {"formula": "5 + 3*sin(2*pi*t/10)", "drawn": "0 5; 2 10; 4 5"}
 """Motions that are written, each with an example."""
 
 SHAPES = {
-    **following.MOTIONS,
+    **motions.MOTIONS,
     "hold": "Stay at one value",
     "formula": "Formula of t",
     "drawn": "Points: time and value",
     "points": "From a file or a recording",
 }
 
-LOOP = ("approach", "settle", "noise", "delay", "slew", "preview", "pressure_loop", "seed")
+LOOP_OPTIONS = ("approach", "settle", "noise", "delay", "slew", "preview", "pressure_loop", "seed")
 """Fields of `TrackOptions` that are asked for."""
 
-USUAL = ("feedforward", "feedforward-pid")
+DEFAULT_LAWS = ("feedforward", "feedforward-pid")
 """Controllers that are tried first."""
 
-DRIVEN = ("pressure", "voltage", "force", "command")
+COMMAND_PREFIXES = ("pressure", "voltage", "force", "command")
 """What channels that drive a plant begin with."""
 
 Json = dict[str, Any]
@@ -76,36 +76,36 @@ async def build(state: State) -> None:
 def _prepare(state: State) -> None:
     """Find what takes a moment, so that clicks find it ready."""
     with suppress(MckibbenError):
-        if following.having(state.workspace, "inverse"):
+        if compensators.models_usable_as(state.workspace, "inverse"):
             _wish(state)
-            following.plants(state.workspace, _able(state))
+            loops.plants(state.workspace, _able(state))
 
 
 @parts.steady("models")
 def page(state: State) -> None:
     """Show the tab that is chosen."""
-    able = following.having(state.workspace, "inverse")
-    forces = following.having(state.workspace, "force")
-    chosen = state.chosen.setdefault("compensate.tab", "force" if forces and not able else "motion")
-    names = forces if chosen == "force" else able
+    able = compensators.models_usable_as(state.workspace, "inverse")
+    forces = compensators.models_usable_as(state.workspace, "force")
+    tab = state.chosen.setdefault("compensate.tab", "force" if forces and not able else "motion")
+    names = forces if tab == "force" else able
 
     def turn(event: events.ValueChangeEventArguments[Any]) -> None:
         state.chosen["compensate.tab"] = str(event.value)
         page.refresh()
 
     if able or forces:
-        with ui.tabs(value=chosen).props("dense no-caps align=left inline-label") as tabs:
+        with ui.tabs(value=tab).props("dense no-caps align=left inline-label") as tabs:
             for name, title in TABS.items():
                 mark(ui.tab(name, title), f"tab-{name}")
         tabs.on_value_change(turn)
     if not names:
-        _empty(state, chosen)
+        _empty(state, tab)
         return
     left, right = {
         "motion": (_motion, followed),
-        "force": (trying.force, trying.estimated),
-        "log": (trying.log, trying.reviewed),
-    }[chosen]
+        "force": (force_and_log.force, force_and_log.estimated),
+        "log": (force_and_log.log, force_and_log.reviewed),
+    }[tab]
     with ui.element("div").classes("columns"):
         with ui.element("div").classes("stack"):
             left(state, names)
@@ -138,7 +138,7 @@ def _empty(state: State, tab: str) -> None:
 
 def _able(state: State) -> str:
     """Return the model that is inverted: the one that is chosen, or the best that can be."""
-    return parts.model_of(state, following.having(state.workspace, "inverse"))
+    return parts.model_of(state, compensators.models_usable_as(state.workspace, "inverse"))
 
 
 def _wish(state: State) -> Json:
@@ -146,25 +146,31 @@ def _wish(state: State) -> Json:
     workspace, name = state.workspace, _able(state)
     wish: Json = state.chosen.get("compensate.wish", {})
     data = (workspace.read("results", name) or {}).get("data", "")
-    asked = [[*some] for some in following.asked_for(workspace, name)]
-    if [data, *asked] == [wish.get("data"), [*wish.get("channels", {})], [*wish.get("held", {})]]:
+    channels = [[*some] for some in compensators.reference_channels(workspace, name)]
+    if [data, *channels] == [
+        wish.get("data"),
+        [*wish.get("channels", {})],
+        [*wish.get("held", {})],
+    ]:
         return wish
-    wish = state.chosen["compensate.wish"] = following.wish(workspace, name) | {"data": data}
-    for one in [*_runs(state).values()][:1]:
+    wish = state.chosen["compensate.wish"] = motions.default_motion(workspace, name) | {
+        "data": data
+    }
+    for newest_run in [*_runs(state).values()][:1]:
         with suppress(MckibbenError):  # it may be gone
-            _take(wish, following.read_run(workspace, one["reference"]), one["reference"])
+            _take(wish, loops.read_run(workspace, newest_run["reference"]), newest_run["reference"])
     return wish
 
 
 def _runs(state: State) -> dict[str, Json]:
     """Return the runs of the model that is inverted, the newest first."""
-    runs, name = following.newest(state.workspace, "runs"), _able(state)
-    return {run: one for run, one in runs.items() if one["model"] == name}
+    runs, name = loops.newest(state.workspace, "runs"), _able(state)
+    return {run: content for run, content in runs.items() if content["model"] == name}
 
 
 def _take(wish: Json, recording: Recording, stored: str = "") -> None:
     """Take the motion of a recording; a stored one keeps its name, so that its runs are shown."""
-    for channel, points in following.of_file(recording, wish["channels"]).items():
+    for channel, points in motions.points_of_recording(recording, wish["channels"]).items():
         wish["channels"][channel] |= {"kind": "points", "points": points}
     for channel in {*wish["held"]} & {*recording.channels}:
         wish["held"][channel] = float(recording[channel][0])
@@ -172,112 +178,140 @@ def _take(wish: Json, recording: Recording, stored: str = "") -> None:
 
 
 def _reference(state: State) -> Recording:
-    wish, (channels, held) = _wish(state), following.asked_for(state.workspace, _able(state))
-    units = following.units_of(channels | held)
-    return following.reference(following.points_of(wish), wish["held"], wish["step"], units)
+    wish, (channels, held) = (
+        _wish(state),
+        compensators.reference_channels(state.workspace, _able(state)),
+    )
+    units = motions.units_of(channels | held)
+    return motions.reference_from_points(
+        motions.motion_points(wish), wish["held"], wish["step"], units
+    )
 
 
 def _motion(state: State, names: list[str]) -> None:
-    name, wish = parts.model_of(state, names), _wish(state)
-    channels, held = following.asked_for(state.workspace, name)
-    own, unit = wish["channels"][wish["now"]], channels[wish["now"]].unit
-    ready = own["kind"] != "points"
-
-    def moved() -> None:
-        wish["stored"] = ""
-        with suppress(DataError):  # while it is being filled in
-            following.shape(wish)
-            followed.refresh()
-
-    def written() -> None:
-        following.shape(wish)  # errors are shown, as it is a whole text
-        moved()
-
-    def reshaped() -> None:
-        moved()
-        page.refresh()
-
-    async def loaded(event: events.UploadEventArguments) -> None:
-        _take(wish, (await trying.received(state, event))[1])
-        page.refresh()
-
-    def field(values: Json, key: str, label: str) -> None:
-        found = ui.number(label, format="%.6g").bind_value(values, key)
-        found.props("dense outlined debounce=400").classes("number")
-        mark(found, f"field-{key}").on_value_change(moved)
-
-    def of_recording(event: events.ValueChangeEventArguments[Any]) -> None:
-        _take(wish, recordings[event.value])
-        page.refresh()
-
-    recordings = {
-        run.name: run
-        for run in state.workspace.used().values()
-        if run.sample_time is not None and all(key in run for key in channels)
-    }
-
+    """Show the controls of the motion, and of the compensator that follows it."""
     with widgets.card("Motion"):
-        if len(channels) > 1:
-            toggle = ui.toggle([*channels]).bind_value(wish, "now")
+        _MotionForm(state, parts.model_of(state, names)).show()
+    _compensator(state, parts.model_of(state, names))
+
+
+class _MotionForm:
+    """The controls of the motion of one channel; they change the wish, and draw it again."""
+
+    def __init__(self, state: State, model: str) -> None:
+        self.state, self.wish = state, _wish(state)
+        self.channels, self.held = compensators.reference_channels(state.workspace, model)
+        self.motion = self.wish["channels"][self.wish["now"]]
+        self.unit = self.channels[self.wish["now"]].unit
+
+    def show(self) -> None:
+        """Build the controls: channel, shape, size and source."""
+        if len(self.channels) > 1:
+            toggle = ui.toggle([*self.channels]).bind_value(self.wish, "now")
             toggle.props("dense no-caps unelevated").on_value_change(lambda _: page.refresh())
             mark(toggle, "channel")
+        self._shape()
+        self._duration()
+        self._source()
+
+    def _shape(self) -> None:
+        shape = self.motion["kind"]
         with widgets.row(classes="fields"):
-            kind = ui.select(SHAPES, label="Shape").bind_value(own, "kind").props("dense outlined")
-            mark(kind, "shape").on_value_change(reshaped)
-            if own["kind"] in TEXTS:
-                own.setdefault("text", "")
-                text = ui.input(axis_label("Value", unit), placeholder=TEXTS[own["kind"]])
-                text.bind_value(own, "text").props("dense outlined debounce=600")
-                mark(text, "field-text").on_value_change(widgets.guarded(written))
-            elif ready:
-                field(own, "first", axis_label("At" if own["kind"] == "hold" else "From", unit))
-            if own["kind"] in following.MOTIONS:
-                field(own, "other", axis_label("To", unit))
-        with widgets.row(classes="fields" if ready or held else "hidden"):
-            if ready and own["kind"] != "drawn":
-                field(wish, "seconds", "Duration [s]")
-            if own["kind"] in following.MOTIONS:
-                field(wish, "cycles", "Cycles")
-            for key, channel in held.items():
-                field(wish["held"], key, axis_label(f"{key}, held", channel.unit))
+            kind = ui.select(SHAPES, label="Shape").bind_value(self.motion, "kind")
+            mark(kind.props("dense outlined"), "shape").on_value_change(self._reshape)
+            if shape in TEXTS:
+                self.motion.setdefault("text", "")
+                text = ui.input(axis_label("Value", self.unit), placeholder=TEXTS[shape])
+                text.bind_value(self.motion, "text").props("dense outlined debounce=600")
+                mark(text, "field-text").on_value_change(widgets.guarded(self._read_text))
+            elif shape != "points":
+                label = axis_label("At" if shape == "hold" else "From", self.unit)
+                self._field(self.motion, "first", label)
+            if shape in motions.MOTIONS:
+                self._field(self.motion, "other", axis_label("To", self.unit))
+
+    def _duration(self) -> None:
+        shape = self.motion["kind"]
+        with widgets.row(classes="fields" if shape != "points" or self.held else "hidden"):
+            if shape not in ("points", "drawn"):
+                self._field(self.wish, "seconds", "Duration [s]")
+            if shape in motions.MOTIONS:
+                self._field(self.wish, "cycles", "Cycles")
+            for key, channel in self.held.items():
+                self._field(self.wish["held"], key, axis_label(f"{key}, held", channel.unit))
+
+    def _source(self) -> None:
+        """Offer a file, or a recording in use, as the motion."""
+        recordings = {
+            run.name: run
+            for run in self.state.workspace.used().values()
+            if run.sample_time is not None and all(key in run for key in self.channels)
+        }
+
+        async def load(event: events.UploadEventArguments) -> None:
+            _take(self.wish, (await force_and_log.received(self.state, event))[1])
+            page.refresh()
+
+        def take(event: events.ValueChangeEventArguments[Any]) -> None:
+            _take(self.wish, recordings[event.value])
+            page.refresh()
+
         with widgets.row():
             with ui.element("div").style("display: none"):
-                files = widgets.upload("", loaded, ".csv,.tsv,.txt,.parquet,.xlsx,.mat")
+                files = widgets.upload("", load, ".csv,.tsv,.txt,.parquet,.xlsx,.mat")
                 mark(files, "reference-file")
             widgets.button("From a file", lambda: files.run_method("pickFiles"), "upload_file")
             if recordings:
-                run_of = ui.select([*recordings], label="From a recording").props("dense outlined")
-                run_of.style("min-width: 200px")
-                mark(run_of, "reference-recording").on_value_change(widgets.guarded(of_recording))
-    _compensator(state, name)
+                source = ui.select([*recordings], label="From a recording")
+                source.props("dense outlined").style("min-width: 200px")
+                mark(source, "reference-recording").on_value_change(widgets.guarded(take))
+
+    def _field(self, values: Json, key: str, label: str) -> None:
+        field = ui.number(label, format="%.6g").bind_value(values, key)
+        field.props("dense outlined debounce=400").classes("number")
+        mark(field, f"field-{key}").on_value_change(self._redraw)
+
+    def _redraw(self) -> None:
+        self.wish["stored"] = ""
+        with suppress(DataError):  # while it is being filled in
+            motions.fill_points(self.wish)
+            followed.refresh()
+
+    def _read_text(self) -> None:
+        motions.fill_points(self.wish)  # errors are shown, as it is a whole text
+        self._redraw()
+
+    def _reshape(self) -> None:
+        self._redraw()
+        page.refresh()
 
 
 # -- compensator, plant, run --------------------------------------------------------------------------
 
 
 def _compensator(state: State, name: str) -> None:
-    workspace, uses = state.workspace, following.uses(state.workspace, name)
-    kinds = {kind: words for kind, words in following.KINDS.items() if kind in uses}
+    workspace, uses = state.workspace, compensators.uses(state.workspace, name)
+    kinds = {kind: words for kind, words in compensators.KINDS.items() if kind in uses}
     with widgets.card("Compensator"):
         with widgets.row(classes="fields"):
-            parts.select_model(state, following.having(workspace, "inverse"))
+            parts.select_model(state, compensators.models_usable_as(workspace, "inverse"))
             form = parts.select(state, "compensate.form", kinds, "As", page.refresh)
         if form == "inverse":
             _expected(state, name)
-        if asked := following.SETTINGS.get(form):
+        if fields := compensators.SETTINGS.get(form):
             title = "How it learns" if form == "adaptive" else "Limits and horizon"
             with widgets.details(title), widgets.row():
-                forms.fields(InvertOptions, asked, values_of(state, form))
-        plants = following.plants(workspace, name)
+                forms.fields(InvertOptions, fields, values_of(state, form))
+        plants = loops.plants(workspace, name)
         key = f"compensate.plant-of-{name}"
         plant = parts.select(state, key, plants, "Tried on", page.refresh)
-        fitting = following.laws(workspace, name, plant) if plant else {}
-        chosen = [x for x in state.chosen.get("compensate.laws", USUAL) if x in fitting]
-        state.chosen["compensate.laws"] = chosen or [*fitting][:1]
+        fitting = loops.laws(workspace, name, plant) if plant else {}
+        names = [x for x in state.chosen.get("compensate.laws", DEFAULT_LAWS) if x in fitting]
+        state.chosen["compensate.laws"] = names or [*fitting][:1]
         laws = ui.select(fitting, multiple=True, label="Controllers").props("dense outlined")
         mark(laws.bind_value(state.chosen, "compensate.laws").props("use-chips"), "laws")
         with widgets.details("Imperfections of the loop"), widgets.row(classes="fields"):
-            forms.fields(TrackOptions, LOOP, values_of(state, "loop"))
+            forms.fields(TrackOptions, LOOP_OPTIONS, values_of(state, "loop"))
         with widgets.row(classes="spread"):
             ui.label("Compared with no compensation.").classes("muted")
             mark(widgets.primary("Run", partial(_start, state, name), "play_arrow"), "run")
@@ -287,22 +321,22 @@ def _expected(state: State, name: str) -> None:
     """Show the error to expect of the model's compensator, or why it is not recommended."""
     parts.warn_of_other_data(state, name)
     row = state.workspace.read("results", name) or {}
-    if own := row.get("compensator"):
-        mark(ui.label(words.expected(own)), "expected")
+    if compensator := row.get("compensator"):
+        mark(ui.label(words.expected(compensator)), "expected")
     elif why := row.get("no_compensator"):
         widgets.error_box(f"This compensator is not recommended: {why}")
 
 
-def values_of(state: State, of: str) -> Json:
+def values_of(state: State, group: str) -> Json:
     """Return what is filled in of a compensator's settings, or of the loop's."""
-    values: Json = state.chosen.setdefault(f"compensate.values-{of}", {})
+    values: Json = state.chosen.setdefault(f"compensate.values-{group}", {})
     return values
 
 
 def settings_of(state: State, form: str) -> Json:
     """Return the settings of a compensator that differ from the default."""
-    asked = {key: values_of(state, form).get(key) for key in following.SETTINGS.get(form, ())}
-    return forms.given(InvertOptions, asked)
+    values = {key: values_of(state, form).get(key) for key in compensators.SETTINGS.get(form, ())}
+    return forms.given(InvertOptions, values)
 
 
 async def _start(state: State, name: str) -> None:
@@ -313,16 +347,16 @@ async def _start(state: State, name: str) -> None:
     if not laws:
         raise DataError("there is no controller", remedy="choose one, such as Compensator alone")
     state.model = name  # what is taken away next
-    asked = {"model": name, "form": form, "settings": settings_of(state, form), "plant": plant}
-    asked["options"] = forms.given(TrackOptions, values_of(state, "loop"))
+    request = {"model": name, "form": form, "settings": settings_of(state, form), "plant": plant}
+    request["options"] = forms.given(TrackOptions, values_of(state, "loop"))
     wish, reference = _wish(state), _reference(state)
     wish["stored"] = wish["stored"] or await run.io_bound(
-        following.stored, state.workspace, reference
+        loops.store_reference, state.workspace, reference
     )
     for law in laws:
         title = " ".join([name, *([form] if form != "inverse" else []), law])
-        more = {"reference": wish["stored"], "controller": law}
-        trying.start(state, following.loop, title, asked | more)
+        job_settings = {"reference": wish["stored"], "controller": law}
+        force_and_log.start(state, loops.loop, title, request | job_settings)
 
 
 # -- results ----------------------------------------------------------------------------------
@@ -332,12 +366,14 @@ async def _start(state: State, name: str) -> None:
 def followed(state: State) -> None:
     """Show the motion, the chosen run, and the errors of all runs of the model."""
     wish, runs, reference = _wish(state), _runs(state), _reference(state)
-    reach = following.reach(state.workspace, _able(state), wish["held"])
-    of_it = [run for run, one in runs.items() if one["reference"] == wish["stored"]]
-    chosen = state.chosen.get("compensate.run")
-    chosen = chosen if chosen in of_it else next(iter(of_it), "")
-    with widgets.card("Desired and measured motion" if chosen else "Desired motion"):
-        _plot(state, reference, reach, runs[chosen] | {"name": chosen} if chosen else None)
+    reach = motions.reach(state.workspace, _able(state), wish["held"])
+    matching = [
+        run for run, run_content in runs.items() if run_content["reference"] == wish["stored"]
+    ]
+    name = state.chosen.get("compensate.run")
+    name = name if name in matching else next(iter(matching), "")
+    with widgets.card("Desired and measured motion" if name else "Desired motion"):
+        _plot(state, reference, reach, runs[name] | {"name": name} if name else None)
         if doubt := modelling.against(modelling.comparable(state.workspace, state.sides)):
             widgets.error_box(doubt)
         together = "; each channel by itself, all at once less" if len(reach) > 1 else ""
@@ -351,27 +387,29 @@ def followed(state: State) -> None:
             if job.given["asked"]["model"] == _able(state):
                 parts.show_job(state, job)
         if runs:
-            _errors(state, runs, chosen)
+            _errors(state, runs, name)
         else:
             text = "Run shows the errors with and without compensation, and the commands."
             mark(ui.label(text).classes("muted"), "nothing-yet")
-        if chosen:
-            with widgets.details(f"More of {_title(runs[chosen])}"):
-                widgets.items(modelling.restored(runs[chosen]))
+        if name:
+            with widgets.details(f"More of {_title(runs[name])}"):
+                widgets.items(modelling.restored(runs[name]))
 
 
-def _title(one: Mapping[str, Any]) -> str:
-    form = "" if one.get("form", "inverse") == "inverse" else f" ({one['form']})"
-    where = str(one.get("plant") or one.get("rig") or "").rpartition(" ")[2]
-    law = following.titled(str(one.get("controller", "")))
-    return f"{law}{form} on {where}" if where else f"{law}{form}"
+def _title(content: Mapping[str, Any]) -> str:
+    form = "" if content.get("form", "inverse") == "inverse" else f" ({content['form']})"
+    plant = str(content.get("plant") or content.get("rig") or "").rpartition(" ")[2]
+    law = loops.controller_title(str(content.get("controller", "")))
+    return f"{law}{form} on {plant}" if plant else f"{law}{form}"
 
 
 def _scored(state: State, name: str) -> Recording | None:
     """Return the recording of a run without its approach; None where it is gone."""
     with suppress(MckibbenError):
-        one = following.read_run(state.workspace, f"{name}.csv")
-        return one.slice(max(round(-one.start_time / one.step), 0), len(one))
+        recording = loops.read_run(state.workspace, f"{name}.csv")
+        return recording.slice(
+            max(round(-recording.start_time / recording.step), 0), len(recording)
+        )
     return None
 
 
@@ -379,94 +417,126 @@ def _plot(
     state: State, reference: Recording, reach: Mapping[str, tuple[float, float]], run: Json | None
 ) -> None:
     """Draw the desired motion, the reachable range, and what a run measured; below, its commands."""
-    one = None if run is None else _scored(state, run["name"])
-    panels, errors = [], []
-    for place, channel in enumerate(reach):
-
-        def curve(time: Any, y: Any, name: str, colour: str, style: Any = "line") -> Curve:
-            shown = "" if place else name  # in the legend once  # noqa: B023
-            return Curve(*over_time(time, y), shown, colour, style)
-
-        curves = [curve(reference.time, reference[channel], "desired", "measured")]
+    recording = None if run is None else _scored(state, run["name"])
+    panels: list[Panel] = []
+    errors: list[Panel] = []
+    for channel in reach:
         label = axis_label(channel, reference.units.get(channel, ""))
-        if one is not None and run is not None:
-            due = one.time - (one.sample_time or 0.0)  # it is recorded a step later
-            desired = np.interp(due, reference.time, reference[channel])
-            away = []
-            for name, key, colour in (
-                ("no compensation", f"uncompensated_{channel}", "muted"),
-                (_title(run), channel, series_colour(0)),
-            ):
-                if key in one:
-                    style: Style = "fine" if colour == "muted" else "line"
-                    curves.append(curve(due, one[key], name, colour, style))
-                    away.append(curve(due, desired - one[key], "", colour, style))
-            errors.append(Panel("time [s]", f"error of {label}", tuple(away), zero=True))
-        panels.append(Panel("time [s]", label, tuple(curves)))
+        name = "" if panels else "desired"  # in the legend once
+        desired = Curve(*over_time(reference.time, reference[channel]), name, "measured", "line")
+        curves: list[Curve] = []
+        if recording is not None and run is not None:
+            names = ("", "") if panels else ("no compensation", _title(run))
+            curves, error_curves = _run_curves(recording, reference, channel, names)
+            errors.append(Panel("time [s]", f"error of {label}", error_curves, zero=True))
+        panels.append(Panel("time [s]", label, (desired, *curves)))
     panels += errors
-    if one is not None and run is not None:
-        known = {*run.get("rmse", {}), *_wish(state)["held"]}
-        driven = [key for key in one.channels if key.startswith(DRIVEN) and key not in known]
-        sent = [key for key in driven if key.startswith(COMMAND)] or driven
-        commands = [
-            Curve(
-                *over_time(one.time, one[x]), x.removeprefix(COMMAND), series_colour(k + 1), "line"
-            )
-            for k, x in enumerate(sent)
-        ]
-        if sent:
-            label = axis_label("command", one.units.get(sent[0], ""))
-            panels.append(Panel("time [s]", label, tuple(commands)))
+    if recording is not None and run is not None:
+        panels += _command_panels(recording, {*run.get("rmse", {}), *_wish(state)["held"]})
     (figure,) = interactive.plots(Drawing(tuple(panels), stacked=True))
+    _shade(figure, reach)
+    height = 300 if len(panels) == 1 else 60 + 170 * len(panels)
+    mark(widgets.plot_of(figure, height=height), "motion-plot")
+
+
+def _run_curves(
+    recording: Recording, reference: Recording, channel: str, names: tuple[str, str]
+) -> tuple[list[Curve], tuple[Curve, ...]]:
+    """Return a channel without and with compensation, and the errors of both."""
+    time = recording.time - (recording.sample_time or 0.0)  # it is recorded a step later
+    desired = np.interp(time, reference.time, reference[channel])
+    keys = f"uncompensated_{channel}", channel
+    styles: list[tuple[str, Style]] = [("muted", "fine"), (series_colour(0), "line")]
+    motion, errors = [], []
+    for key, name, style in zip(keys, names, styles, strict=True):
+        if key in recording:
+            motion.append(Curve(*over_time(time, recording[key]), name, *style))
+            errors.append(Curve(*over_time(time, desired - recording[key]), "", *style))
+    return motion, tuple(errors)
+
+
+def _command_panels(recording: Recording, known: Collection[str]) -> list[Panel]:
+    """Return a panel of the commands of a run, or of what drove the plant; none where there is neither.
+
+    Channels that are known to be outputs or to be held are neither.
+    """
+    driven = [
+        key for key in recording.channels if key.startswith(COMMAND_PREFIXES) and key not in known
+    ]
+    commands = [key for key in driven if key.startswith(COMMAND)] or driven
+    if not commands:
+        return []
+    curves = tuple(
+        Curve(
+            *over_time(recording.time, recording[key]),
+            key.removeprefix(COMMAND),
+            series_colour(k + 1),
+            "line",
+        )
+        for k, key in enumerate(commands)
+    )
+    label = axis_label("command", recording.units.get(commands[0], ""))
+    return [Panel("time [s]", label, curves)]
+
+
+def _shade(figure: Json, reach: Mapping[str, tuple[float, float]]) -> None:
+    """Shade the reachable range in the first panels of a figure."""
     for row, (low, high) in enumerate(reach.values()):
         axis = str(row + 1) if row else ""
         shade = {"type": "rect", "xref": f"x{axis} domain", "yref": f"y{axis}", "x0": 0, "x1": 1}
         shade |= {"y0": low, "y1": high, "fillcolor": "--accent", "opacity": 0.08}
         figure["layout"]["shapes"].append(shade | {"line": {"width": 0}, "layer": "below"})
-    height = 300 if len(panels) == 1 else 60 + 170 * len(panels)
-    mark(widgets.plot_of(figure, height=height), "motion-plot")
 
 
 def _errors(state: State, runs: Mapping[str, Json], chosen: str) -> None:
     """Show the errors of all runs of the model; one that is chosen brings its motion back."""
     names, rows = [*runs], []
 
-    def text(one: Json, errors: Mapping[str, float] | None) -> str:
-        units = one.get("units", {})
-        each = (f"{number(x, 3)} {units.get(key, '')}" for key, x in (errors or {}).items())
-        return ", ".join(each) or "–"
+    def text(content: Json, errors: Mapping[str, float] | None) -> str:
+        units = content.get("units", {})
+        texts_of_channels = (
+            f"{number(x, 3)} {units.get(key, '')}" for key, x in (errors or {}).items()
+        )
+        return ", ".join(texts_of_channels) or "–"
 
-    for name, one in runs.items():
-        plain = one.get("uncompensated") or {}
-        errors = one.get("rmse"), plain.get("rmse", plain), one.get("largest")
-        texts = [text(one, of) for of in errors]
-        motion, limited = one["reference"].removesuffix(".csv"), str(one.get("clipped", "–"))
-        rows.append([_title(one), motion, *texts, limited, partial(_acts, state, name)])
+    for name, content in runs.items():
+        uncompensated = content.get("uncompensated") or {}
+        errors = (
+            content.get("rmse"),
+            uncompensated.get("rmse", uncompensated),
+            content.get("largest"),
+        )
+        texts = [text(content, values) for values in errors]
+        motion, limited = (
+            content["reference"].removesuffix(".csv"),
+            str(content.get("clipped", "–")),
+        )
+        rows.append([_title(content), motion, *texts, limited, partial(_acts, state, name)])
 
-    def choose(at: int) -> None:
-        state.chosen["compensate.run"], file = names[at], runs[names[at]]["reference"]
+    def choose(index: int) -> None:
+        state.chosen["compensate.run"], file = names[index], runs[names[index]]["reference"]
         if file == _wish(state)["stored"]:
             followed.refresh()
         else:
-            _take(_wish(state), following.read_run(state.workspace, file), file)
+            _take(_wish(state), loops.read_run(state.workspace, file), file)
             page.refresh()
 
     columns = ["Run", "Motion", "RMSE", "No compensation", "Largest", "Steps at a limit", ""]
-    at = names.index(chosen) if chosen else None
-    mark(widgets.table(columns, rows, chosen=at, on_choose=choose), "runs")
+    index = names.index(chosen) if chosen else None
+    mark(widgets.table(columns, rows, chosen=index, on_choose=choose), "runs")
 
 
 def _acts(state: State, name: str) -> None:
     path = state.workspace.path("runs", f"{name}.csv")
 
-    def away() -> None:
+    def delete() -> None:
         state.workspace.delete("runs", name)
         path.unlink(missing_ok=True)
         state.changed()
 
-    def ask() -> None:
-        widgets.sure(f"Delete {name}?", "The run and its recording are deleted.", away)
+    def confirm() -> None:
+        widgets.sure(f"Delete {name}?", "The run and its recording are deleted.", delete)
 
     with ui.element("div").classes("acts").on("click.stop", js_handler="() => {}"):
         widgets.icon_button("download", f"Download {name}", partial(widgets.download, path))
-        widgets.icon_button("delete_outline", f"Delete {name}", ask)
+        widgets.icon_button("delete_outline", f"Delete {name}", confirm)

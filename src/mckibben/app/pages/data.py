@@ -11,7 +11,7 @@ import numpy as np
 from nicegui import events, ui
 
 from mckibben import example
-from mckibben.app import together, widgets
+from mckibben.app import sample_times, widgets
 from mckibben.app.pages import importing, parts
 from mckibben.app.state import State, view
 from mckibben.app.steps import UNTOUCHED, Entry, Reading, Step
@@ -30,7 +30,7 @@ ROLES = {"train": "Train", "test": "Test", "unused": "Unused"}
 MOST_DRAWN = 4
 """Channels that are drawn over time at first."""
 
-PICKED = """(event) => {
+SELECTION_ENDS = """(event) => {
     const range = Object.entries(event?.range ?? {}).find(([axis]) => axis.startsWith("x"));
     if (range) emit(range[1]);
 }"""
@@ -56,17 +56,17 @@ def build(state: State) -> None:
 
 
 def _upload(state: State) -> Any:
-    found = widgets.upload("Drop files here", partial(_received, state))
-    return mark(found, "upload")
+    element = widgets.upload("Drop files here", partial(_received, state))
+    return mark(element, "upload")
 
 
 def _is_empty(state: State) -> bool:
-    rest = _unread(state) or state.chosen.get("data.removed")
-    return not (rest or state.workspace.names("recordings"))
+    content = _unread(state) or state.chosen.get("data.removed")
+    return not (content or state.workspace.names("recordings"))
 
 
-async def _changed(state: State, change: Callable[..., Any], *given: Any) -> None:
-    await asyncio.to_thread(change, *given)
+async def _changed(state: State, change: Callable[..., Any], *arguments: Any) -> None:
+    await asyncio.to_thread(change, *arguments)
     state.changed()
 
 
@@ -131,8 +131,8 @@ def shown(state: State) -> None:
 
 def _unread(state: State) -> dict[str, MckibbenError]:
     """Return the uploads that are not read yet, and why."""
-    found: dict[str, MckibbenError] = state.chosen.setdefault("data.unread", {})
-    return found
+    unread: dict[str, MckibbenError] = state.chosen.setdefault("data.unread", {})
+    return unread
 
 
 async def _received(state: State, event: events.UploadEventArguments) -> None:
@@ -161,12 +161,12 @@ async def _ask(state: State, upload: str) -> None:
         add = partial(workspace.add, reading=reading)
         state.recording, *_ = await asyncio.to_thread(add, upload)
         unread.pop(upload, None)
-        for one in [*unread] if others else ():
+        for name in [*unread] if others else ():
             try:
-                await asyncio.to_thread(add, one)
-                unread.pop(one, None)
+                await asyncio.to_thread(add, name)
+                unread.pop(name, None)
             except MckibbenError as error:
-                unread[one] = error
+                unread[name] = error
         state.changed()
 
     path = workspace.path("uploads", upload)
@@ -177,9 +177,9 @@ async def _correct(state: State, entry: Entry) -> None:
     """Ask how a recording is to be read instead, and those that are read like it."""
     workspace = state.workspace
     channels = {name: [*run.channels] for name, run in workspace.used().items()}
-    like = [one.name for one in workspace.entries() if one.reading == entry.reading]
-    own = channels.pop(entry.name, [])
-    alike = [name for name in like if channels.get(name) == own]
+    same_reading = [other.name for other in workspace.entries() if other.reading == entry.reading]
+    own_channels = channels.pop(entry.name, [])
+    alike = [name for name in same_reading if channels.get(name) == own_channels]
 
     async def take(reading: Reading, all_so: bool) -> None:
         for name in [entry.name, *(alike if all_so else ())]:
@@ -195,7 +195,7 @@ async def _correct(state: State, entry: Entry) -> None:
 
 
 def _recordings(state: State, entries: list[Entry]) -> None:
-    names = [one.name for one in entries]
+    names = [entry.name for entry in entries]
 
     def discard(upload: str) -> Any:
         _unread(state).pop(upload, None)
@@ -224,14 +224,17 @@ def _recordings(state: State, entries: list[Entry]) -> None:
             mark(widgets.button("Bring it back", restore, "undo"), "restore")
     if entries:
         chosen = names.index(state.recording) if state.recording in names else None
-        heads, rows = ["Name", "Role", "Samples", "Channels"], [_line(state, e) for e in entries]
+        heads, rows = (
+            ["Name", "Role", "Samples", "Channels"],
+            [_line(state, entry) for entry in entries],
+        )
         mark(widgets.table(heads, rows, chosen=chosen, on_choose=choose), "recordings")
-    if entries and not any(one.role == "test" for one in entries):
+    if entries and not any(entry.role == "test" for entry in entries):
         ui.label(
             "None is for testing: add another recording, or split this one in two. Without, the last "
             "part of the recordings is held out."
         ).classes("muted")
-    if len(dict.fromkeys([*_unread(state), *(one.upload for one in entries)])) > 1:
+    if len(dict.fromkeys([*_unread(state), *(entry.upload for entry in entries)])) > 1:
         widgets.button("Join files", partial(_join, state), "merge")
     _upload(state)
 
@@ -239,17 +242,17 @@ def _recordings(state: State, entries: list[Entry]) -> None:
 def _join(state: State) -> None:
     """Let files be chosen that are pieces of one run, or its channels, and make a recording of them."""
     workspace, unread = state.workspace, _unread(state)
-    uploads = dict.fromkeys([*unread, *(one.upload for one in workspace.entries())])
+    uploads = dict.fromkeys([*unread, *(upload.upload for upload in workspace.entries())])
 
     async def join() -> None:
         state.recording = await asyncio.to_thread(workspace.join, files.value)
-        for one in files.value:
-            unread.pop(one, None)
-        shown.close()
+        for upload in files.value:
+            unread.pop(upload, None)
+        window.close()
         state.read_again()
 
     text = "Pieces of one run, one after the other, or channels of one run by several loggers"
-    with widgets.dialog("Join files") as shown:
+    with widgets.dialog("Join files") as window:
         ui.label(text).classes("muted")
         files = ui.select([*uploads], value=[*unread], multiple=True, label="Files")
         mark(files.props("outlined dense use-chips"), "joined")
@@ -271,32 +274,32 @@ def _line(state: State, entry: Entry) -> list[Any]:
 def _further(state: State) -> None:
     """Show what models are given beside the inputs, and what is not used."""
     sides = state.sides
-    for said, names in (
+    for words, names in (
         ("Every model is given", sides.scheduling),
         ("Models that can take them are given", sides.offered),
         ("Not used:", sides.unused),
     ):
         if names:
-            ui.label(f"{said} {', '.join(names)}.").classes("muted")
+            ui.label(f"{words} {', '.join(names)}.").classes("muted")
 
 
-def _sides(state: State, known: list[str]) -> None:
+def _sides(state: State, common: list[str]) -> None:
     """Let inputs, outputs and the load be chosen, of channels that all recordings have."""
     workspace = state.workspace
-    if not known:
+    if not common:
         widgets.error_box(
             "The recordings in use have no channel in common. Set one of them to unused, or correct how "
             "it is read"
         )
         return
-    if times := together.sample_times(workspace):
+    if times := sample_times.sample_times(workspace):
         slow = f"{times[1]:.4g}"
         with widgets.row():
             ui.label(f"Sample times differ, from {times[0]:.4g} to {slow} s.").classes("muted")
-            alike = partial(_changed, state, together.resample, workspace, times[1])
-            mark(widgets.button(f"Resample to {slow} s", alike), "one-rate")
+            resample = partial(_changed, state, sample_times.resample, workspace, times[1])
+            mark(widgets.button(f"Resample to {slow} s", resample), "one-rate")
     _further(state)
-    rest = [name for name in known if name not in (*state.inputs, *state.outputs)]
+    others = [name for name in common if name not in (*state.inputs, *state.outputs)]
 
     def choose(side: str, names: Any) -> None:
         if names or side == "load":
@@ -304,11 +307,11 @@ def _sides(state: State, known: list[str]) -> None:
         state.changed()
 
     for side in ("inputs", "outputs"):
-        chosen = [name for name in getattr(state, side) if name in known]
-        mark(parts.several(side.capitalize(), known, chosen, partial(choose, side)), side)
-    if rest:
-        loads = {"": "By name, or none", **{name: name for name in rest}}
-        load: Any = ui.select(loads, value=state.load if state.load in rest else "", label="Load")
+        selected = [name for name in getattr(state, side) if name in common]
+        mark(parts.several(side.capitalize(), common, selected, partial(choose, side)), side)
+    if others:
+        loads = {"": "By name, or none", **{name: name for name in others}}
+        load: Any = ui.select(loads, value=state.load if state.load in others else "", label="Load")
         load.on_value_change(lambda event: choose("load", event.value or ""))
         mark(load.props("dense outlined"), "load")
 
@@ -341,17 +344,17 @@ def _actions(state: State, entry: Entry) -> None:
     def rename() -> None:
         def done() -> None:
             state.recording = workspace.rename(name, field.value)
-            shown.close()
+            window.close()
             state.changed()
 
-        with widgets.dialog(f"Rename {name}") as shown:
+        with widgets.dialog(f"Rename {name}") as window:
             field = ui.input("Name", value=name).props("outlined dense autofocus")
             field.on("keydown.enter", widgets.guarded(done), [])
             widgets.primary("Rename", done)
 
-    picked = ui.toggle(ROLES, value=entry.role).props("dense no-caps unelevated")
+    toggle = ui.toggle(ROLES, value=entry.role).props("dense no-caps unelevated")
     role = widgets.guarded(lambda e: act(partial(workspace.change, name, role=e.value)))
-    mark(picked.props("toggle-color=primary").on_value_change(role), "role")
+    mark(toggle.props("toggle-color=primary").on_value_change(role), "role")
     mark(widgets.button("Import settings", lambda: _correct(state, entry), "tune"), "correct")
     widgets.icon_button("edit", "Rename", rename)
     mark(widgets.icon_button("delete_outline", "Remove", remove), "remove")
@@ -366,7 +369,7 @@ def _part(state: State, entry: Entry, recording: Recording) -> None:
     for figure in widgets.plot(drawing, height=height, dragged="select"):
         figure.figure["layout"]["selectdirection"] = "h"
         mark(figure, "over-time")
-        figure.on("plotly_selected", lambda event: pick(event.args), js_handler=PICKED)
+        figure.on("plotly_selected", lambda event: pick(event.args), js_handler=SELECTION_ENDS)
 
     def pick(range_: Any) -> None:
         for field, end in zip(ends, sorted(map(float, range_)), strict=True):
@@ -427,8 +430,8 @@ def _steps(state: State, entry: Entry, recording: Recording) -> None:
             offer("Low-pass", "low_pass", lambda: {"cutoff": cutoff.value})
             step = _number("Sample time [s]", recording.sample_time)
             offer("Resample", "resample", lambda: {"sample_time": step.value})
-        of = ui.select(others, value=others[:1], multiple=True, label="Channels")
-        of.props("dense outlined")
+        selection = ui.select(others, value=others[:1], multiple=True, label="Channels")
+        selection.props("dense outlined")
         zero = f"Zero where {driving} is lowest"
-        offer(zero, "zero", lambda: {"channels": of.value, "over": driving})
-        offer("Remove drift", "detrend", lambda: {"channels": of.value})
+        offer(zero, "zero", lambda: {"channels": selection.value, "over": driving})
+        offer("Remove drift", "detrend", lambda: {"channels": selection.value})

@@ -34,20 +34,21 @@ CHANNELS = (
 """Channels that are offered; any other name can be typed."""
 
 ENCODINGS = ("utf-8", "cp1252", "utf-16", "cp932", "gb18030", "cp949")
-"""That are offered."""
+"""Encodings that are offered."""
 
 FIRST_LINES = 8
-"""Of a text that are shown."""
+"""Lines of a text that are shown."""
 
 LAYOUT = ("header", "skip", "encoding", "sheet")
-"""What the columns depend on."""
+"""Options that the columns of a file depend on."""
 
 SAMPLES = ("rate", "sample_time", "rest_length", "constants", "gaps", "join", "raw")
 """What else is chosen for a whole file; columns, units and calibrations are controls of the columns."""
 
-OF_COLUMNS = ("columns", "units", "calibration", "channels")
+COLUMN_OPTIONS = ("columns", "units", "calibration", "channels")
+"""Options that the controls of the columns state."""
 
-FIELD = "dense outlined debounce=600"
+FIELD_PROPS = "dense outlined debounce=600"
 
 
 @dataclass
@@ -100,16 +101,15 @@ class Form:
                 columns = columns_of(self.path, self.reading)
         if self.columns and [c.seen.header for c in self.columns] == [c.header for c in columns]:
             return False
-        units, lines = self.reading.units, self.reading.lines
-        kept = None if self.reading.channels is None else {"time", *self.reading.channels}
-        self.columns = [
-            Column(one, of, units.get(of, one.unit), *lines.get(of, (1.0, 0.0)))
-            for one, of in ((one, one.channel) for one in columns)
-        ]
-        for column in self.columns:
-            if kept is not None and column.channel not in kept:
-                column.channel = ""
+        self.columns = [self._column(seen) for seen in columns]
         return True
+
+    def _column(self, seen: Seen) -> Column:
+        """Return the controls of a column, as the reading states it."""
+        name, reading = seen.channel, self.reading
+        unit = reading.units.get(name, seen.unit)
+        used = reading.channels is None or name in ("time", *reading.channels)
+        return Column(seen, name if used else "", unit, *reading.lines.get(name, (1.0, 0.0)))
 
     def stated(self) -> Reading:
         """Return the reading that the controls state; `DataError` if they contradict each other."""
@@ -118,7 +118,7 @@ class Form:
             self.columns = []  # others: what was stated of these is void
             return plain
         if not self.columns:
-            named = {name: getattr(self.reading, name) for name in OF_COLUMNS}
+            named = {name: getattr(self.reading, name) for name in COLUMN_OPTIONS}
             return replace(plain, **named)
         used = [(one.channel, one) for one in self.columns if one.channel]
         channel, count = Counter(name for name, _ in used).most_common(1)[0] if used else ("", 0)
@@ -172,60 +172,80 @@ async def ask(
 
     That is a coroutine function, called also with whether ``others`` (empty for none) are read so, too.
     """
-    form, one = Form(path, reading), asyncio.Lock()
+    form = Form(path, reading)
     await asyncio.to_thread(form.look)
-
-    async def again() -> None:
-        async with one:
-            if await asyncio.to_thread(form.look):
-                columns.refresh()
-        understood.refresh()
-        button.set_enabled(form.error is None)
-
-    async def finish() -> None:
-        await again()
-        if form.error is None:
-            await take(form.reading, all_so.value)
-            shown.close()
-
-    async def read_as(reading: Reading) -> None:
-        form.start(reading)
-        controls.refresh()
-        await again()
-        columns.refresh()
-
-    check = widgets.guarded(again)
-
-    def fields(names: Iterable[str], choices: Mapping[str, Iterable[str]] = forms.FIXED) -> None:
-        with ui.element("div").classes("fields"):
-            forms.fields(Reading, names, form.values, choices=choices, changed=check)
-
-    @ui.refreshable
-    def controls() -> None:
-        fields(SAMPLES)
-        names, choices = form.layout()
-        if names:
-            with widgets.details(
-                "Sheet" if names == ["sheet"] else "Lines and encoding of the text"
-            ):
-                numbered = [[str(at), line[:160]] for at, line in enumerate(form.lines(), start=1)]
-                if numbered:
-                    widgets.table(["", "First lines"], numbered)
-                fields(names, choices)
-
-    understood, columns = ui.refreshable(_understood), ui.refreshable(_columns)
-    with widgets.dialog(f"Import settings of {path.name}") as shown:
-        mark(shown, "importing")
-        understood(form, read_as)
-        columns(form, check)
-        controls()
+    with widgets.dialog(f"Import settings of {path.name}") as window:
+        mark(window, "importing")
+        settings = _Settings(form)
+        settings.show()
         with widgets.row(classes="spread"):
-            widgets.button("As found", partial(read_as, UNTOUCHED))
+            widgets.button("As found", partial(settings.read_as, UNTOUCHED))
             ui.space()
-            all_so = mark(ui.checkbox(others, value=bool(others) and ticked), "others")
-            all_so.set_visibility(bool(others))
-            button = mark(widgets.primary(verb, finish), "import")
-            button.set_enabled(form.error is None)
+            tick = mark(ui.checkbox(others, value=bool(others) and ticked), "others")
+            tick.set_visibility(bool(others))
+
+            async def finish() -> None:
+                await settings.read_again()
+                if form.error is None:
+                    await take(form.reading, tick.value)
+                    window.close()
+
+            settings.button = mark(widgets.primary(verb, finish), "import")
+            settings.button.set_enabled(form.error is None)
+
+
+class _Settings:
+    """The controls of a form and what they make of its file, which is read again at each change."""
+
+    def __init__(self, form: Form) -> None:
+        self.form = form
+        self.button: Any = None
+        self._reading = asyncio.Lock()
+        self._check = widgets.guarded(self.read_again)
+        self._result, self._columns = ui.refreshable(_understood), ui.refreshable(_columns)
+        self._controls = ui.refreshable(self._show_controls)
+
+    def show(self) -> None:
+        """Build all three parts: what was read, its columns, and the settings of the whole file."""
+        self._result(self.form, self.read_as)
+        self._columns(self.form, self._check)
+        self._controls()
+
+    async def read_again(self) -> None:
+        """Read the file as the controls say, and show what comes of it."""
+        async with self._reading:
+            if await asyncio.to_thread(self.form.look):
+                self._columns.refresh()
+        self._result.refresh()
+        if self.button is not None:
+            self.button.set_enabled(self.form.error is None)
+
+    async def read_as(self, reading: Reading) -> None:
+        """Begin again with other settings."""
+        self.form.start(reading)
+        self._controls.refresh()
+        await self.read_again()
+        self._columns.refresh()
+
+    def _show_controls(self) -> None:
+        self._fields(SAMPLES)
+        names, choices = self.form.layout()
+        if not names:
+            return
+        title = "Sheet" if names == ["sheet"] else "Lines and encoding of the text"
+        with widgets.details(title):
+            numbered = [
+                [str(row), line[:160]] for row, line in enumerate(self.form.lines(), start=1)
+            ]
+            if numbered:
+                widgets.table(["", "First lines"], numbered)
+            self._fields(names, choices)
+
+    def _fields(
+        self, names: Iterable[str], choices: Mapping[str, Iterable[str]] = forms.NO_CHOICES
+    ) -> None:
+        with ui.element("div").classes("fields"):
+            forms.fields(Reading, names, self.form.values, choices=choices, changed=self._check)
 
 
 def _understood(form: Form, read_as: Callable[[Reading], Any]) -> None:
@@ -253,7 +273,7 @@ def _understood(form: Form, read_as: Callable[[Reading], Any]) -> None:
 
 
 def summary(recording: Recording) -> str:
-    """Return what a recording is, in a line."""
+    """Return samples, duration, rate and ranges of a recording in a line."""
     time = f"{recording.n_samples} samples"
     if recording.sample_time is not None:
         time += f", {recording.duration or 0:.4g} s at {1 / recording.sample_time:.4g} Hz"
@@ -270,7 +290,7 @@ def _columns(form: Form, check: Callable[[], Any]) -> None:
 
     def cells(column: Column) -> list[Any]:
         def bound(made: Any, name: str, label: str, width: int) -> None:
-            made.bind_value(column, name).on_value_change(check).props(FIELD)
+            made.bind_value(column, name).on_value_change(check).props(FIELD_PROPS)
             widgets.labelled(made, label).style(f"width: {width}px; min-width: 0")
 
         def channel() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from nicegui import ui
 
 from mckibben.app import forms, widgets
-from mckibben.app.later import later
+from mckibben.app.background import later
 from mckibben.app.modelling import last_plan, plan, restored
 from mckibben.app.pages import parts
 from mckibben.app.state import State, view
@@ -29,10 +29,10 @@ from mckibben.report.figures import draw
 TITLE = "Look"
 ICON = "insights"
 
-DRAWN = 3
+RECORDINGS_DRAWN = 3
 """Recordings that are drawn at first."""
 
-MOST = 6
+MOST_CHANNELS = 6
 """Channels that are drawn over time together."""
 
 VIEWS = {"loop": "Loop", "time": "Over time", "spectrum": "Spectrum"}
@@ -65,25 +65,25 @@ def content(state: State) -> None:
             ui.link("Add recordings, or choose their inputs and outputs →", "/")
         return
     sides, runs = state.sides, [*used.values()]
-    found = coupling(runs, sides.inputs, sides.outputs)
-    every = [(given, wanted) for given in sides.inputs for wanted in sides.outputs]
-    pair, pairs = state.chosen.get("look.pair"), found.pairs(runs)
-    pair = pair if pair in [*every, *pairs] else pairs[0]
+    effects = coupling(runs, sides.inputs, sides.outputs)
+    all_pairs = [(driving, driven) for driving in sides.inputs for driven in sides.outputs]
+    pair, pairs = state.chosen.get("look.pair"), effects.pairs(runs)
+    pair = pair if pair in [*all_pairs, *pairs] else pairs[0]
     shown = [name for name in state.chosen.get("look.shown", []) if name in used]
-    shown = shown or [*used][:DRAWN]
+    shown = shown or [*used][:RECORDINGS_DRAWN]
     with ui.element("div").classes("columns"):
         with ui.element("div").classes("stack"):
             with widgets.card("Recordings"):
                 _recordings(state, used, shown)
-                for name in unexplained(runs, found):
+                for name in unexplained(runs, effects):
                     text = f"The inputs explain hardly any of {name}: are these its inputs?"
                     mark(ui.label(text).classes("error"), "unexplained")
             with widgets.card("Characterization" + f": {pair[1]}" * (len(sides.outputs) > 1)):
                 _words(state, runs, sides, pair)
         with ui.element("div").classes("stack"):
-            if len(every) > 1:
+            if len(all_pairs) > 1:
                 with widgets.card("Effects of inputs on outputs"):
-                    _coupling(state, found, pair)
+                    _coupling(state, effects, pair)
             with widgets.card():
                 _figure(state, [used[name] for name in shown], sides, pair)
             with widgets.card("What to record next"):
@@ -101,18 +101,19 @@ def _recordings(state: State, used: dict[str, Recording], shown: list[str]) -> N
     roles = {entry.name: entry.role for entry in state.workspace.entries()}
 
     def tick(name: str, event: Any) -> None:
-        chosen = [n for n in used if (event.value if n == name else n in shown)]
-        _choose(state, "look.shown", chosen)
+        names = [n for n in used if (event.value if n == name else n in shown)]
+        _choose(state, "look.shown", names)
 
     def box(name: str) -> None:
-        found = ui.checkbox(name, value=name in shown, on_change=partial(tick, name))
-        mark(found.props("dense"), f"show-{name}")
+        element = ui.checkbox(name, value=name in shown, on_change=partial(tick, name))
+        mark(element.props("dense"), f"show-{name}")
 
     def chip(role: str) -> None:
         ui.label(role.capitalize()).classes(f"chip {role}")
 
     lengths = [
-        f"{r.duration:.4g} s" if r.sample_time else f"{len(r)} samples" for r in used.values()
+        f"{run.duration:.4g} s" if run.sample_time else f"{len(run)} samples"
+        for run in used.values()
     ]
     rows = [
         [partial(box, name), partial(chip, roles[name]), length]
@@ -121,25 +122,31 @@ def _recordings(state: State, used: dict[str, Recording], shown: list[str]) -> N
     widgets.table(["Shown", "Role", "Length"], rows)
 
 
-def _coupling(state: State, found: Coupling, pair: Pair) -> None:
+def _coupling(state: State, effects_of: Coupling, pair: Pair) -> None:
     """Show how far every input moves every output; a click shows their loop."""
 
-    def cell(given: str, wanted: str, effect: float, unit: str) -> None:
+    def cell(driving: str, driven: str, effect: float, unit: str) -> None:
         text = f"{number(effect, 2)}\xa0{unit}" if np.isfinite(effect) else "loop"
-        button = widgets.button(text, partial(_choose, state, "look.pair", (given, wanted)))
-        chosen = "unelevated" if (given, wanted) == pair else "flat"
-        widgets.labelled(button, f"{wanted} over {given}").props(chosen, remove="flat")
-        mark(button, f"pair-{given}-{wanted}")
+        button = widgets.button(text, partial(_choose, state, "look.pair", (driving, driven)))
+        chosen = "unelevated" if (driving, driven) == pair else "flat"
+        widgets.labelled(button, f"{driven} over {driving}").props(chosen, remove="flat")
+        mark(button, f"pair-{driving}-{driven}")
 
     rows: list[list[Any]] = []
-    each = zip(found.outputs, found.effects.tolist(), found.units, found.explained, strict=True)
-    for wanted, effects, unit, share in each:
+    rows_of_effects = zip(
+        effects_of.outputs,
+        effects_of.effects.tolist(),
+        effects_of.units,
+        effects_of.explained,
+        strict=True,
+    )
+    for driven, effects, unit, share in rows_of_effects:
         cells = [
-            partial(cell, given, wanted, effect, unit)
-            for given, effect in zip(found.inputs, effects, strict=True)
+            partial(cell, driving, driven, effect, unit)
+            for driving, effect in zip(effects_of.inputs, effects, strict=True)
         ]
-        rows.append([wanted, *cells, f"{100 * max(share, 0):.0f} %"])
-    mark(widgets.table(["", *found.inputs, "Explained"], rows), "coupling")
+        rows.append([driven, *cells, f"{100 * max(share, 0):.0f} %"])
+    mark(widgets.table(["", *effects_of.inputs, "Explained"], rows), "coupling")
     ui.label(
         "Effect of each input over its whole range on an output, by linear regression on all inputs. "
         "The rest, up to 100 %, is nonlinear, hysteretic or dynamic. Choose a cell to see its loop."
@@ -147,18 +154,20 @@ def _coupling(state: State, found: Coupling, pair: Pair) -> None:
 
 
 def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
-    (given, wanted), kind = pair, state.chosen.get("look.view", "loop")
-    shared = [name for name in runs[0].channels if all(name in run for run in runs)]
-    named = [n for n in (*sides.inputs, *sides.outputs, *sides.further) if n in shared]
-    channels = [*dict.fromkeys([given, wanted, *(named if len(named) <= MOST else ())])]
+    (driving, driven), kind = pair, state.chosen.get("look.view", "loop")
+    common = [name for name in runs[0].channels if all(name in run for run in runs)]
+    modelled = [n for n in (*sides.inputs, *sides.outputs, *sides.further) if n in common]
+    channels = [
+        *dict.fromkeys([driving, driven, *(modelled if len(modelled) <= MOST_CHANNELS else ())])
+    ]
     with widgets.row(classes="spread"):
-        ui.label(f"{wanted} over {given}").classes("subtitle")
+        ui.label(f"{driven} over {driving}").classes("subtitle")
         toggle = ui.toggle(VIEWS, value=kind).props("no-caps unelevated dense")
         toggle.on_value_change(lambda event: _choose(state, "look.view", event.value))
     if kind != "loop":
         drawing = draw(runs, kind, channels=channels)
     else:
-        drawing = draw(runs, "loop", input=given, output=wanted)
+        drawing = draw(runs, "loop", input=driving, output=driven)
     for plot in widgets.plot(drawing, height=360 if kind == "loop" else 130 + 90 * len(channels)):
         mark(plot, f"look-{kind}")
     if drawing.note:
@@ -167,46 +176,46 @@ def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) ->
 
 def _words(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
     """Show the characterization: a few sentences, and all numbers behind a fold-out."""
-    others = tuple(n for n in (*sides.inputs, *sides.further) if n != pair[0])
+    scheduling = tuple(n for n in (*sides.inputs, *sides.further) if n != pair[0])
     modelled = {*sides.inputs, *sides.outputs, *sides.further}
     dropped = {*by_name(runs)[0]} - modelled  # no inputs, as was chosen
     runs = [run.select([name for name in run if name not in dropped]) for run in runs]
-    key = "characterization", state.workspace.digest(), pair, others, tuple(sorted(dropped))
-    make = partial(characterize, runs, *pair, scheduling=others)
+    key = "characterization", state.workspace.digest(), pair, scheduling, tuple(sorted(dropped))
+    make = partial(characterize, runs, *pair, scheduling=scheduling)
     with mark(ui.element("div"), "words"):
-        later(key, make, lambda found: widgets.items(results.characterization(found)), height=120)
+        later(key, make, lambda result: widgets.items(results.characterization(result)), height=120)
 
 
 def _gaps(state: State, sides: Channels, pair: Pair) -> None:
     """Show what the recordings cannot identify."""
     train, test = state.workspace.train_and_test()
     inputs = sides.inputs if len(sides.inputs) > 1 else (pair[0],)
-    none = [Text(["The recordings have no data gaps."])]
+    no_gaps = [Text(["The recordings have no data gaps."])]
     key = "gaps", state.workspace.digest(), inputs, sides.outputs
     make = partial(data_gaps, train or test, inputs, sides.outputs, tests=test if train else ())
     with mark(ui.element("div"), "gaps"):
-        later(key, make, lambda found: widgets.items(results.data_gaps(found) or none))
+        later(key, make, lambda gaps: widgets.items(results.data_gaps(gaps) or no_gaps))
 
 
 def _planned(state: State) -> None:
     """Offer to plan the next recording, and show the plan."""
-    made, jobs = last_plan(state.workspace), parts.jobs_of(state, ["plan"])
+    last, jobs = last_plan(state.workspace), parts.jobs_of(state, ["plan"])
     for job in jobs:
         parts.show_job(state, job)
     if any(job.active for job in jobs):
         return
-    if made:
-        items = restored(made[0])
+    if last:
+        items = restored(last[0])
         with mark(ui.element("div").classes("stack"), "planned"):
             ui.label("Planned").classes("subtitle")
-            widgets.items([one for one in items if isinstance(one, Text)])
+            widgets.items([item for item in items if isinstance(item, Text)])
             with widgets.details("Its steps, and the gaps they close"):
-                widgets.items([one for one in items if not isinstance(one, Text)])
+                widgets.items([item for item in items if not isinstance(item, Text)])
     with widgets.row():
-        text = "Plan another" if made else "Plan the next recording"
+        text = "Plan another" if last else "Plan the next recording"
         mark(widgets.button(text, partial(_ask, state), "edit_calendar"), "plan")
-        if made:
-            download = partial(widgets.download, made[1])
+        if last:
+            download = partial(widgets.download, last[1])
             mark(widgets.button("Download its commands (CSV)", download, "download"), "commands")
 
 

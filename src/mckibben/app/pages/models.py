@@ -10,11 +10,12 @@ import numpy as np
 from nicegui import ui
 
 from mckibben.app import modelling, widgets
-from mckibben.app.later import later
-from mckibben.app.pages import choosing, parts
+from mckibben.app.background import later
+from mckibben.app.pages import model_choice, parts
 from mckibben.app.state import State, view
 from mckibben.app.terms import message_of
 from mckibben.app.widgets import mark
+from mckibben.arrays import Array
 from mckibben.channels import Channels
 from mckibben.diagnosis.coupling import coupling
 from mckibben.diagnosis.description import ModelDescription, describe
@@ -35,12 +36,12 @@ FIGURES = {"loop": "loops", "time": "fit", "residual": "residuals"}
 TABS = (*FIGURES, "parameters", "check")
 
 HEIGHT = 380
-"""Of a figure [px]."""
+"""Height of a figure [px]."""
 
-ENDED = 6
+MOST_ENDED = 6
 """Fits that did not work that are shown."""
 
-FIRST = ("chosen", "test")
+BOARD_COLUMNS = ("chosen", "test")
 """Columns of the leaderboard; the report has all."""
 
 OTHER_DATA = (
@@ -58,7 +59,7 @@ def build(state: State) -> None:
             widgets.heading(
                 "Models", "Fitted to the recordings for training, tested on others in simulation."
             )
-            fit = widgets.primary("Fit models", partial(choosing.choose, state), "add")
+            fit = widgets.primary("Fit models", partial(model_choice.choose, state), "add")
             mark(fit, "fit-models")
         preselect(state)
         fits(state)
@@ -104,12 +105,15 @@ def fits(state: State) -> None:
                     again = partial(parts.again, state, ended, modelling.fit)
                     mark(widgets.button("Do again", again, "replay"), "again")
                     widgets.button("Clear", partial(parts.end, state, ended))
-        for job in [*(job for job in active if job.state == "running"), *ended[: -ENDED - 1 : -1]]:
+        for job in [
+            *(job for job in active if job.state == "running"),
+            *ended[: -MOST_ENDED - 1 : -1],
+        ]:
             title = f"{full_name(job.title)} · {job.title}"
             parts.show_job(state, job, title)
         if waiting := [job.title for job in active if job.state == "waiting"]:
-            more = f" and {len(waiting) - ENDED} more" if len(waiting) > ENDED else ""
-            ui.label(f"Next: {', '.join(waiting[:ENDED])}{more}").classes("muted")
+            more = f" and {len(waiting) - MOST_ENDED} more" if len(waiting) > MOST_ENDED else ""
+            ui.label(f"Next: {', '.join(waiting[:MOST_ENDED])}{more}").classes("muted")
 
 
 def _empty(state: State) -> None:
@@ -144,20 +148,20 @@ def board(state: State) -> None:
     with widgets.card("Leaderboard") as card:
         mark(card, "leaderboard")
         if rows:
-            every = columns_of(rows, rows[0]["unit"], (), rows[0]["chosen_by"])
-            shown = [one for one in every if one.key in FIRST]
+            columns = columns_of(rows, rows[0]["unit"], (), rows[0]["chosen_by"])
+            shown = [column for column in columns if column.key in BOARD_COLUMNS]
             lines = []
             for row in rows:
-                values = [one.value(row) for one in shown]
+                values = [column.value(row) for column in shown]
                 texts = ["–" if value is None else value for value in values]
                 lines.append([partial(_title, row), *texts])
-            _choosable(state, ["Model", *(one.label for one in shown)], lines, compared)
+            _choosable(state, ["Model", *(column.label for column in shown)], lines, compared)
             _remarks(rows, shown)
         else:
             ui.label("No model of these inputs and outputs is fitted yet.").classes("muted")
         if others:
-            about = {row["name"]: row for row in state.workspace.results()}
-            rows = [about.get(name, {}) for name in others]
+            results = {row["name"]: row for row in state.workspace.results()}
+            rows = [results.get(name, {}) for name in others]
             words = [f"{row.get('output', '')} {row.get('input', '')}" for row in rows]
             with widgets.details(f"{len(others)} of other channels, or not fitted here"):
                 lines = [list(line) for line in zip(others, words, strict=True)]
@@ -173,25 +177,28 @@ def _choosable(state: State, heads: list[str], lines: list[list[Any]], names: li
     widgets.table(heads, lines, chosen=chosen, on_choose=pick)
 
 
-def _title(row: Json) -> None:
+def _title(result: Json) -> None:
     with ui.element("div"):
-        ui.label(full_name(row["model"]) + "*" * bool(row.get("doubted")))
-        ui.label(row["name"] + " · other data" * (not row["current"])).classes("muted")
+        ui.label(full_name(result["model"]) + "*" * bool(result.get("doubted")))
+        ui.label(result["name"] + " · other data" * (not result["current"])).classes("muted")
 
 
 def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:
-    first = rows[0]
-    if first["current"] and (mean := first.get("constant")):
-        errors = [f"{one.heading} {typeset(one.text(mean))} {one.unit}".rstrip() for one in shown]
+    best = rows[0]
+    if best["current"] and (constant := best.get("constant")):
+        errors = [
+            f"{column.heading} {typeset(column.text(constant))} {column.unit}".rstrip()
+            for column in shown
+        ]
         text = f"The mean of the output, to compare with: {', '.join(errors)}."
         ui.label(text).classes("muted")
     if why := modelling.against(rows):
         with mark(ui.element("div").classes("error"), "not-recommended"):
             ui.icon("info_outline")
             ui.label(typeset_within(message_of(why)))
-    by = CHOICES[first["chosen_by"]]
-    notes = [f"Ordered by {by[0]} ({by[1]}), as the test is to judge, not to choose."]
-    notes += [f"{first['split'][:1].upper()}{first['split'][1:]}."]
+    choice = CHOICES[best["chosen_by"]]
+    notes = [f"Ordered by {choice[0]} ({choice[1]}), as the test is to judge, not to choose."]
+    notes += [f"{best['split'][:1].upper()}{best['split'][1:]}."]
     notes += dict.fromkeys(why for row in rows for why in row.get("shared", ()))
     notes += [f"* {CAREFUL}."] * any(row.get("doubted") for row in rows)
     notes += [OTHER_DATA] * (not all(row["current"] for row in rows))
@@ -231,8 +238,10 @@ def closer(state: State) -> None:
                 mark(ui.tab(key, key.capitalize()), f"tab-{key}")
         if tab == "check":
             _check(state, row)
+        elif tab == "parameters":
+            _show_parameters(state, sides)
         else:
-            _shown(state, tab, sides, row)
+            _show_figure(state, tab, sides)
 
 
 def _summary(row: Json) -> str:
@@ -242,96 +251,122 @@ def _summary(row: Json) -> str:
     text = f"Test RMSE {number(test['rmse'], 3)} {unit}"
     if ends := test.get("rmse_interval"):
         text += f" ({number(ends[0], 2)} to {number(ends[1], 2)} in 95 %)"
-    inverse = choosing.INVERSES.get(row.get("inverse") or "", "")
+    inverse = model_choice.INVERSES.get(row.get("inverse") or "", "")
     about = [text, inverse, f"{row.get('n_parameters')} parameters"]
     return typeset_within(" · ".join(filter(None, about)))
 
 
 def _delete(state: State) -> None:
-    name = state.model
+    model = state.model
 
     def delete() -> None:
         for kind in ("models", "results"):
-            state.workspace.delete(kind, name)
+            state.workspace.delete(kind, model)
         state.chosen.pop("models.picked", None)
         state.changed()
 
     text = "The model and its results are deleted; what was exported of it stays."
-    widgets.sure(f"Delete {name}?", text, delete)
+    widgets.sure(f"Delete {model}?", text, delete)
 
 
-def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
-    """Show parameters, or the model on a recording."""
-    workspace, name = state.workspace, state.model
-    block = workspace.model(name)
-    inputs, outputs = ([c.name for c in side] for side in (block.inputs, block.outputs))
-    every = modelling.parts(workspace, sides).items()
-    runs = {key: one for key, one in every if {*inputs, *outputs} <= {*one[0].channels}}
+def _show_parameters(state: State, sides: Channels) -> None:
+    """Show equations and parameters of the chosen model, from the recordings that it was fitted to."""
+    workspace, runs = state.workspace, _drawable_runs(state, sides)
     if not runs:
-        text = f"No recording has {', '.join(sorted({*inputs, *outputs}))}."
-        ui.label(text).classes("muted")
         return
-    train = workspace.with_role("train")
-    key = workspace.digest(), parts.stamps(workspace, "models", of=name)
-    if tab == "parameters":
-        fitted = [run for run in train if {*inputs, *outputs} <= {*run.channels}]
-        on = fitted or [run for run, *_ in runs.values()]
-        describing = partial(describe, block, on, fitted=bool(fitted))
-        later(("parameters", *key), describing, _parameters, height=HEIGHT)
+    block = workspace.model(state.model)
+    names = {channel.name for channel in (*block.inputs, *block.outputs)}
+    fitted = [run for run in workspace.with_role("train") if names <= {*run.channels}]
+    on = fitted or [run for run, *_ in runs.values()]
+    describing = partial(describe, block, on, fitted=bool(fitted))
+    later(("parameters", *_model_key(state)), describing, _parameters, height=HEIGHT)
+
+
+def _show_figure(state: State, tab: str, sides: Channels) -> None:
+    """Draw the chosen model, and others beside it, on a recording."""
+    workspace, name = state.workspace, state.model
+    runs = _drawable_runs(state, sides)
+    if not runs:
         return
-
-    def choice(what: str, label: str, options: dict[str, str]) -> str:
-        if len(options) == 1:
-            return next(iter(options))
-        return parts.select(state, f"models.closer-{what}", options, label, closer.refresh)
-
+    block = workspace.model(name)
+    outputs = [channel.name for channel in block.outputs]
     with widgets.row():
         uses = {key: f"{key} ({use})" for key, (*_, use) in runs.items()}
-        run, tested, _ = runs[choice("run", "Recording", uses)]
-        wanted = choice("output", "Output", {each: each for each in outputs})
-        beside = _beside(state)
-    driving = [each for each in sides.inputs if each in inputs] or inputs[:1]
-    pair = coupling([run], driving, [wanted]).pairs([run])[0]
+        run, tested, _ = runs[_select(state, "run", "Recording", uses)]
+        output = _select(state, "output", "Output", {key: key for key in outputs})
+        models = [name, *_beside(state)]
+    inputs = [channel.name for channel in block.inputs]
+    driving = [key for key in sides.inputs if key in inputs] or inputs[:1]
+    pair = coupling([run], driving, [output]).pairs([run])[0]
 
-    def show(modelled: Mapping[str, Recording]) -> None:
-        curves = {each: simulated[wanted] for each, simulated in modelled.items()}
+    def simulate() -> dict[str, Recording]:
+        return {model: workspace.model(model).simulate(run) for model in models}
+
+    def show(simulated: Mapping[str, Recording]) -> None:
+        curves = {model: recording[output] for model, recording in simulated.items()}
         plots = interactive.plots(subjects.against(FIGURES[tab], run, pair, curves, tested))
-        rows, unit = slice(tested or 0, None), run.units[wanted]
-        what = f"{'the held-out part of ' if tested else ''}{run.name}"
-        errors = [
-            f"{each} {number(np.sqrt(np.mean((y - run[wanted])[rows] ** 2)), 3)} {unit}".rstrip()
-            for each, y in curves.items()
-        ]
-        text = [f"RMSE of {wanted} on {what}: {', '.join(errors)}."]
         with ui.element("div").classes("columns-even" if len(plots) > 1 else "stack"):
             for plot in plots:
                 mark(widgets.plot_of(plot, height=HEIGHT), f"closer-{tab}")
-        ui.label(typeset_within(" ".join(text))).classes("muted")
+        ui.label(_errors_text(run, output, curves, tested)).classes("muted")
 
-    def free() -> dict[str, Recording]:
-        return {each: workspace.model(each).simulate(run) for each in (name, *beside)}
+    later(("free", *_model_key(state), *models[1:], run.name), simulate, show, height=HEIGHT)
 
-    later(("free", *key, *beside, run.name), free, show, height=HEIGHT)
+
+def _drawable_runs(state: State, sides: Channels) -> dict[str, tuple[Recording, int | None, str]]:
+    """Return the recordings with all channels of the chosen model; say so where there are none."""
+    block = state.workspace.model(state.model)
+    names = {channel.name for channel in (*block.inputs, *block.outputs)}
+    parts_of_data = modelling.parts(state.workspace, sides).items()
+    runs = {key: part for key, part in parts_of_data if names <= {*part[0].channels}}
+    if not runs:
+        ui.label(f"No recording has {', '.join(sorted(names))}.").classes("muted")
+    return runs
+
+
+def _model_key(state: State) -> tuple[Any, ...]:
+    """Return what all that is drawn of the chosen model depends on."""
+    return state.workspace.digest(), parts.stamps(state.workspace, "models", of=state.model)
+
+
+def _select(state: State, what: str, label: str, options: dict[str, str]) -> str:
+    """Let one of several options be chosen; a single one needs no control."""
+    if len(options) == 1:
+        return next(iter(options))
+    return parts.select(state, f"models.closer-{what}", options, label, closer.refresh)
+
+
+def _errors_text(
+    run: Recording, output: str, curves: Mapping[str, Array], tested: int | None
+) -> str:
+    """Return the RMSE of every model from the first sample that is tested on, in a sentence."""
+    rows, unit = slice(tested or 0, None), run.units[output]
+    errors = [
+        f"{model} {number(np.sqrt(np.mean((y - run[output])[rows] ** 2)), 3)} {unit}".rstrip()
+        for model, y in curves.items()
+    ]
+    on = f"{'the held-out part of ' if tested else ''}{run.name}"
+    return typeset_within(f"RMSE of {output} on {on}: {', '.join(errors)}.")
 
 
 def _beside(state: State) -> list[str]:
     """Let other models of the same channels be drawn beside the chosen one; return which are."""
     rows = modelling.comparable(state.workspace, state.sides)
     others = [row["name"] for row in rows if row["name"] != state.model]
-    kept = [name for name in state.chosen.get("models.beside", ()) if name in others]
+    names_beside = [name for name in state.chosen.get("models.beside", ()) if name in others]
 
     def draw_beside(names: list[str]) -> None:
         state.chosen["models.beside"] = names
         closer.refresh()
 
     if others:
-        mark(parts.several("Beside", others, kept, draw_beside), "closer-beside")
-    return kept
+        mark(parts.several("Beside", others, names_beside, draw_beside), "closer-beside")
+    return names_beside
 
 
-def _parameters(found: ModelDescription) -> None:
+def _parameters(description: ModelDescription) -> None:
     with mark(ui.element("div").classes("stack"), "parameters"):
-        widgets.items(results.description(found))
+        widgets.items(results.description(description))
 
 
 CHECK = (
@@ -341,19 +376,19 @@ CHECK = (
 
 
 def _check(state: State, row: Json) -> None:
-    found: Mapping[str, Any] = row.get("check") or {}
-    if not found:
+    content: Mapping[str, Any] = row.get("check") or {}
+    if not content:
         _work(state, modelling.check, "Check it", "fact_check", CHECK)
         return
-    items = modelling.restored(found)
+    items = modelling.restored(content)
     with mark(ui.element("div").classes("stack"), "verdict"):
-        widgets.items([one for one in items if not isinstance(one, Figure)])
-    if drawn := [one for one in items if isinstance(one, Figure)]:
+        widgets.items([item for item in items if not isinstance(item, Figure)])
+    if figures := [item for item in items if isinstance(item, Figure)]:
         with widgets.details("What the residual follows"):
-            widgets.items(drawn)
-    on = "the test recordings" if found["on"] == "test" else "its training recordings"
-    old = "" if found["data"] == state.workspace.digest() else ", as they were"
-    ui.label(f"Checked on {on}{old}.").classes("muted")
+            widgets.items(figures)
+    data_used = "the test recordings" if content["on"] == "test" else "its training recordings"
+    outdated = "" if content["data"] == state.workspace.digest() else ", as they were"
+    ui.label(f"Checked on {data_used}{outdated}.").classes("muted")
     _work(state, modelling.check, "Check again", "fact_check")
 
 
@@ -366,15 +401,15 @@ def _work(
 ) -> None:
     """Show a button for a job on the model, and what it is for; while it runs, that it does."""
     jobs = parts.jobs_of(state, [work.__name__])
-    mine = [job for job in jobs if job.given.get("name") == state.model]
+    own_jobs = [job for job in jobs if job.given.get("name") == state.model]
 
     def start() -> None:
         state.jobs.forget_ended(work.__name__)
         state.jobs.submit(work, f"{work.__name__} {state.model}", name=state.model)
         state.changed()
 
-    for job in mine[-1:]:
+    for job in own_jobs[-1:]:
         parts.show_job(state, job)
-    if not any(job.active for job in mine):
+    if not any(job.active for job in own_jobs):
         with widgets.empty(icon, *about) if about else widgets.row():
             mark(widgets.button(text, start, icon), work.__name__)

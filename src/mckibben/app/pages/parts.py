@@ -26,34 +26,34 @@ def steady(
     those of the model), or jobs. Fields in it outlive what happens else, and no click on it is lost.
     """
 
-    def now(state: State) -> Any:
+    def current_state(state: State) -> Any:
         files = stamps(state.workspace, *kinds, of=state.model if own else "")
         going = [(job.name, job.state) for job in jobs_of(state, jobs)]
         sides = state.model, (*state.inputs,), (*state.outputs,), state.load
         return widgets.theme.dark, sides, state.workspace.digest(), files, going
 
     def decorate(build: Callable[[State], None]) -> Any:
-        known: list[Any] = [None]
+        last_state: list[Any] = [None]
 
         @ui.refreshable
         @widgets.shielded
         def part(state: State) -> None:
             if state.ready.is_set():
                 build(state)
-                known[0] = now(state)
+                last_state[0] = current_state(state)
 
         @view
         def watch(state: State) -> None:
-            if known[0] != now(state):
+            if last_state[0] != current_state(state):
                 part.refresh()
 
         @wraps(build)
-        def made(state: State) -> None:
+        def build_part(state: State) -> None:
             part(state)
             watch(state)
 
-        made.refresh = part.refresh  # type: ignore[attr-defined]
-        return made
+        build_part.refresh = part.refresh  # type: ignore[attr-defined]
+        return build_part
 
     return decorate
 
@@ -94,13 +94,13 @@ def several(
 
     A chip that is removed is a change at once.
     """
-    chosen, is_open = [[*value]], [False]
+    last_choice, is_open = [[*value]], [False]
 
     def turn(now_open: bool) -> Any:
         is_open[0] = now_open
-        if not now_open and field.value != chosen[0]:
-            chosen[0] = [*field.value]
-            return changed(chosen[0])
+        if not now_open and field.value != last_choice[0]:
+            last_choice[0] = [*field.value]
+            return changed(last_choice[0])
         return None
 
     field = ui.select(options, value=[*value], multiple=True, label=label)
@@ -127,13 +127,13 @@ def warn_of_other_data(state: State, name: str) -> None:
 def select_model(state: State, names: Sequence[str], name: str = "model") -> None:
     """Let one of some models be chosen."""
 
-    def chosen(event: events.ValueChangeEventArguments[Any]) -> None:
+    def choose(event: events.ValueChangeEventArguments[Any]) -> None:
         state.model = str(event.value)
         state.changed()
 
     stale = state.workspace.on_other_data()
-    options = {one: f"{one} · other data" if one in stale else one for one in names}
-    field = ui.select(options, value=model_of(state, names), label="Model", on_change=chosen)
+    options = {model: f"{model} · other data" if model in stale else model for model in names}
+    field = ui.select(options, value=model_of(state, names), label="Model", on_change=choose)
     mark(field.props("dense outlined"), name)
 
 

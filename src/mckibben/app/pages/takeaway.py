@@ -8,11 +8,11 @@ from typing import Any
 
 from nicegui import ui
 
-from mckibben.app import following, forms, taking, widgets
+from mckibben.app import compensators, downloads, forms, widgets
+from mckibben.app.downloads import THINGS, Thing
 from mckibben.app.pages import parts
 from mckibben.app.pages.compensate import settings_of
 from mckibben.app.state import State, view
-from mckibben.app.taking import THINGS, Thing
 from mckibben.app.widgets import mark
 from mckibben.errors import MckibbenError
 
@@ -39,7 +39,7 @@ def page(state: State) -> None:
             widgets.empty("inventory_2", "Nothing to take away yet", text)
             return
         if models:
-            uses = following.uses(state.workspace, state.model)
+            uses = compensators.uses(state.workspace, state.model)
             if state.chosen.get("takeaway.of") != state.model:
                 state.chosen["takeaway.of"] = state.model
                 usual = state.chosen.get("compensate.form", "inverse")
@@ -48,25 +48,25 @@ def page(state: State) -> None:
             with widgets.row():
                 parts.select_model(state, models, "take-model")
                 again = state.changed, page.refresh
-                changed = lambda: [do() for do in again]  # noqa: E731
-                use = parts.select(state, "takeaway.take-use", uses, "Used as", changed)
-        muscle = bool(models) and following.is_balance(state.workspace, state.model)
+                on_change = lambda: [do() for do in again]  # noqa: E731
+                use = parts.select(state, "takeaway.take-use", uses, "Used as", on_change)
+        muscle = bool(models) and compensators.is_balance(state.workspace, state.model)
         rows = [
             [thing.title, thing.purpose, partial(_options, state, key, thing),
              partial(_button, state, key, thing)]
             for key, thing in THINGS.items()
             if (models or "{stem}" not in thing.file)
-            and (key != "ros2" or use in following.KINDS)
+            and (key != "ros2" or use in compensators.KINDS)
             and (key != "mjcf" or (use == "model" and muscle))
         ]  # fmt: skip
         mark(widgets.table(["", "What it is for", "", ""], rows), "things")
 
 
-def _of(state: State) -> dict[str, Any]:
+def _subject(state: State) -> dict[str, Any]:
     """Return what all things are of: model and what it is used as, and channels."""
     use = str(state.chosen.get("takeaway.take-use", "model"))
-    found = {"model": state.model, "use": use, "settings": settings_of(state, use)}
-    return found | {"inputs": [*state.inputs], "outputs": [*state.outputs], "load": state.load}
+    subject = {"model": state.model, "use": use, "settings": settings_of(state, use)}
+    return subject | {"inputs": [*state.inputs], "outputs": [*state.outputs], "load": state.load}
 
 
 def _options(state: State, key: str, thing: Thing) -> None:
@@ -90,14 +90,16 @@ def _button(state: State, key: str, thing: Thing) -> None:
     """Make the button that writes a thing in a job, and hands it over when it is done."""
 
     async def take() -> None:
-        values, of = state.chosen[f"takeaway.{key}"], _of(state)
+        values, subject = state.chosen[f"takeaway.{key}"], _subject(state)
         options = forms.given(thing.kind, values) if thing.kind else {}
-        stem = state.model if of["use"] == "model" else f"{state.model}-{of['use']}"
-        wish, _, ending = thing.file.format(stem=stem).rpartition(".")
-        file = f"{state.workspace.new_name('takeaway', wish, '.' + ending)}.{ending}"
+        stem = state.model if subject["use"] == "model" else f"{state.model}-{subject['use']}"
+        stem_wish, _, ending = thing.file.format(stem=stem).rpartition(".")
+        file = f"{state.workspace.new_name('takeaway', stem_wish, '.' + ending)}.{ending}"
         path = state.workspace.path("takeaway", file)
         path.unlink()  # only its name was reserved; exports replace what they wrote alone
-        job = state.jobs.submit(thing.work, file, file=file, options=options, of=of, **thing.more)
+        job = state.jobs.submit(
+            thing.work, file, file=file, options=options, of=subject, **thing.more
+        )
         while job.active:
             await asyncio.sleep(0.1)
         if job.state != "done":
@@ -112,9 +114,9 @@ def _button(state: State, key: str, thing: Thing) -> None:
 @view
 def script(state: State) -> None:
     """Show the script that does it all again."""
-    if not taking.fitted(state.workspace):
+    if not downloads.fitted(state.workspace):
         return
-    text = taking.script(state.workspace, _of(state))
+    text = downloads.script(state.workspace, _subject(state))
     with widgets.card("All of it as a script"):
         take = partial(ui.download.content, text, "script.py")
         mark(widgets.button("script.py", take, "download"), "take-script")

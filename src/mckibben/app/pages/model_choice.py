@@ -8,7 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from mckibben.app import modelling, widgets
-from mckibben.app.later import later
+from mckibben.app.background import later
 from mckibben.app.modelling import Offered
 from mckibben.app.state import State
 from mckibben.app.terms import message_of
@@ -39,23 +39,23 @@ def choose(state: State) -> None:
             mark(widgets.icon_button("close", "Close", drawer.close), "close-drawer")
         key = "offered", state.workspace.digest(), sides
         offer = partial(modelling.offered, state.workspace, sides)
-        later(key, offer, lambda offered: _Choice(state, sides, offered, drawer))
+        later(key, offer, lambda offered: _ModelChoice(state, sides, offered, drawer))
     drawer.on("hide", drawer.delete)
 
 
-class _Choice:
+class _ModelChoice:
     """What is ticked, and the controls that show it."""
 
     def __init__(self, state: State, sides: Channels, offered: Offered, drawer: Any) -> None:
         self.state, self.sides, self.offered, self.drawer = state, sides, offered, drawer
-        before = state.chosen.get("models.ticked", ())
-        self.ticked = [name for name in before if name in offered.models] or offered.quick
+        last_ticked = state.chosen.get("models.ticked", ())
+        self.ticked = [name for name in last_ticked if name in offered.models] or offered.quick
         self.boxes: dict[str, Any] = {}
-        told = f", given {', '.join(sides.further)}" if sides.further else ""
+        further = f", given {', '.join(sides.further)}" if sides.further else ""
         sets = {"Quick choice": offered.quick, "All": offered.models, "None": []}
         with ui.element("div").classes("stack scroll"):
             with ui.element("div"):
-                ui.label(f"{', '.join(sides.outputs)} over {', '.join(sides.inputs)}{told}")
+                ui.label(f"{', '.join(sides.outputs)} over {', '.join(sides.inputs)}{further}")
                 ui.label(f"{offered.split[:1].upper()}{offered.split[1:]}.").classes("muted")
             shared = ui.checkbox("Allow the same data in training and test").props("dense")
             shared.bind_value(state.chosen, "models.shared")
@@ -74,19 +74,19 @@ class _Choice:
         with widgets.row(classes="spread foot"):  # stays in sight
             self.count = ui.label().classes("muted")
             self.button = mark(widgets.primary("Fit", self._fit), "fit")
-        self._counted()
+        self._show_count()
 
     def _need(self, need: Need) -> None:
         with ui.element("div"):
             ui.label(need.title).classes("subtitle").props('role=heading aria-level="3"')
             ui.label(need.about).classes("muted")
-        first = {*self.offered.quick, *self.ticked} & {*need.models}
+        prominent = {*self.offered.quick, *self.ticked} & {*need.models}
         for model in need.models:
-            if model in first:
+            if model in prominent:
                 self._model(model)
-        if rest := [one for one in need.models if one not in first]:
-            with widgets.details(f"{len(rest)} more"):
-                for model in rest:
+        if others := [model for model in need.models if model not in prominent]:
+            with widgets.details(f"{len(others)} more"):
+                for model in others:
                     self._model(model)
 
     def _model(self, model: str) -> None:
@@ -111,9 +111,9 @@ class _Choice:
     def _tick(self, model: str, on: bool) -> None:
         self.ticked = [name for name in self.ticked if name != model] + [model] * on
         self.state.chosen["models.ticked"] = self.ticked
-        self._counted()
+        self._show_count()
 
-    def _counted(self) -> None:
+    def _show_count(self) -> None:
         n, seconds = len(self.ticked), sum(map(self.offered.seconds, self.ticked))
         self.count.set_text(f"Takes {_time(seconds / self.state.jobs.at_once)}" if n else "")
         self.button.set_text(f"Fit {n} model{'s' * (n != 1)}")
@@ -122,12 +122,12 @@ class _Choice:
     def _fit(self) -> None:
         """Start the fits, quick ones first."""
         sides, state = self.sides, self.state
-        given: dict[str, Any] = {"inputs": list(sides.inputs), "outputs": list(sides.outputs)}
-        given["load"] = state.load
-        given["allow_shared"] = bool(state.chosen.get("models.shared"))
+        settings: dict[str, Any] = {"inputs": list(sides.inputs), "outputs": list(sides.outputs)}
+        settings["load"] = state.load
+        settings["allow_shared"] = bool(state.chosen.get("models.shared"))
         state.jobs.forget_ended("fit")
         for model in sorted(self.ticked, key=self.offered.seconds):
-            state.jobs.submit(modelling.fit, model, model=model, **given)
+            state.jobs.submit(modelling.fit, model, model=model, **settings)
         self.drawer.close()
         state.chosen.pop("models.picked", None)
         state.changed()

@@ -6,8 +6,8 @@ from typing import Any
 
 from nicegui import events, run, ui
 
-from mckibben.app import following, widgets
-from mckibben.app.later import later
+from mckibben.app import compensators, loops, widgets
+from mckibben.app.background import later
 from mckibben.app.modelling import restored
 from mckibben.app.pages import parts
 from mckibben.app.state import State
@@ -21,41 +21,47 @@ from mckibben.report.drawing import Curve, Drawing, Panel, axis_label, over_time
 def force(state: State, names: list[str]) -> None:
     """Ask for a model that gives a force, and for a recording."""
     workspace, used = state.workspace, state.workspace.used()
-    block = following.made(workspace, parts.model_of(state, names), "force", {})
-    needed, given = ({channel.name for channel in side} for side in (block.inputs, block.outputs))
+    block = compensators.block_for_use(workspace, parts.model_of(state, names), "force", {})
+    inputs, estimates = (
+        {channel.name for channel in side} for side in (block.inputs, block.outputs)
+    )
     fitting = {
         entry.name: f"{entry.name} ({entry.role})"
         for entry in sorted(workspace.entries(), key=lambda entry: entry.role)
-        if entry.name in used and needed <= {*used[entry.name].channels}
+        if entry.name in used and inputs <= {*used[entry.name].channels}
     }
-    order = sorted(fitting, key=lambda name: not given <= {*used[name].channels})  # to compare with
+    order = sorted(
+        fitting, key=lambda name: not estimates <= {*used[name].channels}
+    )  # to compare with
     with widgets.card("Force from other channels"):
-        text = f"From {', '.join(sorted(needed))}. As JSON, C or FMU: under Take away."
+        text = f"From {', '.join(sorted(inputs))}. As JSON, C or FMU: under Take away."
         ui.label(text).classes("muted")
         with widgets.row(classes="fields"):
             parts.select_model(state, names)
             parts.warn_of_other_data(state, parts.model_of(state, names))
-            of = {name: fitting[name] for name in order}
-            parts.select(state, "compensate.recording", of, "Recording", estimated.refresh)
+            options = {name: fitting[name] for name in order}
+            parts.select(state, "compensate.recording", options, "Recording", estimated.refresh)
 
 
 @parts.steady("models", own=True)
 def estimated(state: State) -> None:
     """Show a force that is estimated over a recording, beside what was measured."""
     workspace, recording = state.workspace, str(state.chosen.get("compensate.recording") or "")
-    name = parts.model_of(state, following.having(workspace, "force"))
+    name = parts.model_of(state, compensators.models_usable_as(workspace, "force"))
 
-    def show(found: Any) -> None:
-        widgets.items(results.simulation(found))
-        run, panels = found.recording, []
-        for channel in following.made(workspace, name, "force", {}).outputs:
+    def show(simulation: Any) -> None:
+        widgets.items(results.simulation(simulation))
+        run, panels = simulation.recording, []
+        for channel in compensators.block_for_use(workspace, name, "force", {}).outputs:
             y = run[f"{channel.name}_model"]
             curves = [Curve(*over_time(run.time, y), "estimated", "series-1", "line")]
             label = axis_label(channel.name, channel.unit)
             if channel.name in run:
-                true = run[channel.name]
-                measured = Curve(*over_time(run.time, true), "measured", "measured", "broad")
-                error = Curve(*over_time(run.time, true - y), "error", "series-2", "line")
+                measured_force = run[channel.name]
+                measured = Curve(
+                    *over_time(run.time, measured_force), "measured", "measured", "broad"
+                )
+                error = Curve(*over_time(run.time, measured_force - y), "error", "series-2", "line")
                 panels.append(Panel("time [s]", label, (measured, *curves)))
                 label, curves = axis_label("error", channel.unit), [error]
             panels.append(Panel("time [s]", label, tuple(curves)))
@@ -66,7 +72,12 @@ def estimated(state: State) -> None:
         if recording:
             stamps = parts.stamps(workspace, "models", of=name)
             key = "force", stamps, recording, workspace.digest()
-            later(key, lambda: following.estimate(workspace, name, recording), show, height=420)
+            later(
+                key,
+                lambda: compensators.estimate_force(workspace, name, recording),
+                show,
+                height=420,
+            )
         else:
             text = (
                 "A recording with all that it is made from is drawn here, beside what was measured."
@@ -79,12 +90,12 @@ def log(state: State, names: list[str]) -> None:
     name = parts.model_of(state, names)
 
     async def loaded(event: events.UploadEventArguments) -> None:
-        path, found = await received(state, event)
-        if not any(key.startswith(REFERENCE) for key in found.channels):
+        path, recording = await received(state, event)
+        if not any(key.startswith(REFERENCE) for key in recording.channels):
             problem, remedy = "it has no reference", "name a column reference_displacement_mm"
             raise DataError(problem, file=path, remedy=remedy)
-        asked = {"log": path.name, "model": name, "form": state.chosen["compensate.form"]}
-        start(state, following.review, path.stem, asked)
+        request = {"log": path.name, "model": name, "form": state.chosen["compensate.form"]}
+        start(state, loops.review, path.stem, request)
 
     with widgets.card("Log of a loop"):
         ui.label(
@@ -93,8 +104,8 @@ def log(state: State, names: list[str]) -> None:
         ).classes("muted")
         with widgets.row(classes="fields"):
             parts.select_model(state, names)
-            uses = following.uses(state.workspace, name)
-            forms = {form: words for form, words in following.KINDS.items() if form in uses}
+            uses = compensators.uses(state.workspace, name)
+            forms = {form: words for form, words in compensators.KINDS.items() if form in uses}
             parts.select(state, "compensate.form", forms, "Ran as", lambda: None)
         endings = ".csv,.tsv,.txt,.parquet,.xlsx,.mat,.h5,.tdms"
         mark(widgets.upload("Drop the log here", loaded, endings), "log-file")
@@ -106,37 +117,37 @@ async def received(state: State, event: events.UploadEventArguments) -> tuple[An
 
     with state.workspace.receiving(event.file.name, event.file.size()) as (part, path):
         await event.file.save(part)
-    found = await run.io_bound(lambda: read(path, informative=False))
-    if not found:
+    recordings = await run.io_bound(lambda: read(path, informative=False))
+    if not recordings:
         raise DataError("it has no recording", file=path, remedy="give another file")
-    return path, found[0]
+    return path, recordings[0]
 
 
 @parts.steady("reviews", jobs=["review"])
 def reviewed(state: State) -> None:
     """Show where the error of a logged loop comes from."""
-    found = following.newest(state.workspace, "reviews")
+    reviews = loops.newest(state.workspace, "reviews")
     with widgets.card("Sources of the error"):
         for job in parts.jobs_of(state, ["review"]):
             parts.show_job(state, job)
-        if not found:
+        if not reviews:
             text = (
                 "A review splits the error of a loop on your rig into parts of model, actuator, delay, "
                 "drift and limits."
             )
             widgets.empty("fact_check", "No log was reviewed yet", text)
             return
-        key = f"compensate.review-of-{len(found)}"  # so that a new one is shown at once
-        options = {name: str(one["log"]) for name, one in found.items()}
+        key = f"compensate.review-of-{len(reviews)}"  # so that a new one is shown at once
+        options = {name: str(content["log"]) for name, content in reviews.items()}
         name = parts.select(state, key, options, "Review", reviewed.refresh)
         with mark(ui.element("div").classes("stack"), "review"):
-            widgets.items(restored(found[name]))
+            widgets.items(restored(reviews[name]))
 
 
 def start(state: State, work: Any, title: str, asked: dict[str, Any]) -> None:
     """Start a job that writes a result, and forget those of its kind that ended."""
     state.jobs.forget_ended(work.__name__)
     state.jobs.submit(
-        work, title, name=following.named(title.replace(" ", "-"), asked), asked=asked
+        work, title, name=loops.result_name(title.replace(" ", "-"), asked), asked=asked
     )
     state.changed()

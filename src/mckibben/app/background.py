@@ -12,10 +12,10 @@ from mckibben.errors import MckibbenError
 
 T = TypeVar("T")
 
-MOST = 48
-"""Things that are remembered."""
+MOST_CACHED = 48
+"""Results that are kept in memory."""
 
-_made: dict[Hashable, Any] = {}
+_CACHE: dict[Hashable, Any] = {}
 
 
 def later(
@@ -27,25 +27,25 @@ def later(
     """
 
     def shown() -> None:
-        found = _made[key] = _made.pop(key)  # the last used goes last
+        found = _CACHE[key] = _CACHE.pop(key)  # the last used goes last
         with place:
             (widgets.error_box if isinstance(found, MckibbenError) else show)(found)
 
     async def fill() -> None:
         try:
-            if (made := await run.io_bound(make)) is None:
+            if (result := await run.io_bound(make)) is None:
                 return  # the page was left
-            _made[key] = made
+            _CACHE[key] = result
         except MckibbenError as error:
-            _made[key] = error
-        while len(_made) > MOST:
-            del _made[next(iter(_made))]
+            _CACHE[key] = error
+        while len(_CACHE) > MOST_CACHED:
+            del _CACHE[next(iter(_CACHE))]
         if not place.is_deleted:
             place.clear()
             shown()
 
     place = ui.element("div").classes("stack")
-    if key in _made:
+    if key in _CACHE:
         shown()
         return
     with place, ui.element("div").classes("empty").style(f"min-height: {height}px"):

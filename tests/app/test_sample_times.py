@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mckibben import Recording
-from mckibben.app import together
+from mckibben.app import sample_times
 from mckibben.app.jobs import Jobs
 from mckibben.app.state import State
 from mckibben.app.workspace import Workspace
@@ -20,9 +20,9 @@ def test_other_rates_are_brought_to_one(tmp_path: Path) -> None:
         time = np.linspace(0.0, 20.0, round(20.0 / step))
         one = Recording({"pressure": time, "displacement": 2 * time}, step)
         workspace.add_recording(one, name=f"run-{step}")
-    assert together.sample_times(workspace) == (0.1, 0.11)
-    together.resample(workspace, 0.11)
-    assert together.sample_times(workspace) is None
+    assert sample_times.sample_times(workspace) == (0.1, 0.11)
+    sample_times.resample(workspace, 0.11)
+    assert sample_times.sample_times(workspace) is None
     assert len(workspace.entry("run-0-11").steps) == 0
 
 

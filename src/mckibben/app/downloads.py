@@ -1,7 +1,8 @@
 """What can be taken away, the jobs that write it into ``takeaway/``, and the script that repeats it.
 
 Every job is given its file, its options, and what all have in common: ``model``, ``use`` and
-``settings``, of which `following.made` makes a block, and ``inputs``, ``outputs`` and ``load``.
+``settings``, of which `compensators.block_for_use` makes a block, and ``inputs``, ``outputs``
+and ``load``.
 """
 
 from __future__ import annotations
@@ -12,14 +13,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from mckibben.app.following import made, pace
+from mckibben.app.compensators import block_for_use
 from mckibben.app.jobs import Tell
 from mckibben.app.modelling import Json
+from mckibben.app.motions import step_and_cycle
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
 from mckibben.options import COptions, ExportOptions, FMUOptions, MJCFOptions, StudyOptions
 
-FLAGS = {
+SCRIPT_ARGUMENTS = {
     "inverse": "",
     "adaptive": ", adaptive=True",
     "predictive": ", predictive=True",
@@ -40,11 +42,11 @@ def report(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Js
     models = fitted(workspace)
     if not models:
         raise DataError("no model is fitted to these recordings", remedy="fit one under Models")
-    given = {"input": of["inputs"], "output": of["outputs"], "load": of["load"] or None}
-    given |= {"models": models, "jobs": 1} | options
+    settings = {"input": of["inputs"], "output": of["outputs"], "load": of["load"] or None}
+    settings |= {"models": models, "jobs": 1} | options
     train, test = workspace.with_role("train"), workspace.with_role("test")
-    found = study(train, test, **given, progress=tell)
-    write_report(found, workspace.path("takeaway", file), title=options.get("title", ""))
+    result = study(train, test, **settings, progress=tell)
+    write_report(result, workspace.path("takeaway", file), title=options.get("title", ""))
     return f"{file} is written"
 
 
@@ -54,23 +56,25 @@ def code(
     """Write a model, or what is made of it, as JSON or code; a folder becomes a zip."""
     from mckibben.workflow import export
 
-    found, path = made(workspace, of["model"], of["use"], of["settings"]), Path(file)
-    to = workspace.path("takeaway", file)
+    block, path = block_for_use(workspace, of["model"], of["use"], of["settings"]), Path(file)
+    target_path = workspace.path("takeaway", file)
     if target == "json":
-        found.save(to)
+        block.save(target_path)
         return f"{file} is written"
     if target == "mjcf":
-        export(found, to, target, force=True, **options)
+        export(block, target_path, target, force=True, **options)
         return f"{file} is written"
     name = "".join(c if c.isalnum() else "_" for c in path.stem).strip("_")
-    given: Json = {"name": name.lower() if target == "ros2" else name, "force": True} | options
-    given["sample_time"] = None
-    if found.rate_dependent:
-        given["sample_time"] = options.get("sample_time") or pace(workspace, of["model"])[0]
+    settings: Json = {"name": name.lower() if target == "ros2" else name, "force": True} | options
+    settings["sample_time"] = None
+    if block.rate_dependent:
+        settings["sample_time"] = (
+            options.get("sample_time") or step_and_cycle(workspace, of["model"])[0]
+        )
     if target == "fmu":
-        export(found, to, target, **given)
+        export(block, target_path, target, **settings)
     else:
-        _zip(to, lambda folder: export(found, folder / path.stem, target, **given))
+        _zip(target_path, lambda folder: export(block, folder / path.stem, target, **settings))
     return f"{file} is written"
 
 
@@ -94,12 +98,12 @@ def _zip(path: Path, fill: Callable[[Path], Any]) -> None:
 
     with TemporaryDirectory() as folder:
         fill(Path(folder))
-        files = [one for one in Path(folder).rglob("*") if one.is_file()]
-        held = {one.relative_to(folder).as_posix(): one.read_bytes() for one in files}
-    if not held:
+        files = [file for file in Path(folder).rglob("*") if file.is_file()]
+        contents = {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
+    if not contents:
         raise DataError("no recording is in use", remedy="add one under Data")
     with replacing(path) as new:
-        new.write_bytes(zipped(held))
+        new.write_bytes(zipped(contents))
 
 
 # -- the list ---------------------------------------------------------------------------------------
@@ -170,18 +174,18 @@ def script(workspace: Workspace, of: Json) -> str:
     lines = ['"""What was done in the workbench; run it in its folder."""', ""]
     lines += ["import mckibben", ""]
     for role in ("train", "test"):
-        runs = [f"    {one.code()}," for one in workspace.entries() if one.role == role]
+        runs = [f"    {entry.code()}," for entry in workspace.entries() if entry.role == role]
         lines += [f"{role} = [", *runs, "]"]
-    given = {"input": of["inputs"], "output": of["outputs"], "load": of["load"]}
-    given = {key: value for key, value in given.items() if value} | {"models": models}
+    settings = {"input": of["inputs"], "output": of["outputs"], "load": of["load"]}
+    settings = {key: value for key, value in settings.items() if value} | {"models": models}
     lines += ["board = mckibben.compare(", "    train,", "    test,"]
-    lines += [*(f"    {key}={value!r}," for key, value in given.items()), ")", "print(board)"]
-    for chosen in (row["model"] for row in workspace.results() if row["name"] == of["model"]):
-        lines.append(f"model = next(row.block for row in board.rows if row.model == {chosen!r})")
-        lines.append(f'model.save("{chosen}.json")')
-        if (use := of["use"]) in FLAGS:
-            lines.append(f"inverse = mckibben.invert(model{FLAGS[use]})")
-            lines.append(f'inverse.model.save("{chosen}-{use}.json")')
+    lines += [*(f"    {key}={value!r}," for key, value in settings.items()), ")", "print(board)"]
+    for kind in (row["model"] for row in workspace.results() if row["name"] == of["model"]):
+        lines.append(f"model = next(row.block for row in board.rows if row.model == {kind!r})")
+        lines.append(f'model.save("{kind}.json")')
+        if (use := of["use"]) in SCRIPT_ARGUMENTS:
+            lines.append(f"inverse = mckibben.invert(model{SCRIPT_ARGUMENTS[use]})")
+            lines.append(f'inverse.model.save("{kind}-{use}.json")')
             step = ", sample_time=train[0].sample_time"
-            lines.append(f'mckibben.export(inverse, "{chosen}-{use}-c", "c"{step})')
+            lines.append(f'mckibben.export(inverse, "{kind}-{use}-c", "c"{step})')
     return "\n".join(lines) + "\n"

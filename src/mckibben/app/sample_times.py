@@ -14,8 +14,8 @@ def sample_times(workspace: Workspace) -> tuple[float, float] | None:
     return min(times), max(times)
 
 
-def resample(workspace: Workspace, step: float) -> None:
+def resample(workspace: Workspace, sample_time: float) -> None:
     """Resample the recordings in use that have another sample time."""
     for name, run in workspace.used().items():
-        if run.sample_time is not None and abs(run.sample_time - step) > 1e-9 * step:
-            workspace.do(name, Step(do="resample", sample_time=step))
+        if run.sample_time is not None and abs(run.sample_time - sample_time) > 1e-9 * sample_time:
+            workspace.do(name, Step(do="resample", sample_time=sample_time))

@@ -138,7 +138,7 @@ PLUGINS: dict[str, dict[str, str]] = {
     },
     "faces": {
         "card": "mckibben.report.notebook:card",
-        "lines": "mckibben.report.text:shown",
+        "lines": "mckibben.report.text:lines_of_result",
         "plot": "mckibben.report.figures:plot",
     },
     "models": {},

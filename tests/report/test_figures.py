@@ -26,7 +26,7 @@ from mckibben.report.figures import (
     write_figure,
 )
 from mckibben.report.interactive import packed, plots, text
-from mckibben.report.shown import shown
+from mckibben.report.modelled_runs import runs_of_study
 from tests.refusals import refused
 from tests.report.studies_by_hand import measured, plain_study, study
 
@@ -65,17 +65,18 @@ def test_thinning_keeps_the_extremes_the_order_and_the_limit(pair: np.ndarray, p
 
 def test_a_recording_with_a_held_out_part_is_shown_once_with_its_start() -> None:
     whole = measured(400)
-    (one,) = shown(study((whole.slice(0, 300),), (whole,)))
+    (one,) = runs_of_study(study((whole.slice(0, 300),), (whole,)))
     assert one.test_from == 300
     assert all(output.shape == (400,) for output in one.outputs.values())
-    found = shown(study((measured(300, seed=5),), (whole,)))  # of the same name, and no part of it
+    other = measured(300, seed=5)  # of the same name, and no part of it
+    found = runs_of_study(study((other,), (whole,)))
     assert [one.test_from for one in found] == [None, None]
 
 
 def test_outputs_belong_to_their_recording_and_tested_ones_come_first() -> None:
     train = (measured(400), measured(300, seed=2, name="second"))
     whole = study(train, (measured(200, seed=1, name="third"),))
-    found = shown(whole)
+    found = runs_of_study(whole)
     assert [one.recording.name for one in found] == ["third", "muscle", "second"]
     assert [one.role for one in found] == ["test", "fit", "fit"]
     assert list(found[0].outputs) == [row.model for row in whole.leaderboard.rows if row.block]

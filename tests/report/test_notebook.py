@@ -15,7 +15,7 @@ from mckibben import Recording, example
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.control import track
 from mckibben.errors import MckibbenError, in_terms_of
-from mckibben.report.text import shown
+from mckibben.report.text import lines_of_result
 from mckibben.system.showing import DrawsItself, Result
 
 EVIL = '<img src=x onerror="alert(1)">\x1b[2J'
@@ -66,7 +66,7 @@ def test_they_print_as_commands_do_and_cards_bring_nothing_along(things: dict[st
     for name, thing in things.items():
         lines = str(thing).splitlines()
         if isinstance(thing, Result):
-            assert lines == in_terms_of("\n".join(shown(thing))).splitlines(), name
+            assert lines == in_terms_of("\n".join(lines_of_result(thing))).splitlines(), name
         else:
             assert 1 < len(lines) <= 3, name
             assert max(map(len, lines)) <= 80, name

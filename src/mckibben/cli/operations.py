@@ -52,7 +52,7 @@ def operation_command(name: str) -> click.Command:
             about |= found.to_dict()
         written = [out / one for one in operation.writes] if out and operation.writes else [out]
         notes = getattr(found, "notes", ())
-        lines = () if found is None else text.shown(found)
+        lines = () if found is None else text.lines_of_result(found)
         show(about, lambda: lines, as_json, notes, written, read)
         return NO_RESULT if getattr(found, "failed", False) else 0
 

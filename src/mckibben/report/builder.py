@@ -49,7 +49,7 @@ class Text:
     kind: str = "text"
 
     def __post_init__(self) -> None:  # names in it may hold anything
-        object.__setattr__(self, "sentences", [printable(one) for one in self.sentences])
+        object.__setattr__(self, "sentences", [printable(sentence) for sentence in self.sentences])
 
 
 @dataclass(frozen=True)
@@ -79,14 +79,15 @@ class Table:
     def numeric_columns(self) -> set[int]:
         """Columns of numbers, which are right-aligned."""
 
-        def numbers(place: int) -> float:
+        def number_share(place: int) -> float:
             cells = [row[place] for row in self.rows if row[place] not in (None, "", "–", "-")]
-            plain = [
-                isinstance(c, int | float) or bool(NUMBER_CELL.fullmatch(str(c))) for c in cells
+            are_numbers = [
+                isinstance(cell_value, int | float) or bool(NUMBER_CELL.fullmatch(str(cell_value)))
+                for cell_value in cells
             ]
-            return sum(plain) / max(len(plain), 1)
+            return sum(are_numbers) / max(len(are_numbers), 1)
 
-        return {k for k in range(1, len(self.headings)) if numbers(k) > 0.5}
+        return {k for k in range(1, len(self.headings)) if number_share(k) > 0.5}
 
 
 @dataclass(frozen=True)
@@ -178,8 +179,13 @@ class Page:
 
     def html(self) -> str:
         """Return the page as HTML."""
-        drawn = [item for one in self.sections for item in one.items if isinstance(item, Figure)]
-        figures = {one.name: one.plots for one in (*([self.lead] if self.lead else []), *drawn)}
+        figures_of_sections = [
+            item for section in self.sections for item in section.items if isinstance(item, Figure)
+        ]
+        figures = {
+            section.name: section.plots
+            for section in (*([self.lead] if self.lead else []), *figures_of_sections)
+        }
         scripts = _scripts() if figures else ()
         return template("page.html.j2").render(
             page=self,
@@ -209,7 +215,7 @@ def markdown(items: Sequence[Item]) -> str:
         elif isinstance(item, Text):
             start = "### " if item.style == "lead" else "- " if item.listed else ""
             mark = "\n" if item.listed else " "
-            lines.append(mark.join(f"{start}{plain(one)}" for one in item.sentences))
+            lines.append(mark.join(f"{start}{plain(sentence)}" for sentence in item.sentences))
     return "\n\n".join(filter(None, lines))
 
 
@@ -225,17 +231,19 @@ def plain(text: str) -> str:
     return re.sub(r"([\\`*\[\]<>|#])", r"\\\1", " ".join(text.split()))
 
 
-def _table(one: Table) -> Iterator[str]:
-    sides = ("---:" if k in one.numeric_columns else "---" for k in range(len(one.headings)))
-    yield f"| {' | '.join(map(plain, one.headings))} |"
+def _table(content: Table) -> Iterator[str]:
+    sides = (
+        "---:" if k in content.numeric_columns else "---" for k in range(len(content.headings))
+    )
+    yield f"| {' | '.join(map(plain, content.headings))} |"
     yield f"|{'|'.join(sides)}|"
-    for place, row in enumerate(one.rows):
+    for row_number, row in enumerate(content.rows):
         cells = []
         for column, value in enumerate(row):
-            shown = typeset(cell(value, 4)) if isinstance(value, float) else plain(cell(value))
-            mark = one.marked.get((place, column), "")
-            shown = f"**{shown}**" if "least" in mark else shown
-            cells.append(f"<u>{shown}</u>" if "chosen" in mark else shown)
+            text = typeset(cell(value, 4)) if isinstance(value, float) else plain(cell(value))
+            mark = content.marked.get((row_number, column), "")
+            text = f"**{text}**" if "least" in mark else text
+            cells.append(f"<u>{text}</u>" if "chosen" in mark else text)
         yield f"| {' | '.join(cells)} |"
 
 
@@ -249,13 +257,13 @@ def _scripts() -> tuple[str, ...]:
 
 def policy(*scripts: str) -> str:
     """Return a page's content security policy: only these scripts run, and nothing is loaded or sent."""
-    own = " ".join(
+    digests = " ".join(
         f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
         for text in scripts
     )
-    own = own or "'none'"
+    digests = digests or "'none'"
     return (
-        f"default-src 'none'; script-src {own}; style-src 'unsafe-inline'; "
+        f"default-src 'none'; script-src {digests}; style-src 'unsafe-inline'; "
         "img-src data: blob:; connect-src 'none'; form-action 'none'; base-uri 'none'"
     )
 
@@ -291,5 +299,5 @@ def _environment() -> Environment:
 
 def versions() -> str:
     """Return the versions of Python, this package, and its numerical libraries."""
-    found = [f"{name} {version(name)}" for name in PACKAGES]
-    return ", ".join([f"Python {platform.python_version()}", *found])
+    parts = [f"{name} {version(name)}" for name in PACKAGES]
+    return ", ".join([f"Python {platform.python_version()}", *parts])

@@ -8,7 +8,7 @@ from mckibben.numerals import percent
 from mckibben.recording import notes_by_file
 from mckibben.report import interactive, model_subjects, results, words
 from mckibben.report.builder import Figure, Item, Page, Section, Text, Tile
-from mckibben.report.shown import Shown
+from mckibben.report.modelled_runs import ModelledRun
 from mckibben.system.atomic import to_json
 
 if TYPE_CHECKING:
@@ -29,63 +29,71 @@ MOST_TILES = 4
 """Outputs whose residual is a tile at the top of the page."""
 
 
-def check_json(found: Validation, model_file: str) -> dict[str, Any]:
+def check_json(validation: Validation, model_file: str) -> dict[str, Any]:
     """Return a check with its verdict in words, for JSON."""
-    return found.to_dict() | {
-        "verdict": words.check_verdict(found),
-        "sentences": [said for one in found.outputs for said in words.check_notes(one)],
+    return validation.to_dict() | {
+        "verdict": words.check_verdict(validation),
+        "sentences": [
+            sentence for check in validation.outputs for sentence in words.check_notes(check)
+        ],
         "model_file": model_file,
-        "notes_of_reading": notes_by_file([run.source for run in found.runs]),
+        "notes_of_reading": notes_by_file([run.source for run in validation.runs]),
     }
 
 
-def write_check(folder: Results, found: Validation, model_file: str) -> None:
+def write_check(folder: Results, validation: Validation, model_file: str) -> None:
     """Write ``validation.json`` and ``report.html``."""
-    folder.write_text("validation.json", to_json(check_json(found, model_file)) + "\n")
-    folder.write_text("report.html", check_page(found, model_file))
+    folder.write_text("validation.json", to_json(check_json(validation, model_file)) + "\n")
+    folder.write_text("report.html", check_page(validation, model_file))
 
 
-def check_page(found: Validation, model_file: str) -> str:
+def check_page(validation: Validation, model_file: str) -> str:
     """Return a check as HTML; ``model_file`` is the path of the model."""
-    longest = sorted(found.runs, key=lambda run: -len(run))[:MOST_RECORDINGS]
-    runs = [run for run in found.runs if run in longest]
+    longest = sorted(validation.runs, key=lambda run: -len(run))[:MOST_RECORDINGS]
+    runs = [run for run in validation.runs if run in longest]
     names = [run.name for run in runs]
     sections = [
-        Section(f"output-{k}", f"Residual of {one.output}", _output(one, k, runs), names)
-        for k, one in enumerate(found.outputs)
+        Section(f"output-{k}", f"Residual of {check.output}", _output(check, k, runs), names)
+        for k, check in enumerate(validation.outputs)
     ]
-    if found.description is not None:
-        sections.append(Section("model", "Model", results.description(found.description)))
-    untested = [f"Too short to be tested: {', '.join(found.untested)}."] * bool(found.untested)
-    more = len(found.recordings) - MOST_NAMED
-    listed = ", ".join(found.recordings[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+    if validation.description is not None:
+        sections.append(Section("model", "Model", results.description(validation.description)))
+    untested = [f"Too short to be tested: {', '.join(validation.untested)}."] * bool(
+        validation.untested
+    )
+    more = len(validation.recordings) - MOST_NAMED
+    listed = ", ".join(validation.recordings[:MOST_NAMED]) + (
+        f" and {more} more" if more > 0 else ""
+    )
     return Page(
-        f"Check of {found.model}",
+        f"Check of {validation.model}",
         f"{model_file}, running free on {listed}",
         [Section("untested", "", [Text(untested)]), *sections],
         [
             Tile(
-                f"Residual of {one.output}",
-                words.size(one.unit, one.rmse),
-                f"RMS, {percent(one.rmse / one.span)} of its range" if one.span else "RMS",
+                f"Residual of {check.output}",
+                words.size(check.unit, check.rmse),
+                f"RMS, {percent(check.rmse / check.span)} of its range" if check.span else "RMS",
                 f"output-{k}",
             )
-            for k, one in enumerate(found.outputs[:MOST_TILES])
+            for k, check in enumerate(validation.outputs[:MOST_TILES])
         ],
-        answers=[("Is it right?", words.check_verdict(found, sized=False))],
+        answers=[("Is it right?", words.check_verdict(validation, sized=False))],
     ).html()
 
 
-def _output(one: OutputCheck, place: int, runs: list[FreeRun]) -> list[Item]:
+def _output(check: OutputCheck, place: int, runs: list[FreeRun]) -> list[Item]:
     """Return the items of an output: its tests, then figures over time and of the autocorrelation.
 
     ``place`` is that of the output in the model; from `MOST_OUTPUTS` on there are no figures.
     """
-    items = results.checked(one)
+    items = results.checked(check)
     if place >= MOST_OUTPUTS:
         return items
-    about = [
-        Shown(run.source, one.patterns[0].channel, one.output, {"model": modelled}, "test")
+    runs_drawn = [
+        ModelledRun(
+            run.source, check.patterns[0].channel, check.output, {"model": modelled}, "test"
+        )
         for run in runs
         for modelled in [run.modelled[:, place]]
     ]
@@ -95,9 +103,16 @@ def _output(one: OutputCheck, place: int, runs: list[FreeRun]) -> list[Item]:
     }
     figures: list[Item] = []
     for kind, label in labels.items():
-        drawn = [interactive.plots(each.draw(kind)) for each in about]
-        figures.append(Figure(f"{kind}-{place}", drawn, label, columns=len(drawn[0])))
-    white = [interactive.plots(model_subjects.autocorrelation(one))]
+        plots = [interactive.plots(run_drawn.draw(kind)) for run_drawn in runs_drawn]
+        figures.append(Figure(f"{kind}-{place}", plots, label, columns=len(plots[0])))
+    plots_of_autocorrelation = [interactive.plots(model_subjects.autocorrelation(check))]
     label = "Autocorrelation of the residual"
-    figures.append(Figure(f"autocorrelation-{place}", white, label, f"{label}; band: white noise."))
+    figures.append(
+        Figure(
+            f"autocorrelation-{place}",
+            plots_of_autocorrelation,
+            label,
+            f"{label}; band: white noise.",
+        )
+    )
     return [*items, *figures]

@@ -82,13 +82,13 @@ def columns_of(
     chosen_by : str
         One of `CHOICES`.
     """
-    of_each = tuple(
+    by_output = tuple(
         Column(name, f"test RMSE of {name}", unit, _inside("outputs", name, "rmse"))
         for name in (outputs if len(outputs) > 1 else ())
     )
     on_train, validated = _inside("train", "rmse"), _inside("validation_rmse")
     by_fit = chosen_by == "fit"
-    every = (
+    columns = (
         Column("chosen", CHOICES[chosen_by][0], unit, on_train if by_fit else validated),
         Column("test", "test RMSE", unit, _inside("test", "rmse")),
         Column("interval", "95 % interval", unit, _inside("test", "rmse_interval")),
@@ -98,7 +98,7 @@ def columns_of(
             unit,
             _inside("test", "difference_to_chosen_interval"),
         ),
-        *of_each,
+        *by_output,
         Column("rank", "rank", "", _inside("test", "rank")),
         Column("inverse", "inverse", "", _inside("inverse")),
         *(() if by_fit else (Column("train", CHOICES["fit"][0], unit, on_train),)),
@@ -110,7 +110,7 @@ def columns_of(
         Column("seconds", "fit time", "s", _inside("fit_seconds"), 2),
         Column("step", "step", "ns", _inside("step_ns")),
     )
-    return tuple(column for column in every if any(column.value(row) is not None for row in rows))
+    return tuple(column for column in columns if any(column.value(row) is not None for row in rows))
 
 
 def columns_of_board(board: Leaderboard) -> tuple[Column, ...]:
@@ -131,10 +131,10 @@ def diverged(row: Given) -> bool:
 
 def _inside(*path: str) -> Callable[[Given], Any]:
     def value(row: Given) -> Any:
-        found: Any = row
+        content: Any = row
         for name in path:
-            found = (found or {}).get(name)
-        return found
+            content = (content or {}).get(name)
+        return content
 
     return value
 

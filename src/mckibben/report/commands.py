@@ -23,8 +23,8 @@ def commands(study: Study, command: str = "") -> list[tuple[str, str]]:
     """
     board, lines = study.leaderboard, []
     if not command:
-        named = [word for one in board.inputs for word in ("--input", one)]
-        named += [word for one in board.outputs for word in ("--output", one)]
+        options = [word for name in board.inputs for word in ("--input", name)]
+        options += [word for name in board.outputs for word in ("--output", name)]
         train = _files(study.train)
         tests = [
             word for file in _files(study.test) if file not in train for word in ("--test", file)
@@ -33,7 +33,7 @@ def commands(study: Study, command: str = "") -> list[tuple[str, str]]:
             *registry.names("estimators")
         }
         load = [] if study.load is None else ["--load", study.load]
-        words = ["study", *train, *tests, *named, *load, "--models", ",".join(sorted(models))]
+        words = ["study", *train, *tests, *options, *load, "--models", ",".join(sorted(models))]
         command = printing.command(["mckibben", *words, "--seed", str(board.seed)])
     lines.append(("Repeat this study", command))
     best = board.best
@@ -53,7 +53,7 @@ def commands(study: Study, command: str = "") -> list[tuple[str, str]]:
 
 def _files(recordings: Sequence[Recording]) -> list[str]:
     sources = [recording.source or f"{recording.name}.csv" for recording in recordings]
-    return list(dict.fromkeys(f"./{one}" if one.startswith("-") else one for one in sources))
+    return list(dict.fromkeys(f"./{file}" if file.startswith("-") else file for file in sources))
 
 
 def model_file(model: str) -> str:

@@ -149,8 +149,8 @@ class Panel:
         """Limits of the y axis, if not from the curves."""
         if self.limits is not None:
             return self.limits
-        every = [one.y[np.isfinite(one.y)] for one in self.curves]
-        values = np.concatenate([*every, np.zeros(int(self.zero))])
+        parts = [curve.y[np.isfinite(curve.y)] for curve in self.curves]
+        values = np.concatenate([*parts, np.zeros(int(self.zero))])
         if not values.size or np.ptp(values) >= self.least:
             return None
         middle = (values.min() + values.max()) / 2
@@ -221,24 +221,24 @@ def within(panel: Panel, least: float = 0.0) -> Panel:
     least : float
         What counts as near at least, if the first curve is low.
     """
-    known = [curve.y[~np.isnan(curve.y)] for curve in panel.curves]
-    low, high = float(known[0].min()), float(known[0].max())
+    values = [curve.y[~np.isnan(curve.y)] for curve in panel.curves]
+    low, high = float(values[0].min()), float(values[0].max())
     reach = max(high - low, least)
-    ends = [(float(y.min()), float(y.max())) if y.size else (low, high) for y in known]
-    near = [low - reach <= lowest and highest <= high + reach for lowest, highest in ends]
-    if all(near):
+    ends = [(float(y.min()), float(y.max())) if y.size else (low, high) for y in values]
+    is_near = [low - reach <= lowest and highest <= high + reach for lowest, highest in ends]
+    if all(is_near):
         return panel
-    inside = [pair for pair, stays in zip(ends, near, strict=True) if stays]
+    inside = [pair for pair, is_inside in zip(ends, is_near, strict=True) if is_inside]
     low, high = min(pair[0] for pair in inside), max(pair[1] for pair in inside)
     height = max(high - low, reach)
     limits = low - MARGIN * height, high + MARGIN * height
     # a curve cut off a height away still leaves the panel, and is a number for every library
     far = low - height, high + height
     curves = [
-        curve if stays else replace(curve, y=np.clip(curve.y, *far))
-        for curve, stays in zip(panel.curves, near, strict=True)
+        curve if is_inside else replace(curve, y=np.clip(curve.y, *far))
+        for curve, is_inside in zip(panel.curves, is_near, strict=True)
     ]
-    leaving = [curve for curve, stays in zip(curves, near, strict=True) if not stays]
+    leaving = [curve for curve, is_inside in zip(curves, is_near, strict=True) if not is_inside]
     heads = [
         head
         for place, curve in enumerate(leaving)
@@ -302,8 +302,8 @@ def left_out(names: Sequence[str]) -> str:
     if not names:
         return ""
     more = len(names) - N_COLOURS
-    others = f" and {more} more" if more > 0 else ""
-    return f"Not shown: {', '.join(names[:N_COLOURS])}{others}."
+    more_names = f" and {more} more" if more > 0 else ""
+    return f"Not shown: {', '.join(names[:N_COLOURS])}{more_names}."
 
 
 def series_colour(place: int) -> str:

@@ -25,7 +25,12 @@ from mckibben.report import (
     subjects,
 )
 from mckibben.report.drawing import Curve, Drawing, Panel, axis_label, left_out
-from mckibben.report.shown import MOST_RECORDINGS, Shown, shown, unique
+from mckibben.report.modelled_runs import (
+    MOST_RECORDINGS,
+    ModelledRun,
+    each_recording_once,
+    runs_of_study,
+)
 from mckibben.signals import decaying_triangle
 from mckibben.system.extras import demand
 from mckibben.system.showing import DrawsItself
@@ -77,22 +82,23 @@ def draw(thing: Any, kind: str | None = None, **choices: Any) -> Drawing:
         problem = f"a kind of figure is a text, and this is {type(kind).__name__}"
         raise ModelError(problem, remedy="name what is drawn with it, as in `recording=RUN`")
     thing = thing.drawn if isinstance(thing, DrawsItself) else thing
-    known = FIGURES.get(getattr(thing, "face", "recording"), {})
-    if kind is None and "recording" in choices and "loops" in known:
+    figures = FIGURES.get(getattr(thing, "face", "recording"), {})
+    if kind is None and "recording" in choices and "loops" in figures:
         kind = "loops"
     elif kind is None and isinstance(thing, Recording) and pair_of(thing) is None:
         kind = "loop" if {"input", "output"} <= choices.keys() else "time"
-    kind = kind or next(iter(known), "")
-    if kind not in known:
-        remedy = f"use one of {', '.join(known)}" if known else "use to_dict(), or to_frame()"
+    kind = kind or next(iter(figures), "")
+    if kind not in figures:
+        remedy = f"use one of {', '.join(figures)}" if figures else "use to_dict(), or to_frame()"
         raise ModelError(f"there is no figure {kind!r}", remedy=remedy)
-    taken = [*signature(known[kind]).parameters][1:]
-    if unknown := choices.keys() - set(taken):
+    parameters = [*signature(figures[kind]).parameters][1:]
+    if unknown := choices.keys() - set(parameters):
         raise ModelError(
             f"the figure {kind!r} takes no {', '.join(sorted(unknown))}",
-            remedy=f"it takes {', '.join(taken) or 'no choices'}; other figures: {', '.join(known)}",
+            remedy=f"it takes {', '.join(parameters) or 'no choices'}; "
+            f"other figures: {', '.join(figures)}",
         )
-    return known[kind](thing, **choices)
+    return figures[kind](thing, **choices)
 
 
 def write_figure(
@@ -171,17 +177,17 @@ def _time(
     output: str | None = None,
 ) -> Drawing:
     """Draw channels over time, one panel each; by default all."""
-    several = _several(recordings)
-    named = [name for name in (input, output) if name is not None]
-    return subjects.time_course(several, channels or named or [*several[0].channels])
+    runs = _as_sequence(recordings)
+    names = [name for name in (input, output) if name is not None]
+    return subjects.time_course(runs, channels or names or [*runs[0].channels])
 
 
 def _spectrum(recordings: Recordings, channels: Sequence[str] = ()) -> Drawing:
     """Draw the power density of channels over frequency; by default of all."""
-    several = _several(recordings)
-    if any(each.sample_time is None for each in several):
+    runs = _as_sequence(recordings)
+    if any(run.sample_time is None for run in runs):
         raise DataError("a spectrum needs a sample time", remedy="give `sample_time` in reading")
-    return subjects.spectrum(several, channels or [*several[0].channels])
+    return subjects.spectrum(runs, channels or [*runs[0].channels])
 
 
 def _loop(
@@ -190,21 +196,21 @@ def _loop(
     output: str | None = None,
 ) -> Drawing:
     """Draw the output over the input, coloured by time."""
-    several = _several(recordings)
-    pair = pair_of(several[0])
+    runs = _as_sequence(recordings)
+    pair = pair_of(runs[0])
     if pair is None and not (input and output):
         raise DataError("no channels of a loop are known by name", remedy="name `input`, `output`")
-    given, moved = pair or ("", "")
-    return subjects.loop(several, input or given, output or moved)
+    driving, driven = pair or ("", "")
+    return subjects.loop(runs, input or driving, output or driven)
 
 
-def _several(recordings: Recordings) -> Sequence[Recording]:
+def _as_sequence(recordings: Recordings) -> Sequence[Recording]:
     return [recordings] if isinstance(recordings, Recording) else recordings
 
 
 def _triangle(
     name: str,
-    driven: str,
+    name_of_input: str,
     ends: tuple[float, float],
     others: Mapping[str, float],
     step: float = SAMPLE_TIME,
@@ -213,11 +219,11 @@ def _triangle(
     """Return a decreasing triangle of one input, with the other inputs constant."""
     t = step * np.arange(round(CYCLES * PERIOD / step) + 1)
     channels = {other: np.full(t.size, value) for other, value in others.items()}
-    channels[driven] = decaying_triangle(t, period=PERIOD, low=ends[0], high=ends[1])
+    channels[name_of_input] = decaying_triangle(t, period=PERIOD, low=ends[0], high=ends[1])
     return Recording(channels, step, units or {}, meta={"name": name})
 
 
-def _of_rig(drawn: Callable[..., Drawing]) -> Callable[..., Drawing]:
+def _of_rig(draw_recordings: Callable[..., Drawing]) -> Callable[..., Drawing]:
     """Return the drawing function of a rig's loop for a decreasing triangle, other inputs at rest."""
 
     def draw_rig(
@@ -228,10 +234,12 @@ def _of_rig(drawn: Callable[..., Drawing]) -> Callable[..., Drawing]:
         driven, resting = input or rig.inputs[0], dict(zip(rig.inputs, rig.resting[0], strict=True))
         ends = rig.limits(driven).low, rig.limits(driven).high
         run = rig.run(_triangle(rig.name, driven, ends, resting))
-        moved = [name for name in rig.outputs if name not in rig.inputs] or [*rig.outputs]
-        pairs = Channels(tuple(rig.inputs), tuple(moved)).pairs
-        own = next((wanted for given, wanted in pairs if given == driven), moved[0])
-        return drawn([run], input=driven, output=output or own)
+        measured = [name for name in rig.outputs if name not in rig.inputs] or [*rig.outputs]
+        pairs = Channels(tuple(rig.inputs), tuple(measured)).pairs
+        paired = next(
+            (output_name for input_name, output_name in pairs if input_name == driven), measured[0]
+        )
+        return draw_recordings([run], input=driven, output=output or paired)
 
     return draw_rig
 
@@ -247,7 +255,7 @@ def _block_loop(
 ) -> Drawing:
     """Draw the loop of a block for a decreasing triangle of one input, others at mid-range."""
     names = [channel.name for channel in block.inputs]
-    driven, given = input or names[0], output or block.outputs[0].name
+    driven, output_name = input or names[0], output or block.outputs[0].name
     compensated = block.forward_model if block.inverts else None
     ranges = known_ranges(block.inputs, block.known_inputs)
     ranges |= reachable_ranges(compensated, block.inputs[: block.n_driven], None)
@@ -262,7 +270,7 @@ def _block_loop(
     step = block.sample_time or SAMPLE_TIME
     units = {channel.name: channel.unit for channel in block.inputs}
     run = block.simulate(_triangle(block.title, driven, turns, middle, step, units))
-    return subjects.loop([run], driven, given, symbols=channel_symbols(block))
+    return subjects.loop([run], driven, output_name, symbols=channel_symbols(block))
 
 
 def _against(kind: str) -> Callable[..., Drawing]:
@@ -278,22 +286,22 @@ def _against(kind: str) -> Callable[..., Drawing]:
         if recording is None:
             raise ModelError(f"{kind!r} compares with a measurement", remedy="set `recording=`")
         blocks = {"model": thing} if isinstance(thing, Block) else _blocks(thing, models)
-        first, several = next(iter(blocks.values())), _several(recording)
-        wanted = output or first.outputs[0].name
-        coupled = coupling(several, _driving(first), (wanted,))
-        symbols = channel_symbols(first)
+        first_block, recordings = next(iter(blocks.values())), _as_sequence(recording)
+        output_name = output or first_block.outputs[0].name
+        coupled = coupling(recordings, _driving(first_block), (output_name,))
+        symbols = channel_symbols(first_block)
         runs = [
-            Shown(
-                one,
-                input or coupled.pairs([one])[0][0],
-                wanted,
-                {name: block.simulate(one)[wanted] for name, block in blocks.items()},
+            ModelledRun(
+                run,
+                input or coupled.pairs([run])[0][0],
+                output_name,
+                {name: block.simulate(run)[output_name] for name, block in blocks.items()},
                 "",
                 symbols=symbols,
             )
-            for one in several[:MOST_RECORDINGS]
+            for run in recordings[:MOST_RECORDINGS]
         ]
-        return _one_each(runs, kind, [one.name for one in several[MOST_RECORDINGS:]])
+        return _panels_of_runs(runs, kind, [run.name for run in recordings[MOST_RECORDINGS:]])
 
     return draw_against
 
@@ -301,12 +309,12 @@ def _against(kind: str) -> Callable[..., Drawing]:
 def _simulated(kind: str) -> Callable[[Simulation], Drawing]:
     """Return the drawing function of a simulation, with what was measured where anything was."""
 
-    def draw_simulation(found: Simulation) -> Drawing:
-        run = found.recording
-        if kind == "time" or not found.metrics:
+    def draw_simulation(simulation: Simulation) -> Drawing:
+        run = simulation.recording
+        if kind == "time" or not simulation.metrics:
             return _time(run)
-        output = next(iter(found.metrics))
-        pair = next(name for name in run if name not in found.metrics), output
+        output = next(iter(simulation.metrics))
+        pair = next(name for name in run if name not in simulation.metrics), output
         return subjects.against(kind, run, pair, {"model": run[f"{output}_model"]})
 
     return draw_simulation
@@ -314,35 +322,35 @@ def _simulated(kind: str) -> Callable[[Simulation], Drawing]:
 
 def _blocks(board: Leaderboard, models: str | Sequence[str]) -> dict[str, Block]:
     """Return the models of a leaderboard by name; by default the chosen one."""
-    asked = [models] if isinstance(models, str) else list(models)
-    if not asked and board.best is not None:
-        asked = [board.best.model]
-    known = {row.model: row.block for row in board.rows if row.block is not None}
-    if not asked or not known.keys() >= set(asked):
+    names = [models] if isinstance(models, str) else list(models)
+    if not names and board.best is not None:
+        names = [board.best.model]
+    blocks = {row.model: row.block for row in board.rows if row.block is not None}
+    if not names or not blocks.keys() >= set(names):
         raise ModelError(
-            f"there is no model {', '.join(asked) or 'chosen'} to draw",
-            remedy=f"name some of {', '.join(known) or 'a leaderboard where a model worked'}",
+            f"there is no model {', '.join(names) or 'chosen'} to draw",
+            remedy=f"name some of {', '.join(blocks) or 'a leaderboard where a model worked'}",
             parameter="models",
         )
-    return {name: known[name] for name in asked}
+    return {name: blocks[name] for name in names}
 
 
 def _driving(block: Block) -> tuple[str, ...]:
     """Return a model's driving inputs, without scheduling ones."""
-    return tuple(one.name for one in block.inputs if one.name not in block.scheduling)
+    return tuple(channel.name for channel in block.inputs if channel.name not in block.scheduling)
 
 
-def _one_each(
-    runs: Sequence[Shown], kind: str, others: Sequence[str] = (), models: int | None = None
+def _panels_of_runs(
+    runs: Sequence[ModelledRun], kind: str, undrawn: Sequence[str] = (), models: int | None = None
 ) -> Drawing:
     """Draw each recording in separate panels."""
     panels: list[Panel] = []
-    for one in runs[:MOST_RECORDINGS]:
-        drawing = one.draw(kind, models=models)
-        title = one.name if len(runs) > 1 else ""
+    for run in runs[:MOST_RECORDINGS]:
+        drawing = run.draw(kind, models=models)
+        title = run.name if len(runs) > 1 else ""
         panels += [replace(panel, title=title) for panel in drawing.panels]
-    named = [*(one.name for one in runs[MOST_RECORDINGS:]), *others]
-    return replace(drawing, panels=tuple(panels), note=left_out(named))
+    names = [*(run.name for run in runs[MOST_RECORDINGS:]), *undrawn]
+    return replace(drawing, panels=tuple(panels), note=left_out(names))
 
 
 # --- Studies ----------------------------------------------------------------------------------------
@@ -352,19 +360,21 @@ def _of_study(kind: str) -> Callable[[Study], Drawing]:
     """Return the drawing function of the chosen model on recordings; residuals on the test."""
 
     def draw_study(study: Study) -> Drawing:
-        runs = shown(study)
-        return _one_each(runs[:1] if kind == "residuals" else runs, kind, models=1)
+        runs = runs_of_study(study)
+        return _panels_of_runs(runs[:1] if kind == "residuals" else runs, kind, models=1)
 
     return draw_study
 
 
-def _study_recordings(drawn: Callable[..., Drawing]) -> Callable[[Study], Drawing]:
+def _study_recordings(draw_recordings: Callable[..., Drawing]) -> Callable[[Study], Drawing]:
     """Return the drawing function of input and first output of all recordings."""
 
     def draw_study(study: Study) -> Drawing:
-        every = shown(study)
-        return drawn(
-            [one.recording for one in unique(every)], input=every[0].input, output=every[0].output
+        runs = runs_of_study(study)
+        return draw_recordings(
+            [run.recording for run in each_recording_once(runs)],
+            input=runs[0].input,
+            output=runs[0].output,
         )
 
     return draw_study
@@ -380,45 +390,47 @@ def _inverse(study: Study) -> Drawing:
 # --- What was found ---------------------------------------------------------------------------------
 
 
-def _cycles(found: Characterization) -> Drawing:
+def _cycles(measures: Characterization) -> Drawing:
     """Draw the loop width of every cycle over its amplitude."""
-    if not found.cycles:
+    if not measures.cycles:
         raise ModelError(
             "there is no whole cycle to draw", remedy="record one, from the lowest input and back"
         )
-    x = np.array([cycle.amplitude for cycle in found.cycles])
-    y = np.array([cycle.width for cycle in found.cycles])
-    label = axis_label(f"amplitude of {found.input}", found.input_unit)
+    x = np.array([cycle.amplitude for cycle in measures.cycles])
+    y = np.array([cycle.width for cycle in measures.cycles])
+    label = axis_label(f"amplitude of {measures.input}", measures.input_unit)
     return Drawing((Panel(label, "loop width [%]", (Curve(x, y, "", "series-1", "dots"),)),))
 
 
-def _tracked(found: Tracked, output: str | None = None) -> Drawing:
+def _tracked(run: Tracked, output: str | None = None) -> Drawing:
     """Draw reference and motion over time."""
-    name = _named({name: name for name in found.rmse}, output)
-    return model_subjects.tracking({"achieved": found}, name)
+    name = _item_named({name: name for name in run.rmse}, output)
+    return model_subjects.tracking({"achieved": run}, name)
 
 
-def _of_output(drawn: Callable[[Any], Drawing]) -> Callable[..., Drawing]:
+def _of_output(draw_item: Callable[[Any], Drawing]) -> Callable[..., Drawing]:
     """Return the drawing function for results of one output."""
 
-    def draw_output(found: Review | Validation, output: str | None = None) -> Drawing:
-        return drawn(_named({one.output: one for one in found.outputs}, output))
+    def draw_output(result: Review | Validation, output: str | None = None) -> Drawing:
+        return draw_item(_item_named({item.output: item for item in result.outputs}, output))
 
     return draw_output
 
 
-def _pattern(found: Validation, output: str | None = None, against: str = "branch") -> Drawing:
+def _pattern(validation: Validation, output: str | None = None, against: str = "branch") -> Drawing:
     """Draw means of an output's residual over inputs, loads, outputs or branches."""
-    one = _named({one.output: one for one in found.outputs}, output)
-    pattern = _named({each.against: each for each in one.patterns}, against)
-    return model_subjects.pattern(one, pattern)
+    check = _item_named({check.output: check for check in validation.outputs}, output)
+    pattern = _item_named(
+        {pattern_of_check.against: pattern_of_check for pattern_of_check in check.patterns}, against
+    )
+    return model_subjects.pattern(check, pattern)
 
 
-def _named(known: Mapping[str, T], name: str | None) -> T:
+def _item_named(items: Mapping[str, T], name: str | None) -> T:
     """Return the item of a name; by default the first."""
-    if name is not None and name not in known:
-        raise DataError(f"{name!r} is not among the results", remedy=f"use {', '.join(known)}")
-    return known[name or next(iter(known))]
+    if name is not None and name not in items:
+        raise DataError(f"{name!r} is not among the results", remedy=f"use {', '.join(items)}")
+    return items[name or next(iter(items))]
 
 
 _AGAINST = {kind: _against(kind) for kind in ("loops", "fit", "residuals")}

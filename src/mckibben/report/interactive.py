@@ -15,7 +15,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.notation import in_unicode
-from mckibben.report.drawing import Curve, Drawing, Label, Panel
+from mckibben.report.drawing import Arrow, Curve, Drawing, Label, Mark, Panel
 
 Json = dict[str, Any]
 
@@ -123,28 +123,37 @@ def _plot(panels: tuple[Panel, ...]) -> Json:
         named = [_trace(curve, x, y) for curve in panel.curves]
         traces += named
         layout["showlegend"] |= any(curve.name and curve.model is None for curve in panel.curves)
-        for arrow in panel.arrows:
-            (x0, y0), (x1, y1) = arrow.tail, arrow.head
-            layout["annotations"].append(
-                {"xref": x, "yref": y, "axref": x, "ayref": y, "x": x1, "y": y1, "ax": x0, "ay": y0}
-                | {"text": "", "showarrow": True, "arrowhead": 2, "arrowsize": 1.3}
-                | {"arrowwidth": 1.6, "arrowcolor": "--ink"}
-            )
+        layout["annotations"] += [_arrow(arrow, x, y) for arrow in panel.arrows]
         for mark in panel.marks:
-            here = {"xref": x, "yref": f"{y} domain"}
-            line: Json = {"type": "line", "x0": mark.x, "x1": mark.x, "y0": 0, "y1": 1}
-            line["line"] = {"color": "--muted", "width": 1, "dash": "dot"}
-            layout["shapes"].append(here | line)
-            at, anchor = (mark.x, "left") if mark.until is None else (mark.until, "right")
-            word = {"x": at, "y": 1, "text": text(mark.text), "showarrow": False}
-            layout["annotations"].append(here | word | {"xanchor": anchor, "yanchor": "bottom"})
-            if mark.until is not None:
-                area = {"type": "rect", "x1": mark.until, "line": {"width": 0}}
-                look = {"fillcolor": "--accent", "opacity": 0.12, "layer": "below"}
-                layout["shapes"].append(here | line | area | look)
+            shapes, word = _mark(mark, {"xref": x, "yref": f"{y} domain"})
+            layout["shapes"] += shapes
+            layout["annotations"].append(word)
         if panel.title:
             layout["title"] = {"text": text(panel.title)}
     return {"data": traces, "layout": layout}
+
+
+def _arrow(arrow: Arrow, x: str, y: str) -> Json:
+    (x0, y0), (x1, y1) = arrow.tail, arrow.head
+    return (
+        {"xref": x, "yref": y, "axref": x, "ayref": y, "x": x1, "y": y1, "ax": x0, "ay": y0}
+        | {"text": "", "showarrow": True, "arrowhead": 2, "arrowsize": 1.3}
+        | {"arrowwidth": 1.6, "arrowcolor": "--ink"}
+    )
+
+
+def _mark(mark: Mark, axes: Json) -> tuple[list[Json], Json]:
+    """Return the line of a mark, with its shaded interval if it has one, and its name."""
+    line: Json = {"type": "line", "x0": mark.x, "x1": mark.x, "y0": 0, "y1": 1}
+    line["line"] = {"color": "--muted", "width": 1, "dash": "dot"}
+    shapes = [axes | line]
+    position, anchor = (mark.x, "left") if mark.until is None else (mark.until, "right")
+    word = {"x": position, "y": 1, "text": text(mark.text), "showarrow": False}
+    if mark.until is not None:
+        area = {"type": "rect", "x1": mark.until, "line": {"width": 0}}
+        look = {"fillcolor": "--accent", "opacity": 0.12, "layer": "below"}
+        shapes.append(axes | line | area | look)
+    return shapes, axes | word | {"xanchor": anchor, "yanchor": "bottom"}
 
 
 def _axis(label: Label | str) -> Json:

@@ -44,19 +44,19 @@ class Card:
     @property
     def lines(self) -> list[str]:
         """Every sentence."""
-        texts = [one for one in self.items if isinstance(one, Text)]
-        return [in_terms_of(line) for one in texts for line in one.sentences]
+        texts = [item for item in self.items if isinstance(item, Text)]
+        return [in_terms_of(line) for item in texts for line in item.sentences]
 
     @property
     def tables(self) -> list[Table]:
         """Every table."""
-        return [one for one in self.items if isinstance(one, Table)]
+        return [item for item in self.items if isinstance(item, Table)]
 
     def text(self) -> str:
         """Return the title and sentences, or rows if there are none, in at most three lines."""
         first, *_ = wrap(verbatim(self.title), WIDTH, max_lines=1, placeholder=" …") or [""]
-        rest = verbatim(" ".join(self.lines or map(_read_out, self.tables)))
-        return "\n".join([first, *wrap(rest, WIDTH, max_lines=2, placeholder=" …")])
+        body = verbatim(" ".join(self.lines or map(_read_out, self.tables)))
+        return "\n".join([first, *wrap(body, WIDTH, max_lines=2, placeholder=" …")])
 
     def html(self) -> str:
         """Return it for a notebook: escaped, without scripts or colours of its own."""
@@ -76,7 +76,7 @@ def card(thing: Any) -> Card:
     """Return the card of an object, by its ``face``."""
     pair = pair_of(thing) if isinstance(thing, Recording) else None
     path = None if pair is None else (thing[pair[0]], thing[pair[1]])
-    title = TITLES.get(thing.face, lambda one: type(one).__name__)(thing)
+    title = TITLES.get(thing.face, lambda value: type(value).__name__)(thing)
     return Card(title, results.FACES[thing.face](thing), path)
 
 
@@ -91,8 +91,10 @@ def _read_out(table: Table) -> str:
 
 
 def _row(cells: Sequence[Any], tag: str) -> str:
-    found = "".join(f'<{tag} style="{_CELL}">{_escaped(cell(value))}</{tag}>' for value in cells)
-    return f"<tr>{found}</tr>"
+    cells_html = "".join(
+        f'<{tag} style="{_CELL}">{_escaped(cell(value))}</{tag}>' for value in cells
+    )
+    return f"<tr>{cells_html}</tr>"
 
 
 def _escaped(text: str) -> str:

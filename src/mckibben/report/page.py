@@ -28,7 +28,12 @@ from mckibben.report.builder import (
 )
 from mckibben.report.commands import commands
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
-from mckibben.report.shown import Shown, drawn, shown, unique
+from mckibben.report.modelled_runs import (
+    ModelledRun,
+    each_recording_once,
+    runs_of_study,
+    runs_with_figures,
+)
 
 if TYPE_CHECKING:
     from mckibben.comparison.leaderboard import Leaderboard
@@ -68,27 +73,27 @@ def write_report(study: Study, path: str | Path, *, title: str = "") -> None:
 
 def page(study: Study, command: str = "", *, title: str = "") -> str:
     """Return the report of a study as HTML, with the commands that repeat it, and its title."""
-    board, every = study.leaderboard, shown(study)
-    pictured = drawn(every)
-    first = pictured[0]
+    board, runs = study.leaderboard, runs_of_study(study)
+    drawn_runs = runs_with_figures(runs)
+    first = drawn_runs[0]
     n_models = min(N_COLOURS, len(study.predictions))
-    n_values = len(pictured) * 2 * (3 + 3 * n_models)
-    view = _View(pictured, max(FEWEST_POINTS, min(POINTS, N_VALUES // n_values)))
+    n_values = len(drawn_runs) * 2 * (3 + 3 * n_models)
+    view = _View(drawn_runs, max(FEWEST_POINTS, min(POINTS, N_VALUES // n_values)))
     sections = (
         _review(study, view.points),
         Section("leaderboard", "Leaderboard", results.leaderboard(board, COLUMNS)),
         _model(study, view),
         _checks(study, view),
-        _recordings(study, every, view),
+        _recordings(study, runs, view),
         _method(study, command),
     )
-    names = [one.recording.name for one in unique(pictured)]
-    more = len(unique(every)) - len(names)
+    names = [run.recording.name for run in each_recording_once(drawn_runs)]
+    more = len(each_recording_once(runs)) - len(names)
     return Page(
         title
         or f"{study.output} over {study.input if first.several else first.input}".capitalize(),
         f"{', '.join(names)}{f' and {more} more' if more else ''}",
-        [one for one in sections if one is not None],
+        [run for run in sections if run is not None],
         results.tiles(study),
         _lead(first, board),
         words.answers(study),
@@ -98,25 +103,25 @@ def page(study: Study, command: str = "", *, title: str = "") -> str:
 class _View:
     """The recordings drawn, and the number of points."""
 
-    def __init__(self, pictured: Sequence[Shown], points: int) -> None:
+    def __init__(self, pictured: Sequence[ModelledRun], points: int) -> None:
         self.pictured, self.points = pictured, points
         self.names = [f"{one.name} ({one.role})" for one in pictured]
 
-    def each(self, draw: Callable[[Shown], Drawing]) -> Variants:
+    def each(self, draw: Callable[[ModelledRun], Drawing]) -> Variants:
         """Return a figure for every recording."""
         return [interactive.plots(draw(one)) for one in self.pictured]
 
 
-def _lead(one: Shown, board: Leaderboard) -> Figure:
+def _lead(run: ModelledRun, board: Leaderboard) -> Figure:
     """Return the measured loop with the chosen model's; over time for several inputs."""
-    moving = [name for name in board.inputs if any_moves([one.recording], (name,))]
-    best = next(iter(one.outputs), None)
-    caption = one.name + (f", and {best} running free" if best else "")
+    moving = [name for name in board.inputs if any_moves([run.recording], (name,))]
+    best = next(iter(run.outputs), None)
+    caption = run.name + (f", and {best} running free" if best else "")
     if best is None:
-        drawing = subjects.loop([one.recording], one.input, one.output)
+        drawing = subjects.loop([run.recording], run.input, run.output)
     else:
-        timed = len(moving) > 1 and one.recording.sample_time is not None
-        drawing = one.draw("fit" if timed else "loops", models=1)
+        timed = len(moving) > 1 and run.recording.sample_time is not None
+        drawing = run.draw("fit" if timed else "loops", models=1)
     return Figure("lead", [interactive.plots(drawing)], "Loop, measured and modelled", caption)
 
 
@@ -131,26 +136,26 @@ def _model(study: Study, view: _View) -> Section | None:
     if not study.predictions:
         return None
     ranked = [row.model for row in board.rows if row.reason is None][:N_COLOURS]
-    fit = view.each(lambda one: one.draw("fit", view.points))
+    fit = view.each(lambda run: run.draw("fit", view.points))
     items: list[Any] = [Figure("fit", fit, "Measured and modelled output over time", toggled=True)]
     if study.description is not None:
         items += results.description(study.description)
     name = "Model" if board.best is None else f"Model: {board.best.model}"
-    models = [{"name": one, "colour": series_colour(k)} for k, one in enumerate(ranked)]
+    models = [{"name": run, "colour": series_colour(k)} for k, run in enumerate(ranked)]
     return Section("model", name, items, view.names, models)
 
 
 def _checks(study: Study, view: _View) -> Section | None:
     board, items = study.leaderboard, list[Any]()
     if study.predictions:
-        residuals = view.each(lambda one: one.draw("residuals", view.points))
+        residuals = view.each(lambda run: run.draw("residuals", view.points))
         label = "Residuals over input and over time"
         items.append(Figure("residuals", residuals, label, "", "", 2, toggled=True))
     if isinstance(study.check, Validation):
-        for one in study.check.outputs[:MOST_CHECKED]:
-            items += results.checked(one)
-    if said := words.compensated(study):
-        items.append(Text(said, "note", listed=True))
+        for run in study.check.outputs[:MOST_CHECKED]:
+            items += results.checked(run)
+    if sentences := words.compensated(study):
+        items.append(Text(sentences, "note", listed=True))
     if study.inverse is not None:
         drawing = model_subjects.inverse_check(study.inverse.check)
         caption = f"A random motion of {study.inverse.model}, and the model behind its inverse."
@@ -169,18 +174,18 @@ def _checks(study: Study, view: _View) -> Section | None:
     return Section("checks", "Checks", items, view.names) if items else None
 
 
-def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
+def _recordings(study: Study, runs: Sequence[ModelledRun], view: _View) -> Section:
     board = study.leaderboard
-    listed = [
-        [one.recording.name, one.recording.source or "–", words.duration(one.recording), one.role]
-        for one in unique(every)
+    rows = [
+        [run.recording.name, run.recording.source or "–", words.duration(run.recording), run.role]
+        for run in each_recording_once(runs)
     ]
-    measured = [one.recording for one in unique(every)]
+    measured = [run.recording for run in each_recording_once(runs)]
     time = view.each(
-        lambda one: subjects.time_course([one.recording], (one.input, one.output), view.points)
+        lambda run: subjects.time_course([run.recording], (run.input, run.output), view.points)
     )
     items: list[Any] = [
-        Table(["Recording", "File", "Length", "Used to"], listed),
+        Table(["Recording", "File", "Length", "Used to"], rows),
         Figure("time", time, "Input and output over time", "", "stacked"),
     ]
     items += results.data_gaps(study.data_gaps)
@@ -188,7 +193,7 @@ def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
         items += results.characterization(study.characterization)
     if not (len(board.inputs) == len(board.outputs) == 1):
         items.append(_coupling(board, measured))
-    notes = [f"{file}: {'; '.join(said)}." for file, said in notes_by_file(measured).items()]
+    notes = [f"{file}: {'; '.join(texts)}." for file, texts in notes_by_file(measured).items()]
     notes += [note for note in study.notes if note not in reading_notes(measured)]
     items.append(Text(notes, "note", listed=True) if notes else None)
     return Section("recordings", "Recordings", items, view.names)
@@ -196,12 +201,12 @@ def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
 
 def _coupling(board: Leaderboard, recordings: Sequence[Recording]) -> Table:
     """Return the effects of several inputs on outputs."""
-    found = coupling(list(recordings), board.inputs, board.outputs)
+    effects = coupling(list(recordings), board.inputs, board.outputs)
     rows: list[list[Any]] = [
-        [f"{output} [{found.units[k]}]", *found.effects[k].tolist(), 100 * found.explained[k]]
-        for k, output in enumerate(found.outputs)
+        [f"{output} [{effects.units[k]}]", *effects.effects[k].tolist(), 100 * effects.explained[k]]
+        for k, output in enumerate(effects.outputs)
     ]
-    return Table(["Effect of the whole range of", *found.inputs, "explained [%]"], rows)
+    return Table(["Effect of the whole range of", *effects.inputs, "explained [%]"], rows)
 
 
 def _method(study: Study, command: str) -> Section:

@@ -159,8 +159,8 @@ def save(drawing: Drawing, path: str | Path, columns: Literal[1, 2] | None = Non
 
     figure = io.BytesIO()
     with rc_context(style):
-        made = drawn(drawing, columns)
-        made.savefig(figure, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
+        canvas = drawn(drawing, columns)
+        canvas.savefig(figure, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
     with replacing(path) as new:
         new.write_bytes(figure.getvalue())
 
@@ -212,16 +212,16 @@ def draw_on(
     width = scale * (COLUMN if (columns or min(abreast, 2)) == 1 else PAGE)
     height = scale * _axes_height(drawing, width / scale / abreast)
     figure.set_size_inches(width, 3 * rows * height)
-    every = list(figure.subplots(rows, abreast, squeeze=False, sharex=drawing.stacked).ravel())
-    axes = every[:n]
-    for axis in every[n:]:
+    all_axes = list(figure.subplots(rows, abreast, squeeze=False, sharex=drawing.stacked).ravel())
+    axes = all_axes[:n]
+    for axis in all_axes[n:]:
         axis.set_axis_off()
     styles = styled(drawing)
-    for place, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=True)):
-        below = drawing.panels[place + abreast : place + abreast + 1]
-        beside = drawing.panels[place - 1 : place] if place % abreast else ()
-        last = all(one.x_label != panel.x_label for one in below)
-        first = all(one.y_label != panel.y_label for one in beside)
+    for index, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=True)):
+        below = drawing.panels[index + abreast : index + abreast + 1]
+        beside = drawing.panels[index - 1 : index] if index % abreast else ()
+        last = all(neighbour.x_label != panel.x_label for neighbour in below)
+        first = all(neighbour.y_label != panel.y_label for neighbour in beside)
         draw_panel(axis, panel, bottom=last, left=first, styled=styles)
     if drawing.note:
         size = _size("legend.fontsize")
@@ -229,14 +229,14 @@ def draw_on(
         figure.supxlabel(note, fontsize=size)
     for repetition in range(PASSES):
         figure.draw_without_rendering()
-        boxes = [axis.get_window_extent().height / figure.dpi for axis in every[::abreast]]
-        others = figure.get_size_inches()[1] - sum(boxes)
-        fitting = min(height, max((scale * PAGE_HEIGHT - others) / rows, LEAST_HEIGHT))
+        boxes = [axis.get_window_extent().height / figure.dpi for axis in all_axes[::abreast]]
+        other_height = figure.get_size_inches()[1] - sum(boxes)
+        fitting = min(height, max((scale * PAGE_HEIGHT - other_height) / rows, LEAST_HEIGHT))
         for panel, axis in zip(drawing.panels, axes, strict=True):
             wrap_labels(axis, panel, _POINTS * max(fitting, LABEL_HEIGHT))
             thin_ticks(axis)
         if repetition:
-            figure.set_size_inches(width, others + rows * fitting)
+            figure.set_size_inches(width, other_height + rows * fitting)
         else:
             _legends(figure, axes)
     return axes
@@ -247,12 +247,16 @@ def _legends(figure: Figure, axes: Sequence[Axes]) -> None:
 
     The figure becomes as high as the legends need at most.
     """
-    own = [_entries(axis) for axis in axes]
-    every = list({(one.name, one.look): one for entries in own for one in entries}.values())
+    entries_of_axes = [_entries(axis) for axis in axes]
+    unique = list(
+        {
+            (entry.name, entry.look): entry for entries in entries_of_axes for entry in entries
+        }.values()
+    )
     width, height = figure.get_size_inches()
-    figure.set_size_inches(width, height + sum(map(len, own)))
-    if len({one.look for one in every}) == len(every):
-        _legend(figure, every, _POINTS * width, loc="outside upper left")
+    figure.set_size_inches(width, height + sum(map(len, entries_of_axes)))
+    if len({entry.look for entry in unique}) == len(unique):
+        _legend(figure, unique, _POINTS * width, loc="outside upper left")
     else:
         for axis in axes:
             axis_legend(axis)
@@ -261,8 +265,8 @@ def _legends(figure: Figure, axes: Sequence[Axes]) -> None:
 def draw_into(axes: Sequence[Axes], drawing: Drawing) -> None:
     """Draw every panel into given axes, each with its legend above."""
     last = len(axes) - 1
-    for place, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=True)):
-        draw_panel(axis, panel, not drawing.stacked or place == last, styled=styled(drawing))
+    for index, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=True)):
+        draw_panel(axis, panel, not drawing.stacked or index == last, styled=styled(drawing))
         wrap_labels(axis, panel, _inside(axis)[1])
         axis_legend(axis)
 
@@ -312,10 +316,10 @@ def _width(words: str, size: float, mathematics: bool = False) -> float:
 
     if not words:
         return 0.0
-    found = text_to_path.get_text_width_height_descent(
+    extent = text_to_path.get_text_width_height_descent(
         words, FontProperties(size=size), mathematics
     )
-    return float(found[0])
+    return float(extent[0])
 
 
 def _size(name: str) -> float:
@@ -344,7 +348,7 @@ def _axes_height(drawing: Drawing, width: float) -> float:
     """Return the height of axes [in] in panels of a width."""
     if words := drawing.panels[0].categories:
         size, widest = _size("ytick.labelsize"), _POINTS * width * _CATEGORIES
-        lines = max(wrapped(verbatim(one), widest, size).count("\n") for one in words)
+        lines = max(wrapped(verbatim(category), widest, size).count("\n") for category in words)
         return 0.3 + (0.2 + 1.2 * lines * size / _POINTS) * len(words)
     if drawing.stacked or drawing.abreast == 1:
         return 1.2
@@ -354,7 +358,7 @@ def _axes_height(drawing: Drawing, width: float) -> float:
 def styled(drawing: Drawing) -> bool:
     """Return whether a drawing has more series than differ by colour alone."""
     curves = [curve for panel in drawing.panels for curve in panel.curves]
-    return len({one.colour for one in curves if one.colour.startswith("series")}) > PLAIN
+    return len({curve.colour for curve in curves if curve.colour.startswith("series")}) > PLAIN
 
 
 def draw_panel(
@@ -411,10 +415,12 @@ def thin_ticks(axis: Axes) -> None:
     """Take fewer ticks along x as long as their numbers touch."""
     for n in range(MOST_TICKS, 1, -1):
         low, high = sorted(axis.get_xlim())
-        shown = [one for one in axis.get_xticklabels() if low <= one.get_position()[0] <= high]
-        boxes = [one.get_window_extent() for one in shown if one.get_text()]
+        labels = [
+            label for label in axis.get_xticklabels() if low <= label.get_position()[0] <= high
+        ]
+        boxes = [label.get_window_extent() for label in labels if label.get_text()]
         gap = APART * _size("xtick.labelsize") * _figure(axis).dpi / _POINTS
-        if all(next_.x0 - one.x1 > gap for one, next_ in pairwise(boxes)):
+        if all(next_.x0 - label.x1 > gap for label, next_ in pairwise(boxes)):
             return
         axis.locator_params(axis="x", nbins=n)
 
@@ -441,12 +447,12 @@ class _Entry(NamedTuple):
 
 def _entries(axis: Axes) -> list[_Entry]:
     """Return what is in the legend of axes."""
-    found = []
+    entries = []
     for handle, name in zip(*axis.get_legend_handles_labels(), strict=True):
         attributes = ("color", "linestyle", "linewidth", "marker", "markerfacecolor", "facecolor")
-        look = (getattr(handle, f"get_{one}", lambda: None)() for one in attributes)
-        found.append(_Entry(name, handle, tuple(map(str, look))))
-    return found
+        look = (getattr(handle, f"get_{attribute}", lambda: None)() for attribute in attributes)
+        entries.append(_Entry(name, handle, tuple(map(str, look))))
+    return entries
 
 
 def axis_legend(axis: Axes) -> None:
@@ -458,22 +464,22 @@ def axis_legend(axis: Axes) -> None:
         legend.set_title(title)
 
 
-def _legend(where: Axes | Figure, entries: Sequence[_Entry], width: float, **place: Any) -> None:
+def _legend(parent: Axes | Figure, entries: Sequence[_Entry], width: float, **place: Any) -> None:
     """Add a legend with as many columns as a width [pt] has room for."""
     size = _size("legend.fontsize")
-    beside, gap = (_HANDLE + _GAP) * size, _BETWEEN * size
+    handle_width, gap = (_HANDLE + _GAP) * size, _BETWEEN * size
     room = width - 2 * size
-    names = [wrapped(one.name, room - beside, size) for one in entries]
-    sizes = [beside + max(_width(line, size) for line in name.split("\n")) for name in names]
+    names = [wrapped(entry.name, room - handle_width, size) for entry in entries]
+    sizes = [handle_width + max(_width(line, size) for line in name.split("\n")) for name in names]
 
     def needed(columns: int) -> float:
         """Return the width of a legend that is filled column by column, as matplotlib does."""
-        return sum(max(one) + gap for one in np.array_split(sizes, columns)) - gap
+        return sum(max(entry) + gap for entry in np.array_split(sizes, columns)) - gap
 
     fitting = [n for n in range(1, len(names) + 1) if needed(n) <= room]
     if names:
-        where.legend(
-            *([one.handle for one in entries], names),
+        parent.legend(
+            *([entry.handle for entry in entries], names),
             ncols=max(fitting, default=1),
             handlelength=_HANDLE,
             handletextpad=_GAP,

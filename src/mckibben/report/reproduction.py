@@ -45,32 +45,34 @@ LEAST_HEIGHT_SHARE = 0.1
 """Least height of a panel, so that noise does not fill it, relative to the same height."""
 
 
-def heading(one: Table | Figure, *, quick: bool = False) -> str:
+def heading(item: Table | Figure, *, quick: bool = False) -> str:
     """Return a title, with the corresponding item of the paper, and whether the run was quick."""
-    of = f" ({one.text.of})" if one.text.of else ""
-    return f"{one.text.title}{of}{', quick run' if quick else ''}"
+    source = f" ({item.text.of})" if item.text.of else ""
+    return f"{item.text.title}{source}{', quick run' if quick else ''}"
 
 
-def reproduction_page(found: Reproduction, command: str = "") -> str:
+def reproduction_page(result: Reproduction, command: str = "") -> str:
     """Return the report of a re-run as HTML: printed results with ours first, figures last.
 
     ``command`` repeats it; default the one on the paper's rig.
     """
-    paper = found.paper
-    quick = ["A quick run: what takes long was left out, so figures are rougher."] * found.quick
-    pictured = [table for table in found.tables if table.text.drawn]
+    paper = result.paper
+    quick = ["A quick run: what takes long was left out, so figures are rougher."] * result.quick
+    drawn_tables = [table for table in result.tables if table.text.drawn]
     published = ". ".join(filter(None, (paper.authors, paper.published, paper.doi)))
     charts = [
         chart(f"comparison-{k}", comparison(table), heading(table), "tall" * (len(table.rows) > 12))
-        for k, table in enumerate(pictured)
+        for k, table in enumerate(drawn_tables)
     ]
-    drawings = [drawing(figure) for figure in found.figures]
+    drawings = [drawing(figure) for figure in result.figures]
     figures = [
-        chart(f"figure-{k}", one, heading(figure), "square", min(len(one.panels), one.abreast))
-        for k, (one, figure) in enumerate(zip(drawings, found.figures, strict=True))
+        chart(
+            f"figure-{k}", drawn, heading(figure), "square", min(len(drawn.panels), drawn.abreast)
+        )
+        for k, (drawn, figure) in enumerate(zip(drawings, result.figures, strict=True))
     ]
-    quickly = " --quick" * found.quick
-    command = command or f"mckibben reproduce {found.name}{quickly} --seed {found.seed}"
+    quick_flag = " --quick" * result.quick
+    command = command or f"mckibben reproduce {result.name}{quick_flag} --seed {result.seed}"
     return Page(
         paper.title,
         published,
@@ -78,33 +80,35 @@ def reproduction_page(found: Reproduction, command: str = "") -> str:
             Section(
                 "question",
                 "",
-                [Text([paper.question, f"{paper.protocol} Here: {found.on}.", *quick])],
+                [Text([paper.question, f"{paper.protocol} Here: {result.on}.", *quick])],
             ),
-            Section("results", "Results", [Text(found.summary, listed=True)]),
+            Section("results", "Results", [Text(result.summary, listed=True)]),
             Section("comparison", "Printed and ours", charts),
-            Section("tables", "Tables", tables(found.tables, found.quick)),
-            Section("differences", "What differs from the paper", [Text(found.notes, listed=True)]),
+            Section("tables", "Tables", tables(result.tables, result.quick)),
+            Section(
+                "differences", "What differs from the paper", [Text(result.notes, listed=True)]
+            ),
             Section("figures", "Figures", figures),
             Section("method", "How to repeat", [Code("", command)]),
         ],
     ).html()
 
 
-def items(found: Reproduction) -> list[Item]:
+def items(result: Reproduction) -> list[Item]:
     """Return the tables of a re-run, and their findings."""
-    return [*tables(found.tables, found.quick), Text(["", *found.summary])]
+    return [*tables(result.tables, result.quick), Text(["", *result.summary])]
 
 
-def tables(given: Sequence[Table], quick: bool = False) -> list[Item]:
+def tables(paper_tables: Sequence[Table], quick: bool = False) -> list[Item]:
     """Return every table under its heading, with its note."""
-    shown: list[Item] = []
-    for one in given:
-        shown += [
-            Text([heading(one, quick=quick)], "lead"),
-            builder.Table(one.columns, one.rows),
+    items_of_tables: list[Item] = []
+    for table in paper_tables:
+        items_of_tables += [
+            Text([heading(table, quick=quick)], "lead"),
+            builder.Table(table.columns, table.rows),
         ]
-        shown.append(Text([one.text.note], "muted") if one.text.note else None)
-    return shown
+        items_of_tables.append(Text([table.text.note], "muted") if table.text.note else None)
+    return items_of_tables
 
 
 def chart(
@@ -139,10 +143,10 @@ def comparison(table: Table) -> Drawing:
 
 def _plotted_columns(table: Table) -> list[str]:
     """Return the drawn columns: those of the measure, or with a printed number."""
-    named = [column for column in table.columns[1:] if table.text.drawn in column]
+    of_measure = [column for column in table.columns[1:] if table.text.drawn in column]
     printed = {c.removesuffix(", printed") for c in table.columns if c.endswith(", printed")}
-    both = [c for c in table.columns[1:] if c.removesuffix(", printed") in printed]
-    return named or both or list(table.columns[1:])
+    of_pairs = [c for c in table.columns[1:] if c.removesuffix(", printed") in printed]
+    return of_measure or of_pairs or list(table.columns[1:])
 
 
 def drawing(figure: Figure) -> Drawing:
@@ -172,13 +176,15 @@ def _panels(figure: Figure, recorded: str, colours: dict[str, str]) -> list[Pane
     panels, unnamed, shading = list[Panel](), {*colours}, figure.text.shaded
     for title, axes in figure.panels.items():
         labels = figure.text.axes.get(axes.key, figure.text)
-        here = {name: axes.curves[name] for name in colours if name in axes.curves}
-        under = recorded if len(here) > 1 else None
+        curves_here = {name: axes.curves[name] for name in colours if name in axes.curves}
+        wide_curve = recorded if len(curves_here) > 1 else None
         curves = tuple(
-            Curve(x, y, name if name in unnamed else "", colours[name], _style(x, name == under))
-            for name, (x, y) in here.items()
+            Curve(
+                x, y, name if name in unnamed else "", colours[name], _style(x, name == wide_curve)
+            )
+            for name, (x, y) in curves_here.items()
         )
-        unnamed -= {*here}
+        unnamed -= {*curves_here}
 
         marks = []
         for start, end in axes.shaded:
@@ -227,7 +233,7 @@ def _style(x: Array, under: bool) -> Style:
 # -- Markdown ------------------------------------------------------------------------------------------
 
 
-def markdown(found: Reproduction, date: str, pictures: str) -> str:
+def markdown(result: Reproduction, date: str, pictures: str) -> str:
     """Return a re-run as a page in Markdown: an index of the paper first, then tables and figures.
 
     Parameters
@@ -238,19 +244,19 @@ def markdown(found: Reproduction, date: str, pictures: str) -> str:
     pictures : str
         Folder of the pictures, relative to the page, each called by its figure's key.
     """
-    return "\n".join(_lines(found, date, pictures)).rstrip("\n") + "\n"
+    return "\n".join(_lines(result, date, pictures)).rstrip("\n") + "\n"
 
 
-def _lines(found: Reproduction, date: str, pictures: str) -> Iterator[str]:
-    paper = found.paper
+def _lines(result: Reproduction, date: str, pictures: str) -> Iterator[str]:
+    paper = result.paper
     yield f"# {paper.number}. {paper.title}\n"
     doi = f"[doi:{paper.doi}](https://doi.org/{paper.doi})" if paper.doi else ""
     yield ". ".join(filter(None, (paper.authors, paper.published, doi))) + ".\n"
     yield f"{paper.question}\n"
-    command = f"mckibben reproduce {found.name}{' --quick' if found.quick else ''}"
-    kind = "Quick run" if found.quick else "Full run"
+    command = f"mckibben reproduce {result.name}{' --quick' if result.quick else ''}"
+    kind = "Quick run" if result.quick else "Full run"
     yield (
-        f"{kind} of {date} by `{command}`, seed {found.seed}, on {found.on}, mckibben "
+        f"{kind} of {date} by `{command}`, seed {result.seed}, on {result.on}, mckibben "
         f"{version('mckibben')}. The rig is not the paper's hardware: orders and ratios can be "
         "compared, digits cannot.\n"
     )
@@ -262,40 +268,46 @@ def _lines(found: Reproduction, date: str, pictures: str) -> Iterator[str]:
     )
     yield "| in the paper | what it is | here | exact, or how it differs | command |"
     yield "|---|---|---|---|---|"
-    yield from (_indexed(item, found) for item in paper.items)
+    yield from (_indexed(item, result) for item in paper.items)
     parts: dict[str, list[Item]] = {
-        "What came out": [Text(found.summary, listed=True)],
+        "What came out": [Text(result.summary, listed=True)],
         "Given, and found": [
             Text([f"Given: {text}" for text in paper.given], listed=True),
             Text([f"Found: {text}" for text in paper.found], listed=True),
         ],
-        "What differs from the paper": [Text(found.notes, listed=True)],
-        "Tables": tables(found.tables, found.quick),
+        "What differs from the paper": [Text(result.notes, listed=True)],
+        "Tables": tables(result.tables, result.quick),
     }
-    for title, shown in parts.items():
-        yield f"\n## {title}\n\n{builder.markdown(shown)}"
+    for title, items_of_part in parts.items():
+        yield f"\n## {title}\n\n{builder.markdown(items_of_part)}"
     yield "\n## Figures\n"
-    for figure in found.figures:
-        yield f"### {heading(figure, quick=found.quick)}\n"
+    for figure in result.figures:
+        yield f"### {heading(figure, quick=result.quick)}\n"
         yield f"![{figure.text.title}]({pictures}/{figure.key}.png)\n"
     yield "## On your own rig\n"
     yield (
-        f"`mckibben reproduce {found.name} --data FOLDER` takes recordings of its runs on a rig of any "
+        f"`mckibben reproduce {result.name} --data FOLDER` takes recordings of its runs on a rig of any "
         f"size, in files of any name, and shows first which run each is; `mckibben rig record "
-        f"{found.name} --rig FILE` moves your rig so, and shows how each level is scaled.\n"
+        f"{result.name} --rig FILE` moves your rig so, and shows how each level is scaled.\n"
     )
 
 
-def _indexed(item: Indexed, found: Reproduction) -> str:
+def _indexed(item: Indexed, result: Reproduction) -> str:
     """Return the line of an equation, table or figure in the index."""
     kind, _, key = item.here.partition(":")
-    shown: tuple[Table | Figure, ...] = found.tables if kind == "table" else found.figures
-    titles = [heading(one, quick=found.quick) for one in shown if one.key == key]
-    here = f'`printed("{key}")`' if kind == "model" else f"`{item.here}`" if item.here else "–"
-    here = f"[{key}](#{_anchor(titles[0])})" if titles else here
+    results_of_kind: tuple[Table | Figure, ...] = (
+        result.tables if kind == "table" else result.figures
+    )
+    titles = [
+        heading(item_of_kind, quick=result.quick)
+        for item_of_kind in results_of_kind
+        if item_of_kind.key == key
+    ]
+    place = f'`printed("{key}")`' if kind == "model" else f"`{item.here}`" if item.here else "–"
+    place = f"[{key}](#{_anchor(titles[0])})" if titles else place
     differs = item.differs or ("the same quantities, on the rig" if titles else "exact")
-    command = f"`{found.paper.commands[item.computed_by]}`" if item.computed_by else ""
-    return f"| {item.of} | {item.what} | {here} | {differs} | {command} |"
+    command = f"`{result.paper.commands[item.computed_by]}`" if item.computed_by else ""
+    return f"| {item.of} | {item.what} | {place} | {differs} | {command} |"
 
 
 def _anchor(title: str) -> str:

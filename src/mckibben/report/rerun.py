@@ -55,55 +55,57 @@ def rerun(
     paper(name)
     runs = None if data is None else _recordings(data, reading)
     if runs is not None:
-        known = recognise(name, runs)  # refuses what is missing, too
+        matches = recognise(name, runs)  # refuses what is missing, too
         if recognised is not None:
-            recognised(recognised_table(known))
-    given: dict[str, Any] = {
+            recognised(recognised_table(matches))
+    arguments: dict[str, Any] = {
         "name": name,
         "rig": None if rig is None else load_rig(rig),
         "data": runs,
         "quick": quick,
     }
-    given |= {"seed": seed, "jobs": jobs, "folder": out}
+    arguments |= {"seed": seed, "jobs": jobs, "folder": out}
     inputs = [] if data is None else [data]
     with results_in(
         out, ["report.html", "tables.json"], inputs=inputs, force=force, kind="reproduce"
     ) as results:
-        with workers.Workers(1, cores=jobs or threads.cores()) as one:
-            (outcome,) = one.results(
-                _again, [given], lambda index, *news: progress(*news) if progress and news else None
+        with workers.Workers(1, cores=jobs or threads.cores()) as pool:
+            (outcome,) = pool.results(
+                _again,
+                [arguments],
+                lambda index, *news: progress(*news) if progress and news else None,
             )
-        found: Reproduction = outcome.result()
+        result: Reproduction = outcome.result()
         if results is not None:
-            results.write_text("report.html", reproduction_page(found, command))
-            results.write_text("tables.json", to_json(found.to_dict()) + "\n")
+            results.write_text("report.html", reproduction_page(result, command))
+            results.write_text("tables.json", to_json(result.to_dict()) + "\n")
             results.commit()
         Checkpoints(out).clear()
-    return found
+    return result
 
 
-def _again(common: None, given: dict[str, Any], tell: Callable[..., None]) -> Reproduction:
+def _again(common: None, arguments: dict[str, Any], tell: Callable[..., None]) -> Reproduction:
     """Re-run a paper in a worker process."""
-    return reproduce(**given, clear=False, progress=tell)
+    return reproduce(**arguments, clear=False, progress=tell)
 
 
 def _recordings(folder: Path, reading: ReadOptions | None) -> list[Recording]:
     """Return the recordings of a folder, each named as its file."""
     if not folder.is_dir():
         raise DataError("there is no such folder", file=folder, remedy="name one with recordings")
-    found: list[Recording] = []
+    runs: list[Recording] = []
     for path in inside(folder):
         with warnings.catch_warnings():  # which are said once for all files
             warnings.simplefilter("ignore", DataWarning)
             parts = read_files(path, None, reading)
-        for place, one in enumerate(parts, start=1):
+        for place, part in enumerate(parts, start=1):
             name = f"{path.stem}-{place}" if len(parts) > 1 else path.stem
-            found.append(replace(one.with_meta(name=name), start_time=0.0))
+            runs.append(replace(part.with_meta(name=name), start_time=0.0))
     files: dict[str, list[str]] = {}
-    for file, notes in notes_by_file(found).items():
+    for file, notes in notes_by_file(runs).items():
         for note in notes:
             files.setdefault(note, []).append(file)
-    for note, those in files.items():
-        more = f" and {len(those) - 1} more" if len(those) > 1 else ""
-        warnings.warn(DataWarning(f"{those[0]}{more}: {note}"), stacklevel=2)
-    return found
+    for note, names in files.items():
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        warnings.warn(DataWarning(f"{names[0]}{more}: {note}"), stacklevel=2)
+    return runs

@@ -68,8 +68,8 @@ class StudyFolder:
         """Write new results; the page only when it is due, or at the end."""
         write, board = self._results.write_text, study.leaderboard
         if not board.rows and study.characterization is not None:
-            found = study.characterization.to_dict()
-            write("characterization.json", to_json(found) + "\n")
+            measures = study.characterization.to_dict()
+            write("characterization.json", to_json(measures) + "\n")
         if not board.rows and study.review is not None:
             write("review.json", to_json(study.review.to_dict()) + "\n")
             if isinstance(study.review.refit, Refit):
@@ -91,8 +91,8 @@ class StudyFolder:
             validation = {"not_checked": study.check}
             if isinstance(study.check, Validation):
                 validation = check_json(study.check, model_file(best.model))
-            whole = study.to_dict()
-            validation |= {name: whole[name] for name in ("description", "data_gaps")}
+            content = study.to_dict()
+            validation |= {name: content[name] for name in ("description", "data_gaps")}
             write("validation.json", to_json(validation) + "\n")
             if best.banded is not None:
                 write("banded.json", best.banded.to_text())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -41,16 +42,16 @@ def time_course(
     recordings: Sequence[Recording], channels: Sequence[str], points: int = POINTS
 ) -> Drawing:
     """Draw channels over time, one panel each; several recordings share the panels."""
-    kept, note = _first(recordings)
-    colours = _colours(kept)
+    drawn, note = _first(recordings)
+    colours = _colours(drawn)
     panels = []
     for channel in channels:
         curves = []
-        for recording, (name, colour) in zip(kept, colours, strict=True):
+        for recording, (name, colour) in zip(drawn, colours, strict=True):
             t, y = over_time(recording.time, recording[channel], points)
             name = name if channel == channels[0] else ""
             curves.append(Curve(t, y, name, colour, _measured_style(recording)))
-        panels.append(Panel(time_label(kept[0]), channel_label(kept[0], channel), tuple(curves)))
+        panels.append(Panel(time_label(drawn[0]), channel_label(drawn[0], channel), tuple(curves)))
     return Drawing(tuple(panels), stacked=True, note=note)
 
 
@@ -58,18 +59,21 @@ def spectrum(recordings: Sequence[Recording], channels: Sequence[str]) -> Drawin
     """Draw the power density of channels over frequency, by Welch's method, one panel each."""
     from scipy.signal import welch
 
-    kept, note = _first(recordings)
+    drawn, note = _first(recordings)
     panels = []
     for channel in channels:
         curves = []
-        for recording, (name, colour) in zip(kept, _colours(kept), strict=True):
+        for recording, (name, colour) in zip(drawn, _colours(drawn), strict=True):
             n = min(recording.n_samples, LONGEST_SEGMENT)
             frequency, density = welch(recording[channel], 1.0 / recording.step, nperseg=n)
             level = 10 * np.log10(np.maximum(density[1:], np.finfo(float).tiny))
             name = name if channel == channels[0] else ""
             curves.append(Curve(*over_time(frequency[1:], level), name, colour, "fine"))
-        of = channel_label(kept[0], channel)
-        label = Label(f"power of {of.name}", f"dB of ({of.unit})²/Hz" if of.unit else "dB/Hz")
+        channel_axis = channel_label(drawn[0], channel)
+        label = Label(
+            f"power of {channel_axis.name}",
+            f"dB of ({channel_axis.unit})²/Hz" if channel_axis.unit else "dB/Hz",
+        )
         panels.append(Panel(Label("frequency", "Hz"), label, tuple(curves)))
     return Drawing(tuple(panels), stacked=True, note=note)
 
@@ -82,11 +86,13 @@ def loop(
     symbols: Mapping[str, str] | None = None,
 ) -> Drawing:
     """Draw the output over the input: a single recording coloured by time, several by recording."""
-    kept, note = _first(recordings)
-    x_label, y_label = (channel_label(kept[0], name, symbols) for name in (input_name, output_name))
-    arrows = directions(kept[0][input_name], kept[0][output_name])
-    if len(kept) == 1:
-        curves = _by_age(kept[0], input_name, output_name, points)
+    drawn, note = _first(recordings)
+    x_label, y_label = (
+        channel_label(drawn[0], name, symbols) for name in (input_name, output_name)
+    )
+    arrows = directions(drawn[0][input_name], drawn[0][output_name])
+    if len(drawn) == 1:
+        curves = _by_age(drawn[0], input_name, output_name, points)
     else:
         curves = tuple(
             Curve(
@@ -95,7 +101,7 @@ def loop(
                 colour,
                 _path_style(recording[input_name], _measured_style(recording)),
             )
-            for recording, (name, colour) in zip(kept, _colours(kept), strict=True)
+            for recording, (name, colour) in zip(drawn, _colours(drawn), strict=True)
         )
     return Drawing((Panel(x_label, y_label, curves, arrows=arrows),), note=note)
 
@@ -128,45 +134,49 @@ def against(
         Of channels, as in the models' equations.
     """
     u, y = recording[pair[0]], recording[pair[1]]
-    left, dots = kind == "residuals", jumps(u)
-    drawn: list[tuple[str, str, Array, Style, str | None]] = []
-    if not left:
-        under = _measured_style(recording, under=True)
-        drawn.append((recording.origin, "measured", y, under, None))
-    for place, (model, modelled) in [*enumerate(outputs.items())][:N_COLOURS][::-1]:
-        style: Style = "fine" if left else "line"
-        values = y - modelled if left else modelled
-        drawn.append((model, series_colour(place), values, style, model))
+    residual = kind == "residuals"
+    signals = _residuals(y, outputs) if residual else _signals(recording, y, outputs)
     label = channel_label(recording, pair[1], symbols)
-    if left:
+    if residual:
         label = Label(f"{recording.origin} − model", label.unit)
-    least, panels = 1e-6 * float(np.ptp(y)), []
+    least = 1e-6 * float(np.ptp(y))
+    panels = []
     if kind != "fit":
         paths = tuple(
-            Curve(*along(u, v, points)[1:], name, colour, "specks" if dots else style, model)
-            for name, colour, v, style, model in drawn
+            replace(signal, x=x, y=v, style=_path_style(u, signal.style))
+            for signal in signals
+            for _, x, v in [along(u, signal.y, points)]
         )
-        arrows = () if left else directions(u, y)
-        panels.append(
-            Panel(
-                channel_label(recording, pair[0], symbols),
-                label,
-                paths,
-                arrows=arrows,
-                zero=left,
-                least=least,
-            )
-        )
+        x_label = channel_label(recording, pair[0], symbols)
+        arrows = () if residual else directions(u, y)
+        panels.append(Panel(x_label, label, paths, arrows=arrows, zero=residual, least=least))
     if kind != "loops":
         t = recording.time
         courses = tuple(
-            Curve(*over_time(t, v, points), "" if left else name, colour, style, model)
-            for name, colour, v, style, model in drawn
+            replace(signal, x=x, y=v, name="" if residual else signal.name)
+            for signal in signals
+            for x, v in [over_time(t, signal.y, points)]
         )
         marks = () if test_from is None else (Mark(float(t[test_from]), HELD_OUT, float(t[-1])),)
-        x = time_label(recording)
-        panels.append(Panel(x, label, courses, marks=marks, zero=left, least=least))
+        x_label = time_label(recording)
+        panels.append(Panel(x_label, label, courses, marks=marks, zero=residual, least=least))
     return Drawing(tuple(panels), abreast={"fit": 1, "residuals": 2}.get(kind, 3))
+
+
+def _signals(recording: Recording, y: Array, outputs: Mapping[str, Array]) -> list[Curve]:
+    """Return the measured output, and over it those of models, the best last; x is not set yet."""
+    under = _measured_style(recording, under=True)
+    models = [*enumerate(outputs.items())][:N_COLOURS][::-1]
+    return [
+        Curve(y, y, recording.origin, "measured", under),
+        *(Curve(v, v, name, series_colour(k), "line", name) for k, (name, v) in models),
+    ]
+
+
+def _residuals(y: Array, outputs: Mapping[str, Array]) -> list[Curve]:
+    """Return the measured output less those of models, the best last; x is not set yet."""
+    models = [*enumerate(outputs.items())][:N_COLOURS][::-1]
+    return [Curve(y - v, y - v, name, series_colour(k), "fine", name) for k, (name, v) in models]
 
 
 def directions(u: Array, y: Array) -> tuple[Arrow, ...]:
@@ -184,9 +194,11 @@ def directions(u: Array, y: Array) -> tuple[Arrow, ...]:
     arrows: list[Arrow] = []
     if jumps(u):
         return ()
-    found = [(abs(u[stop - 1] - u[start]), start, stop, way) for start, stop, way in branches(u)]
-    for wanted in (1, -1):
-        same = [branch for branch in found if branch[3] * wanted > 0]
+    branches_by_width = [
+        (abs(u[stop - 1] - u[start]), start, stop, way) for start, stop, way in branches(u)
+    ]
+    for direction in (1, -1):
+        same = [branch for branch in branches_by_width if branch[3] * direction > 0]
         if not same:
             continue
         _, start, stop, _ = max(same)

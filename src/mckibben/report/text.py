@@ -29,7 +29,7 @@ def lines(items: Sequence[Item]) -> Iterator[str]:
             yield f"{item.what}: {item.text}"
 
 
-def shown(result: Any) -> Iterator[str]:
+def lines_of_result(result: Any) -> Iterator[str]:
     """Return the lines of a result, by its ``face``, and its notes."""
     from mckibben.report.results import FACES
 

@@ -60,17 +60,20 @@ def chosen(board: Leaderboard) -> str:
     best, lowest = board.best, board.lowest
     if board.not_recommended is not None and board.constant is not None:
         first = next(row for row in board.rows if row.reason is None)
-        given = first.to_dict(), board.constant.to_dict()
-        return not_recommended(board.not_recommended, *given, board.unit)
+        rows = first.to_dict(), board.constant.to_dict()
+        return not_recommended(board.not_recommended, *rows, board.unit)
     if best is None or lowest is None:
         return ""
-    heading, by = CHOICES["fit" if best.validation_rmse is None else board.chosen_by]
-    own, least, error = (
+    heading, criterion_name = CHOICES["fit" if best.validation_rmse is None else board.chosen_by]
+    test_error, lowest_error, criterion = (
         f"{numeral(value, 3)} {board.unit}".strip()
         for value in (best.test_error, lowest.test_error, best.chosen_by)
     )
-    end = ", the lowest" if lowest is best else f"; the lowest is {lowest.model}'s, {least}"
-    return f"Chosen by {by}: {best.model}, {heading} {error}. Its test RMSE is {own}{end}."
+    end = ", the lowest" if lowest is best else f"; the lowest is {lowest.model}'s, {lowest_error}"
+    return (
+        f"Chosen by {criterion_name}: {best.model}, {heading} {criterion}. Its test RMSE is "
+        f"{test_error}{end}."
+    )
 
 
 def doubtful(board: Leaderboard) -> str:
@@ -106,7 +109,7 @@ def spanned(span: Span) -> str:
 
 
 def not_recommended(
-    where: Against, row: Mapping[str, Any], constant: Mapping[str, Any], unit: str
+    side: Against, row: Mapping[str, Any], constant: Mapping[str, Any], unit: str
 ) -> str:
     """Return why the model ranked first is not recommended.
 
@@ -119,35 +122,37 @@ def not_recommended(
     unit : str
         Of errors.
     """
-    on_test = where == "test"
+    on_test = side == "test"
     errors = [
-        (one.get("test") or {}).get("rmse") if on_test else one.get("validation_rmse")
-        for one in (row, constant)
+        (numbers.get("test") or {}).get("rmse") if on_test else numbers.get("validation_rmse")
+        for numbers in (row, constant)
     ]
-    own, mean = (f"{numeral(error, 3)} {unit}".strip() for error in errors)
-    on = "the test data" if on_test else "what was left out to validate"
+    error, constant_error = (f"{numeral(error, 3)} {unit}".strip() for error in errors)
+    data = "the test data" if on_test else "what was left out to validate"
     return (
-        f"No model is recommended: on {on}, {row['model']} has an RMSE of {own}, and the mean of the "
-        f"training output has {mean}."
+        f"No model is recommended: on {data}, {row['model']} has an RMSE of {error}, and the mean of "
+        f"the training output has {constant_error}."
     )
 
 
 def comparison(board: Leaderboard) -> list[str]:
     """Return notes on a comparison."""
-    best, said = board.best, list(board.shared)
+    best, sentences = board.best, list(board.shared)
     if board.loads:
-        said.append(f"Further inputs of all models: {', '.join(board.loads)}.")
+        sentences.append(f"Further inputs of all models: {', '.join(board.loads)}.")
     if board.offered:
-        said.append(f"Further inputs of models that can take them: {', '.join(board.offered)}.")
+        sentences.append(
+            f"Further inputs of models that can take them: {', '.join(board.offered)}."
+        )
     if board.ignored:
-        said.append(f"Not used: {', '.join(board.ignored)}; see `inputs` and `load`.")
-    said += [
+        sentences.append(f"Not used: {', '.join(board.ignored)}; see `inputs` and `load`.")
+    sentences += [
         f"{name} is outside its training range in {numeral(100 * share, 2)} % of the test samples."
         for name, share in board.outside.items()
     ]
     if best is not None:
-        said += [f"{best.model}: {note}." for note in best.diagnostics.get("notes", ())]
-    return said
+        sentences += [f"{best.model}: {note}." for note in best.diagnostics.get("notes", ())]
+    return sentences
 
 
 def marks(board: Leaderboard) -> list[str]:
@@ -211,63 +216,67 @@ QUANTITIES = (
 """Name, field, unit and meaning of every figure; of a field with two ends, both are given."""
 
 
-def quantities(found: Characterization) -> Iterator[Quantity]:
+def quantities(measures: Characterization) -> Iterator[Quantity]:
     """Yield every quantity of a characterization."""
-    names = {"input": found.input, "output": found.output}
-    units = {"u": found.input_unit, "y": found.output_unit}
+    names = {"input": measures.input, "output": measures.output}
+    units = {"u": measures.input_unit, "y": measures.output_unit}
 
     def unit_of(form: str) -> str:
-        made = form.format(**units).strip().removesuffix("/")
-        return f"1{made}" if made.startswith("/") else made
+        unit = form.format(**units).strip().removesuffix("/")
+        return f"1{unit}" if unit.startswith("/") else unit
 
     for name, field, unit, meaning in QUANTITIES:
-        value, limits = getattr(found, field), found.intervals.get(field)
-        shown = name.format(**names), unit_of(unit)
+        value, limits = getattr(measures, field), measures.intervals.get(field)
+        heading = name.format(**names), unit_of(unit)
         if isinstance(value, tuple):
-            for which, end in zip(("lowest", "highest"), value, strict=True):
-                yield Quantity(f"{which} {shown[0]}", end, limits, shown[1], meaning)
+            for side, end in zip(("lowest", "highest"), value, strict=True):
+                yield Quantity(f"{side} {heading[0]}", end, limits, heading[1], meaning)
         else:
-            yield Quantity(shown[0], value, limits, shown[1], meaning)
+            yield Quantity(heading[0], value, limits, heading[1], meaning)
     slope = unit_of("{y}/{u}")
-    for level in found.levels:
+    for level in measures.levels:
         at = " and ".join(f"{name} at {size(unit, x)}" for name, x, unit in level.held)
-        own = level.found
+        measures_there = level.found
         for name, field, unit in (("loop width", "loop_width", "%"), ("gain", "gain", slope)):
-            limits = own.intervals.get(field)
+            limits = measures_there.intervals.get(field)
             yield Quantity(
-                f"{name} with {at}", getattr(own, field), limits, unit, "at mid input there"
+                f"{name} with {at}",
+                getattr(measures_there, field),
+                limits,
+                unit,
+                "at mid input there",
             )
 
 
-def characterization_sentences(found: Characterization) -> list[str]:
+def characterization_sentences(measures: Characterization) -> list[str]:
     """Return the main results of a characterization; its table has all, with intervals."""
-    u, y = found.input, found.output
-    ends = found.output_range[::-1] if found.falls else found.output_range
-    slope = f"{found.output_unit}/{found.input_unit}".removesuffix("/")
-    gain = "" if found.gain is None else f", slope {size(slope, found.gain)} at mid {u}"
-    said = [
-        f"{y} covers {_spanning(ends, found.output_unit)} while {u} covers "
-        f"{_spanning(found.input_range, found.input_unit)}{gain}."
+    u, y = measures.input, measures.output
+    ends = measures.output_range[::-1] if measures.falls else measures.output_range
+    slope = f"{measures.output_unit}/{measures.input_unit}".removesuffix("/")
+    gain = "" if measures.gain is None else f", slope {size(slope, measures.gain)} at mid {u}"
+    sentences = [
+        f"{y} covers {_spanning(ends, measures.output_unit)} while {u} covers "
+        f"{_spanning(measures.input_range, measures.input_unit)}{gain}."
     ]
-    if found.loop_width is not None and found.mid_width is not None:
-        said.append(
-            f"Loop width at mid {u}: {numeral(found.loop_width, 2)} % of the output range of the cycle, "
-            f"{size(found.output_unit, found.mid_width)}."
+    if measures.loop_width is not None and measures.mid_width is not None:
+        sentences.append(
+            f"Loop width at mid {u}: {numeral(measures.loop_width, 2)} % of the output range of the "
+            f"cycle, {size(measures.output_unit, measures.mid_width)}."
         )
-    elif found.branch_gap is not None:
-        open_ = "Too few branches, or too much noise, to detect a loop: "
-        shown = {True: "", False: "No loop: ", None: open_}[found.has_loop]
-        gap = f"the mean gap between branches is {size(found.output_unit, found.branch_gap)}."
-        said.append(f"{shown}{gap}")
+    elif measures.branch_gap is not None:
+        undetected = "Too few branches, or too much noise, to detect a loop: "
+        start = {True: "", False: "No loop: ", None: undetected}[measures.has_loop]
+        gap = f"the mean gap between branches is {size(measures.output_unit, measures.branch_gap)}."
+        sentences.append(f"{start}{gap}")
     else:
-        said.append(
-            f"{u} and its direction explain {percent(found.loop_share)} of the variance of {y}."
+        sentences.append(
+            f"{u} and its direction explain {percent(measures.loop_share)} of the variance of {y}."
         )
-    if found.branch_gap is not None and found.p_loop is None:
-        said.append(
+    if measures.branch_gap is not None and measures.p_loop is None:
+        sentences.append(
             "No recording has four branches: drift would also separate rising and falling output."
         )
-    return [f"{sentence[0].upper()}{sentence[1:]}" for sentence in said]
+    return [f"{sentence[0].upper()}{sentence[1:]}" for sentence in sentences]
 
 
 def _spanning(limits: tuple[float, float], unit: str) -> str:
@@ -280,30 +289,30 @@ def _spanning(limits: tuple[float, float], unit: str) -> str:
 # --- Residual check ---------------------------------------------------------------------------------
 
 
-def check_verdict(found: Validation, *, sized: bool = True) -> str:
+def check_verdict(validation: Validation, *, sized: bool = True) -> str:
     """Return the main finding on every output's residual, one sentence each."""
-    return " ".join(_residual(one, sized=sized) for one in found.outputs)
+    return " ".join(_residual(check, sized=sized) for check in validation.outputs)
 
 
-def check_notes(one: OutputCheck) -> list[str]:
+def check_notes(check: OutputCheck) -> list[str]:
     """Return whether a residual is white."""
-    p = one.whiteness.p_value
+    p = check.whiteness.p_value
     if p is None:
         return []
     white = "white" if p > WHITE else "not white"
-    return [f"The residual of {one.output} is {white} (p = {probability(p)})."]
+    return [f"The residual of {check.output} is {white} (p = {probability(p)})."]
 
 
-def missed(one: OutputCheck, cause: Cause) -> str:
+def missed(check: OutputCheck, cause: Cause) -> str:
     """Return a cause of a residual in a few words."""
-    what = _KINDS[cause.kind].format(channel=cause.channel)
+    words = _KINDS[cause.kind].format(channel=cause.channel)
     value = cause.coefficient or 0.0
     if cause.kind == "offset":
-        return f"{what} of {size(one.unit, value)}"
+        return f"{words} of {size(check.unit, value)}"
     if cause.kind == "lag" and value:
-        step, unit = (one.sample_time, "s") if one.sample_time else (1.0, "samples")
-        return f"{what}, about {size(unit, value * step)}"
-    return what
+        step, unit = (check.sample_time, "s") if check.sample_time else (1.0, "samples")
+        return f"{words}, about {size(unit, value * step)}"
+    return words
 
 
 WHITE = 0.01
@@ -322,26 +331,27 @@ _KINDS = {
 }
 
 
-def _residual(one: OutputCheck, *, sized: bool = True) -> str:
-    error = size(one.unit, one.rmse)
-    if one.exact:
+def _residual(check: OutputCheck, *, sized: bool = True) -> str:
+    error = size(check.unit, check.rmse)
+    if check.exact:
         return (
-            f"The residual of {one.output}, {error} RMS, is within rounding or the sensor's step."
+            f"The residual of {check.output}, {error} RMS, is within rounding or the sensor's step."
         )
-    if one.useless:
+    if check.useless:
         return (
-            f"The model is of no use for {one.output}: its RMSE is {error}, that of the mean "
-            f"{numeral(one.mean_error, 2)}."
+            f"The model is of no use for {check.output}: its RMSE is {error}, that of the mean "
+            f"{numeral(check.mean_error, 2)}."
         )
-    mean = next(cause.coefficient for cause in one.suspects if cause.kind == "offset")
-    sizes = [f"{error} RMS ({percent(one.rmse / one.span)} of its range)"] if sized else []
-    sizes.append(f"mean {size(one.unit, mean or 0.0)}")
-    residual = f"The residual of {one.output}, {', '.join(sizes)},"
-    if not one.missing:
-        return f"{residual} is explained by none of the {len(one.suspects)} causes tested."
-    first = max(one.missing, key=lambda cause: cause.share)
-    of = "mean square" if first.kind == "offset" else "variance"
-    return f"{residual} is partly explained by {missed(one, first)}: {percent(first.share)} of its {of}."
+    mean = next(cause.coefficient for cause in check.suspects if cause.kind == "offset")
+    sizes = [f"{error} RMS ({percent(check.rmse / check.span)} of its range)"] if sized else []
+    sizes.append(f"mean {size(check.unit, mean or 0.0)}")
+    residual = f"The residual of {check.output}, {', '.join(sizes)},"
+    if not check.missing:
+        return f"{residual} is explained by none of the {len(check.suspects)} causes tested."
+    first = max(check.missing, key=lambda cause: cause.share)
+    quantity = "mean square" if first.kind == "offset" else "variance"
+    share = f"{percent(first.share)} of its {quantity}"
+    return f"{residual} is partly explained by {missed(check, first)}: {share}."
 
 
 def probability(value: float) -> str:
@@ -410,7 +420,7 @@ def gap_run(gap: Gap, ranges: bool = True) -> str:
 def plan_sentences(plan: Plan) -> list[str]:
     """Return the purpose of a plan, the gaps it leaves, and extrapolations."""
     parts = {step.what for step in plan.steps}
-    open_gaps = [gap for gap in plan.gaps if not any(gap.what in one.gaps for one in plan.steps)]
+    open_gaps = [gap for gap in plan.gaps if not any(gap.what in step.gaps for step in plan.steps)]
     return [
         PLAN.format(seconds=f"{plan.recording.duration:.0f}", parts=listing(sorted(parts))),
         *(LEFT_OPEN.format(gap=gap_sentence(gap), run=gap_run(gap)) for gap in open_gaps),
@@ -423,11 +433,11 @@ def _levels(ranges: Mapping[str, tuple[float, float]]) -> str:
 
     def ends_of(ends: tuple[float, float]) -> str:
         largest = max(map(abs, ends))
-        shown = (end if abs(end) > ROUNDED * largest else 0.0 for end in ends)
-        return " to ".join(dict.fromkeys(f"{end:.3g}" for end in shown))
+        rounded = (end if abs(end) > ROUNDED * largest else 0.0 for end in ends)
+        return " to ".join(dict.fromkeys(f"{end:.3g}" for end in rounded))
 
-    each = ((ends_of(ends), standard_unit(name) or "") for name, ends in ranges.items())
-    return listing([f"{ends} {unit}" for ends, unit in each]).strip()
+    parts = ((ends_of(ends), standard_unit(name) or "") for name, ends in ranges.items())
+    return listing([f"{ends} {unit}" for ends, unit in parts]).strip()
 
 
 def listing(names: Sequence[str]) -> str:
@@ -443,11 +453,11 @@ def listing(names: Sequence[str]) -> str:
 # --- Bands and log reviews --------------------------------------------------------------------------
 
 
-def calibrated_on_blocks(found: Calibration) -> str:
+def calibrated_on_blocks(calibration: Calibration) -> str:
     """Return the limitation of a band whose units are blocks of runs."""
     return (
-        f"{found.band.units} blocks of {found.runs} run(s) count as exchangeable, so differences "
-        "between runs are not in the band: calibrate on 9 runs or more."
+        f"{calibration.band.units} blocks of {calibration.runs} run(s) count as exchangeable, so "
+        "differences between runs are not in the band: calibrate on 9 runs or more."
     )
 
 
@@ -464,40 +474,40 @@ def outside_calibration(
     )
 
 
-def reviewed(found: Review) -> list[str]:
+def reviewed(log: Review) -> list[str]:
     """Return the results of a log's review: every output, then delays, limits and the refit."""
-    given = " of the compensator" if found.judged_by == "compensator" else ""
-    said = []
-    for one in found.outputs:
-        of = partial(size, one.unit)
-        said.append(
-            f"{one.output}: achieved error {of(one.achieved)} RMS; the model misses "
-            f"{of(one.residual)} of the measured motion."
+    source = " of the compensator" if log.judged_by == "compensator" else ""
+    sentences = []
+    for output in log.outputs:
+        sized = partial(size, output.unit)
+        sentences.append(
+            f"{output.output}: achieved error {sized(output.achieved)} RMS; the model misses "
+            f"{sized(output.residual)} of the measured motion."
         )
-        if one.predicted is not None and one.pressure is not None:
-            said.append(
-                f"{one.output}: the model predicts an error of {of(one.predicted)} for the "
-                f"commands{given}, and {of(one.pressure)} for pressures that differ from them."
+        if output.predicted is not None and output.pressure is not None:
+            sentences.append(
+                f"{output.output}: the model predicts an error of {sized(output.predicted)} for the "
+                f"commands{source}, and {sized(output.pressure)} for pressures that differ from them."
             )
-        low, high = (numeral(60 * end, 2) for end in one.drift_interval)
-        said.append(
-            f"{one.output}: the residual drifts by {of(60 * one.drift)} per minute (95 %: {low} to "
-            f"{high})."
+        low, high = (numeral(60 * end, 2) for end in output.drift_interval)
+        sentences.append(
+            f"{output.output}: the residual drifts by {sized(60 * output.drift)} per minute (95 %: "
+            f"{low} to {high})."
         )
-    for delay in found.delays:
+    for delay in log.delays:
         late, low, high = (numeral(1000 * x, 2) for x in (delay.seconds, *delay.interval))
-        said.append(f"Delay and lag of {delay.where}: {late} ms (95 %: {low} to {high}).")
-    if found.clipped:
-        said.append(f"{found.clipped} of {found.n_samples} samples are at a limit of the command.")
-    if isinstance(found.refit, str):
-        said.append(found.refit)
-    elif found.refit is not None:
-        low, high = (percent(end, 2) for end in found.refit.ratio)
-        said.append(
-            f"The model fitted again to the log has {percent(found.refit.new / found.refit.old, 2)} of "
-            f"the old one's error on {found.refit.n_parts} parts held out (95 %: {low} to {high})."
+        sentences.append(f"Delay and lag of {delay.where}: {late} ms (95 %: {low} to {high}).")
+    if log.clipped:
+        sentences.append(f"{log.clipped} of {log.n_samples} samples are at a limit of the command.")
+    if isinstance(log.refit, str):
+        sentences.append(log.refit)
+    elif log.refit is not None:
+        low, high = (percent(end, 2) for end in log.refit.ratio)
+        sentences.append(
+            f"The model fitted again to the log has {percent(log.refit.new / log.refit.old, 2)} of "
+            f"the old one's error on {log.refit.n_parts} parts held out (95 %: {low} to {high})."
         )
-    return said
+    return sentences
 
 
 def size(unit: str, value: float) -> str:
@@ -524,7 +534,7 @@ def _right(study: Study) -> str:
         return "The chosen model is checked when all are fitted."
     if isinstance(study.check, str):
         return study.check
-    worst = max(study.check.outputs, key=lambda one: one.rmse / max(one.span, 1e-300))
+    worst = max(study.check.outputs, key=lambda check: check.rmse / max(check.span, 1e-300))
     return _residual(worst, sized=False)  # the tile has the size
 
 
@@ -538,19 +548,19 @@ def _how_far(study: Study) -> str:
     unknown = best.band.unknown
     farthest = max if unknown == "wide" else min
     worst = farthest(best.band.coverage, key=best.band.coverage.__getitem__)
-    of = f" for {worst}" if len(best.band.coverage) > 1 else ""
+    output = f" for {worst}" if len(best.band.coverage) > 1 else ""
     half = numeral(best.band.width[worst] / 2, 2)
     band = f"(±{half} {best.band.unit_of_width})"
     if unknown is None:
         inside = percent(best.band.coverage[worst])
-        return f"The 90 % band{of} {band} contains {inside} of the test samples."
+        return f"The 90 % band{output} {band} contains {inside} of the test samples."
     counts = {"blocks": best.band.units, "branches": best.band.branches}
     if unknown in counts:
         kind = "independent blocks" if unknown == "blocks" else "different branches"
         what = f"training has {counts[unknown]} {kind}, and {best.band.needed} are needed"
     else:
         inside = percent(best.band.highest if unknown == "wide" else best.band.lowest)
-        what = f"that of training{of} {band} contains {inside} of a test recording"
+        what = f"that of training{output} {band} contains {inside} of a test recording"
     return f"A 90 % band is not known: {what}."
 
 
@@ -564,8 +574,8 @@ def _record_next(study: Study) -> str:
 
 def compensated(study: Study) -> list[str]:
     """Return which better models have no compensator and why, and what an error leaves out."""
-    said = [f"No compensator of {model}: {why}" for model, why in study.passed_over.items()]
-    return [*said, *_left_out(study.inverse.commands if study.inverse is not None else ())]
+    sentences = [f"No compensator of {model}: {why}" for model, why in study.passed_over.items()]
+    return [*sentences, *_left_out(study.inverse.commands if study.inverse is not None else ())]
 
 
 def _left_out(commands: Sequence[str]) -> list[str]:
@@ -579,13 +589,13 @@ def _left_out(commands: Sequence[str]) -> list[str]:
     ]
 
 
-def expected(found: Mapping[str, Any]) -> str:
+def expected(numbers: Mapping[str, Any]) -> str:
     """Return the error to expect of a compensator, from `Compensation.to_dict`."""
-    unit, ends = found["unit"], found["following_interval"]
+    unit, ends = numbers["unit"], numbers["following_interval"]
     interval = f" (95 %: {numeral(ends[0], 2)} to {numeral(ends[1], 2)})" if ends else ""
-    error, plain = (size(unit, found[key]) for key in ("following_error", "static_map_error"))
-    said = f"Expected RMSE of following: {error}{interval}; a static map: {plain}."
-    return " ".join([said, *_left_out(found["commands"])])
+    error, plain = (size(unit, numbers[key]) for key in ("following_error", "static_map_error"))
+    sentence = f"Expected RMSE of following: {error}{interval}; a static map: {plain}."
+    return " ".join([sentence, *_left_out(numbers["commands"])])
 
 
 def not_looped(study: Study) -> str:
@@ -602,60 +612,70 @@ PLANTS = {
 """Plants of loops, and what errors on them tell."""
 
 
-def tracked(found: Tracking) -> list[str]:
+def tracked(tracking: Tracking) -> list[str]:
     """Return the plant of a tracked reference, and its part out of reach."""
-    one = found.tracked
-    unit = one.recording.units[next(iter(one.rmse))]
-    said = [f"Plant: {found.plant.name} ({PLANTS[found.plant_kind]}), seed {found.seed}."]
-    if found.flatters_feedback:
-        said.append("The plant responds within one sample; on a muscle, feedback performs worse.")
-    if one.clipped >= len(one.recording):
-        said.append("Commands were at a limit throughout: the reference is out of reach.")
-    elif one.clipped > max((far.samples for far in one.beyond.values()), default=0):
-        said.append(f"Commands were at a limit in {one.clipped} steps.")
-    said += [
+    run = tracking.tracked
+    unit = run.recording.units[next(iter(run.rmse))]
+    sentences = [
+        f"Plant: {tracking.plant.name} ({PLANTS[tracking.plant_kind]}), seed {tracking.seed}."
+    ]
+    if tracking.flatters_feedback:
+        sentences.append(
+            "The plant responds within one sample; on a muscle, feedback performs worse."
+        )
+    if run.clipped >= len(run.recording):
+        sentences.append("Commands were at a limit throughout: the reference is out of reach.")
+    elif run.clipped > max((far.samples for far in run.beyond.values()), default=0):
+        sentences.append(f"Commands were at a limit in {run.clipped} steps.")
+    sentences += [
         f"{far.samples} samples of the reference {name} are out of reach ({numeral(far.low, 4)} to "
         f"{numeral(far.high, 4)} {unit}); RMSE over the others: {size(unit, far.rmse_elsewhere)}."
-        for name, far in one.beyond.items()
+        for name, far in run.beyond.items()
     ]
-    median, largest = (1e6 * seconds for seconds in one.step_time)
-    return [*said, f"Controller: {median:.0f} µs a step (median), {largest:.0f} µs (99.9 %)."]
+    median, largest = (1e6 * seconds for seconds in run.step_time)
+    return [*sentences, f"Controller: {median:.0f} µs a step (median), {largest:.0f} µs (99.9 %)."]
 
 
-def learned(found: Learned) -> list[str]:
+def learned(runs: Learned) -> list[str]:
     """Return which repetition is kept, and how errors converge."""
     return [
-        f"Corrections of repetition {found.best_repetition} are kept.",
+        f"Corrections of repetition {runs.best_repetition} are kept.",
         *(
-            f"{name}: learned up to {numeral(found.cutoff[name], 2)} Hz; the error falls by a factor of "
-            f"{numeral(found.convergence[name], 2)} per repetition ({numeral(found.expected[name], 2)} "
+            f"{name}: learned up to {numeral(runs.cutoff[name], 2)} Hz; the error falls by a factor of "
+            f"{numeral(runs.convergence[name], 2)} per repetition ({numeral(runs.expected[name], 2)} "
             "if the plant were linear and without noise)."
-            for name in found.rmse
+            for name in runs.rmse
         ),
     ]
 
 
 def read_lines(recordings: Sequence[Recording]) -> list[str]:
     """Return a line on each of some recordings: channels, ranges, grid, and what was left out."""
-    latest = {(one.source, one.name): one for one in recordings}  # some are read twice
-    lines = [_read(one) for one in list(latest.values())[:MOST_LINES]]
+    latest = {(run.source, run.name): run for run in recordings}  # some are read twice
+    lines = [_read(run) for run in list(latest.values())[:MOST_LINES]]
     more = list(latest.values())[MOST_LINES:]
     samples = sum(map(len, more))
     return [*lines, f"{len(more)} more recordings: {samples} samples in all"] if more else lines
 
 
-def _read(one: Recording) -> str:
-    before = dict(text.split(" from ", 1) for text in one.meta.get("converted_units", ()))
+def _read(recording: Recording) -> str:
+    conversions = dict(
+        text.split(" from ", 1) for text in recording.meta.get("converted_units", ())
+    )
     ranges = []
-    for name, ends in one.ranges.items():
+    for name, ends in recording.ranges.items():
         low, high = (numeral(end + 0.0, 3) for end in ends)
-        was = f" (from {before[name].partition(' to ')[0]})" if name in before else ""
-        ranges.append(f"{name} {low} to {high} {one.units[name]}".rstrip() + was)
-    grid = "no time" if one.sample_time is None else f"{one.sample_time:g} s apart"
-    long = "" if one.duration is None else f", {numeral(one.duration, 3)} s"
-    left = one.meta.get("ignored_columns", ())
-    unread = f"; not read: {listed(left, MOST_LINES)}" if left else ""
-    return f"{one.name}: {listed(ranges, 8)}; {len(one)} samples {grid}{long}{unread}"
+        original = (
+            f" (from {conversions[name].partition(' to ')[0]})" if name in conversions else ""
+        )
+        ranges.append(f"{name} {low} to {high} {recording.units[name]}".rstrip() + original)
+    grid = "no time" if recording.sample_time is None else f"{recording.sample_time:g} s apart"
+    duration = "" if recording.duration is None else f", {numeral(recording.duration, 3)} s"
+    ignored = recording.meta.get("ignored_columns", ())
+    unread = f"; not read: {listed(ignored, MOST_LINES)}" if ignored else ""
+    return (
+        f"{recording.name}: {listed(ranges, 8)}; {len(recording)} samples {grid}{duration}{unread}"
+    )
 
 
 def duration(recording: Recording) -> str:

@@ -41,4 +41,4 @@ def info(
         show(about, lambda: text.lines(results.model(about)), as_json)
         return
     found = workflow.info(files, reading=reading, input=input, output=output)
-    show(found, lambda: text.shown(found), as_json, read=found.recordings)
+    show(found, lambda: text.lines_of_result(found), as_json, read=found.recordings)

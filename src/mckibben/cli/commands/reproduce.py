@@ -49,4 +49,4 @@ def reproduce(
             recognised=lambda table: say("\n".join(text.lines(tables([table]))), error=True),
         )  # fmt: skip
     written = [out / "report.html", out / "tables.json"] if out else []
-    show(found, lambda: text.shown(found), as_json, found.notes, written)
+    show(found, lambda: text.lines_of_result(found), as_json, found.notes, written)

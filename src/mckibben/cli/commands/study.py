@@ -73,7 +73,7 @@ def study(
     about["notes"] = notes_by_file([*found.train, *found.test])
     show(
         about if as_json else found,
-        lambda: text.shown(found),
+        lambda: text.lines_of_result(found),
         as_json,
         found.leaderboard.notes,
         written=[out / "report.html"],

@@ -24,7 +24,7 @@ MOST_RECORDINGS = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ModelledRun:
     """One recording and the models' free-running outputs on it.
 
     Parameters
@@ -64,11 +64,11 @@ class Shown:
             problem, remedy = "no model of this study worked", "see the reasons in its leaderboard"
             raise ModelError(problem, remedy=remedy)
         pair = self.input, self.output
-        own = self.symbols if len(outputs) == 1 else None
-        return against(kind, self.recording, pair, outputs, self.test_from, points, own)
+        symbols = self.symbols if len(outputs) == 1 else None
+        return against(kind, self.recording, pair, outputs, self.test_from, points, symbols)
 
 
-def shown(study: Study) -> tuple[Shown, ...]:
+def runs_of_study(study: Study) -> tuple[ModelledRun, ...]:
     """Return all recordings of a study, test recordings first; one per output.
 
     Where the last part of a recording is held out, the study holds its first part once more to fit;
@@ -79,7 +79,7 @@ def shown(study: Study) -> tuple[Shown, ...]:
     several = len(board.outputs) > 1
     ranked = [row.model for row in study.leaderboard.rows if row.model in study.predictions]
     chosen = next((row.block for row in board.rows if row.model in ranked[:1]), None)
-    letters = {} if chosen is None else channel_symbols(chosen)
+    symbols = {} if chosen is None else channel_symbols(chosen)
     n_train = len(study.train)
     parts = [_part_of(study, recording) for recording in study.test]
     runs = [
@@ -90,29 +90,29 @@ def shown(study: Study) -> tuple[Shown, ...]:
     ]
     runs += [(k, run, "fit", None) for k, run in enumerate(study.train) if k not in parts]
     return tuple(
-        Shown(
+        ModelledRun(
             run,
             *pair,
             {model: study.predictions[model][place][:, column] for model in ranked},
             role,
             start,
             several,
-            letters,
+            symbols,
         )
         for place, run, role, start in runs
         for column, pair in enumerate(coupled.pairs([run]))
     )
 
 
-def drawn(found: Sequence[Shown]) -> tuple[Shown, ...]:
+def runs_with_figures(runs: Sequence[ModelledRun]) -> tuple[ModelledRun, ...]:
     """Return those with figures: test recordings first, then the longest."""
-    by_weight = sorted(found, key=lambda one: (one.role == "fit", -len(one.recording)))
-    return tuple(by_weight[:MOST_RECORDINGS])
+    ordered = sorted(runs, key=lambda run: (run.role == "fit", -len(run.recording)))
+    return tuple(ordered[:MOST_RECORDINGS])
 
 
-def unique(found: Sequence[Shown]) -> tuple[Shown, ...]:
+def each_recording_once(runs: Sequence[ModelledRun]) -> tuple[ModelledRun, ...]:
     """Return every recording once, for all its outputs."""
-    return tuple({id(one.recording): one for one in reversed(found)}.values())[::-1]
+    return tuple({id(run.recording): run for run in reversed(runs)}.values())[::-1]
 
 
 def _part_of(study: Study, whole: Recording) -> int | None:

@@ -115,7 +115,7 @@ def standard_unit(channel: str) -> str | None:
     return STANDARD_UNITS.get(base_name(channel))
 
 
-def conversion(wanted: str, given: str, rest_length: float | None) -> tuple[float, float] | None:
+def conversion(target: str, source: str, rest_length: float | None) -> tuple[float, float] | None:
     """Return gain and offset that convert a channel to another, or None.
 
     A displacement is a contraction times the rest length [mm], and a length is that less a displacement.
@@ -123,20 +123,26 @@ def conversion(wanted: str, given: str, rest_length: float | None) -> tuple[floa
     >>> conversion("contraction_2", "displacement_2", 200.0), conversion("length", "displacement", 200.0)
     ((0.005, 0.0), (-1.0, 200.0))
     """
-    if wanted == given:
+    if target == source:
         return 1.0, 0.0
-    (end, _, of), (start, _, also) = wanted.partition("_"), given.partition("_")
-    if of != also or rest_length is None:
+    (quantity, _, suffix), (source_quantity, _, source_suffix) = (
+        target.partition("_"),
+        source.partition("_"),
+    )
+    if suffix != source_suffix or rest_length is None:
         return None
     as_displacement = {
         "displacement": (1.0, 0.0),
         "contraction": (rest_length, 0.0),
         "length": (-1.0, rest_length),
     }
-    if end not in as_displacement or start not in as_displacement:
+    if quantity not in as_displacement or source_quantity not in as_displacement:
         return None
-    (gain, offset), (per, zero) = as_displacement[start], as_displacement[end]
-    return gain / per, (offset - zero) / per
+    (gain, offset), (target_gain, target_offset) = (
+        as_displacement[source_quantity],
+        as_displacement[quantity],
+    )
+    return gain / target_gain, (offset - target_offset) / target_gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,11 +179,11 @@ class Recording(Hinted, DrawsItself):
     start_time: float = 0.0
     meta: Mapping[str, Any] = field(default_factory=dict)
 
-    def __new__(cls, *_: Any, **given: Any) -> Self:
+    def __new__(cls, *_: Any, **arguments: Any) -> Self:
         """Refuse channels by keyword."""
-        if strange := [name for name in given if name not in cls.__dataclass_fields__]:
+        if unknown := [name for name in arguments if name not in cls.__dataclass_fields__]:
             raise DataError(
-                f"there is no argument {strange[0]!r}",
+                f"there is no argument {unknown[0]!r}",
                 remedy='give channels by name: Recording({"pressure": u}, sample_time=0.01)',
             )
         return super().__new__(cls)
@@ -185,67 +191,31 @@ class Recording(Hinted, DrawsItself):
     def __post_init__(self) -> None:
         if is_frame(self.channels):
             raise DataError("it is a data frame", remedy="read it with mckibben.read")
-        for what, named in (
-            ("channels", self.channels),
-            ("units", self.units),
-            ("meta", self.meta),
-        ):
-            if not isinstance(named, Mapping):
-                raise DataError(
-                    f"{what} cannot be {named!r:.60}", remedy='give them by name: {"pressure": ...}'
-                )
+        for name in ("channels", "units", "meta"):
+            value = getattr(self, name)
+            if not isinstance(value, Mapping):
+                problem = f"{name} cannot be {value!r:.60}"
+                raise DataError(problem, remedy='give them by name: {"pressure": ...}')
         channels = {name: _frozen(name, samples) for name, samples in self.channels.items()}
         times = channels.pop("time", None)
-        if not channels:
-            raise DataError(
-                "a recording needs at least one channel", remedy="name a column to read"
-            )
-        lengths = {name: samples.size for name, samples in channels.items()}
-        if len(set(lengths.values())) > 1:
-            raise DataError(
-                f"channels differ in length: {lengths}", remedy="record all channels on one grid"
-            )
-        if min(lengths.values()) < 2:
-            raise DataError(
-                f"{min(lengths.values())} sample(s) are too few", remedy="give at least two samples"
-            )
-        step: Any = self.sample_time
+        _check_lengths(channels)
         if times is not None:
-            if step is not None or self.units.get("time", "s") != "s":
+            if self.sample_time is not None or self.units.get("time", "s") != "s":
                 problem = "a recording has times [s], or a sample time"
                 raise DataError(problem, channel="time", remedy="leave out one of them")
             step, start = _grid(times)
             object.__setattr__(self, "sample_time", step)
             object.__setattr__(self, "start_time", start)
-        if step is not None and not (isinstance(step, SupportsFloat) and 0 < float(step) < np.inf):
-            raise DataError(
-                f"a sample time of {step!r:.60} s is impossible",
-                remedy="give a positive time in seconds, or None where time is unknown",
-            )
-        if not np.isfinite(self.start_time):
-            raise DataError("the start time is not finite", remedy="give a time in seconds")
-        units = {name: self.units.get(name, standard_unit(name) or "") for name in channels}
-        for name, unit in units.items():
-            expected = standard_unit(name)
-            if expected is not None and unit != expected:
-                raise DataError(
-                    f"a recording holds this channel in {expected or 'no unit'}, not {unit!r}",
-                    channel=name,
-                    remedy="convert it, or read the file with mckibben.read, which converts",
-                )
-        strangers = set(self.units) - set(channels) - {"time"}
-        if strangers:
-            raise DataError(
-                f"units are given for absent channels {sorted(strangers)}", remedy="drop them"
-            )
+        _check_grid(self.sample_time, self.start_time)
+        units = _units_of(channels, self.units)
         object.__setattr__(self, "channels", MappingProxyType(channels))
         object.__setattr__(self, "units", MappingProxyType(units))
         object.__setattr__(self, "meta", MappingProxyType(dict(self.meta)))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return how to rebuild it from plain dicts, for worker processes."""
-        plain = (dict(self.channels), self.sample_time, dict(self.units))
-        return Recording, (*plain, self.start_time, dict(self.meta))
+        content = (dict(self.channels), self.sample_time, dict(self.units))
+        return Recording, (*content, self.start_time, dict(self.meta))
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{name} [{self.units[name] or '-'}]" for name in self.channels)
@@ -311,11 +281,11 @@ class Recording(Hinted, DrawsItself):
             )
         return self.channels[channel]
 
-    def _during(self, wanted: builtins.slice) -> Recording:
-        ends = (wanted.start, wanted.stop)
-        if any(isinstance(end, SupportsIndex) for end in ends) or wanted.step is not None:
+    def _during(self, times: builtins.slice) -> Recording:
+        ends = (times.start, times.stop)
+        if any(isinstance(end, SupportsIndex) for end in ends) or times.step is not None:
             raise DataError(
-                f"[{wanted.start}:{wanted.stop}] may be samples or seconds",
+                f"[{times.start}:{times.stop}] may be samples or seconds",
                 file=self.source,
                 remedy="use .slice(start, stop) of samples, or decimals of seconds, as [2.0:5.0]",
             )
@@ -360,17 +330,17 @@ class Recording(Hinted, DrawsItself):
     @property
     def name(self) -> str:
         """A short name to show: ``meta["name"]``, or the stem of the source file."""
-        given = self.meta.get("name")
-        if given is not None:
-            return printable(str(given))
+        entry = self.meta.get("name")
+        if entry is not None:
+            return printable(str(entry))
         return "recording" if self.source is None else printable(Path(self.source).stem)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Assumptions and corrections made in reading it, from ``meta["notes"]``."""
-        given = self.meta.get("notes")
-        several = given if isinstance(given, list | tuple) else () if given is None else (given,)
-        return tuple(map(str, several))
+        entry = self.meta.get("notes")
+        entries = entry if isinstance(entry, list | tuple) else () if entry is None else (entry,)
+        return tuple(map(str, entries))
 
     @property
     def periodic(self) -> bool:
@@ -380,23 +350,23 @@ class Recording(Hinted, DrawsItself):
     @property
     def rest_length(self) -> float | None:
         """Length of the muscle at displacement 0 [mm], from ``meta["rest_length"]``."""
-        given = self.meta.get("rest_length")
-        return float(given) if isinstance(given, int | float) and 0 < given < np.inf else None
+        entry = self.meta.get("rest_length")
+        return float(entry) if isinstance(entry, int | float) and 0 < entry < np.inf else None
 
     @property
     def bridged(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Which samples were interpolated over a gap in reading, shape (n,)."""
-        time, within = self.time, 1e-6 * self.step
-        found = np.zeros(time.size, dtype=np.bool_)
+        time, tolerance = self.time, 1e-6 * self.step
+        rows = np.zeros(time.size, dtype=np.bool_)
         for start, stop in self.meta.get("bridged", ()):
-            found |= (time >= start - within) & (time <= stop + within)
-        return found
+            rows |= (time >= start - tolerance) & (time <= stop + tolerance)
+        return rows
 
     def matrix(self, channels: Iterable[str]) -> Array:
         """Return several channels side by side, shape (n, number of channels)."""
         names = list(channels)
-        whole = self.with_derived(names)
-        return np.column_stack([whole[name] for name in names])
+        recording = self.with_derived(names)
+        return np.column_stack([recording[name] for name in names])
 
     def with_channels(
         self, units: Mapping[str, str] | None = None, /, **samples: ArrayLike
@@ -435,10 +405,10 @@ class Recording(Hinted, DrawsItself):
             On times that are not uniform, and samples that are none.
         """
         options = {"sample_time": sample_time, "units": units or {}}
-        found, *more = load("readers", "table")(frame, informative=False, **options)
-        if more:
+        recording, *others = load("readers", "table")(frame, informative=False, **options)
+        if others:
             raise DataError("it has several recordings", remedy="use `mckibben.read`")
-        return cls(**vars(found) | {"meta": {**found.meta, **meta}})
+        return cls(**vars(recording) | {"meta": {**recording.meta, **meta}})
 
     def to_frame(self) -> Any:
         """Return the channels as a data frame of pandas over time [s]; the inverse of `from_frame`."""
@@ -447,20 +417,20 @@ class Recording(Hinted, DrawsItself):
         index = None if self.sample_time is None else pd.Index(self.time, name="time")
         frame = pd.DataFrame(dict(self.channels), index=index)
         grid = None if self.sample_time is None else (self.sample_time, self.start_time)
-        about = {"grid": grid, "units": dict(self.units), "meta": dict(self.meta)}
-        frame.attrs[OWN] = about | {"digest": _frame_digest(frame)}
+        attributes = {"grid": grid, "units": dict(self.units), "meta": dict(self.meta)}
+        frame.attrs[OWN] = attributes | {"digest": _frame_digest(frame)}
         return frame
 
     def with_derived(self, channels: Iterable[str]) -> Recording:
         """Return a recording with channels added that can be derived by the rest length."""
-        found: dict[str, Array] = {}
-        for wanted in channels:
-            if wanted not in self.channels and self.rest_length is not None:
+        derived: dict[str, Array] = {}
+        for channel in channels:
+            if channel not in self.channels and self.rest_length is not None:
                 for name, samples in self.channels.items():
-                    if (line := conversion(wanted, name, self.rest_length)) is not None:
-                        found[wanted] = line[0] * samples + line[1]
+                    if (line := conversion(channel, name, self.rest_length)) is not None:
+                        derived[channel] = line[0] * samples + line[1]
                         break
-        return self.with_channels(**found) if found else self
+        return self.with_channels(**derived) if derived else self
 
     def between(self, start: float | None = None, stop: float | None = None) -> Recording:
         """Return the samples from ``start`` up to, not including, ``stop``, in seconds of its own time.
@@ -488,8 +458,8 @@ class Recording(Hinted, DrawsItself):
 
     def resample(self, sample_time: float) -> Recording:
         """Return it at another sample time [s], without aliasing; see `mckibben.signals.resample`."""
-        found: Recording = load("readers", "resample")(self, sample_time)
-        return found
+        resampled: Recording = load("readers", "resample")(self, sample_time)
+        return resampled
 
     def to_xarray(self) -> Any:
         """Return the channels as a data set of xarray over time [s], with units as attributes."""
@@ -507,17 +477,17 @@ class Recording(Hinted, DrawsItself):
 
     def select(self, channels: Sequence[str]) -> Recording:
         """Return a recording of some channels only, in the order given."""
-        whole = self.with_derived(channels)
+        recording = self.with_derived(channels)
         return replace(
             self,
-            channels={name: whole[name] for name in channels},
-            units={name: whole.units[name] for name in channels},
+            channels={name: recording[name] for name in channels},
+            units={name: recording.units[name] for name in channels},
         )
 
     def slice(self, start: int, stop: int) -> Recording:
         """Return samples ``start`` up to, not including, ``stop``, counted from 0."""
-        whole = all(isinstance(end, SupportsIndex) for end in (start, stop))
-        if not (whole and 0 <= start < stop <= self.n_samples):
+        are_indices = all(isinstance(end, SupportsIndex) for end in (start, stop))
+        if not (are_indices and 0 <= start < stop <= self.n_samples):
             raise DataError(
                 f"samples {start}:{stop} are not within 0:{self.n_samples}",
                 file=self.source,
@@ -557,22 +527,65 @@ def sample_time_of(
 
 def check_sample_times(recordings: Sequence[Recording], *, equal: bool = True) -> None:
     """Raise a `DataError` where some recordings have no time, or sample times are not `equal`."""
-    for first, one in ((recordings[0], one) for one in recordings):
-        step, usual = one.sample_time, first.sample_time
-        if (step is None) != (usual is None):
+    for first, recording in ((recordings[0], recording) for recording in recordings):
+        step, first_step = recording.sample_time, first.sample_time
+        if (step is None) != (first_step is None):
             raise DataError(
                 "some recordings have time and others have none",
-                file=one.source,
+                file=recording.source,
                 channel="time",
                 remedy="give `rate` for those without, or use them separately",
             )
-        if equal and step and usual and abs(step - usual) > SAME_TIME * usual:
+        if equal and step and first_step and abs(step - first_step) > SAME_TIME * first_step:
             raise DataError(
-                f"the sample time is {step:g} s here and {usual:g} s in {first.name}",
-                file=one.source,
-                options=[{"resample": float(f"{max(step, usual):.3g}")}],
+                f"the sample time is {step:g} s here and {first_step:g} s in {first.name}",
+                file=recording.source,
+                options=[{"resample": float(f"{max(step, first_step):.3g}")}],
                 remedy="give recordings of one sample time",
             )
+
+
+def _check_lengths(channels: Mapping[str, Array]) -> None:
+    """Raise an error unless there are channels, all of one length of two samples or more."""
+    if not channels:
+        raise DataError("a recording needs at least one channel", remedy="name a column to read")
+    lengths = {name: samples.size for name, samples in channels.items()}
+    if len(set(lengths.values())) > 1:
+        raise DataError(
+            f"channels differ in length: {lengths}", remedy="record all channels on one grid"
+        )
+    if min(lengths.values()) < 2:
+        raise DataError(
+            f"{min(lengths.values())} sample(s) are too few", remedy="give at least two samples"
+        )
+
+
+def _check_grid(step: Any, start: float) -> None:
+    """Raise an error unless a sample time is positive or None, and the start is finite."""
+    if step is not None and not (isinstance(step, SupportsFloat) and 0 < float(step) < np.inf):
+        raise DataError(
+            f"a sample time of {step!r:.60} s is impossible",
+            remedy="give a positive time in seconds, or None where time is unknown",
+        )
+    if not np.isfinite(start):
+        raise DataError("the start time is not finite", remedy="give a time in seconds")
+
+
+def _units_of(channels: Iterable[str], given: Mapping[str, str]) -> dict[str, str]:
+    """Return the unit of every channel: the given one, or the package's, which must not differ."""
+    units = {name: given.get(name, standard_unit(name) or "") for name in channels}
+    for name, unit in units.items():
+        expected = standard_unit(name)
+        if expected is not None and unit != expected:
+            raise DataError(
+                f"a recording holds this channel in {expected or 'no unit'}, not {unit!r}",
+                channel=name,
+                remedy="convert it, or read the file with mckibben.read, which converts",
+            )
+    absent = set(given) - set(units) - {"time"}
+    if absent:
+        raise DataError(f"units are given for absent channels {sorted(absent)}", remedy="drop them")
+    return units
 
 
 def _frozen(name: str, samples: ArrayLike) -> Array:
@@ -581,10 +594,10 @@ def _frozen(name: str, samples: ArrayLike) -> Array:
             f"{masked} sample(s) are masked", channel=name, remedy="cut them out, or fill them in"
         )
     try:
-        given = np.asarray(samples)
-        if given.dtype.kind in "cmM":
-            raise TypeError(f"{given.dtype.name}")
-        values = np.array(given, dtype=np.float64)
+        array = np.asarray(samples)
+        if array.dtype.kind in "cmM":
+            raise TypeError(f"{array.dtype.name}")
+        values = np.array(array, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise DataError(
             f"the samples are not numbers ({error})", channel=name, remedy="give real numbers"
@@ -601,17 +614,17 @@ def _frozen(name: str, samples: ArrayLike) -> Array:
 
 def notes_by_file(recordings: Iterable[Recording]) -> dict[str, list[str]]:
     """Return the reading notes of every file of recordings, if there are any."""
-    found: dict[str, list[str]] = {}
+    notes_of: dict[str, list[str]] = {}
     for recording in recordings:
-        known = found.setdefault(recording.source or recording.name, [])
-        known += [note for note in recording.notes if note not in known]
-    return {file: notes for file, notes in found.items() if notes}
+        notes = notes_of.setdefault(recording.source or recording.name, [])
+        notes += [note for note in recording.notes if note not in notes]
+    return {file: notes for file, notes in notes_of.items() if notes}
 
 
 def reading_notes(recordings: Iterable[Recording]) -> tuple[str, ...]:
     """Return the notes of `notes_by_file` as sentences that begin with the file."""
-    found = notes_by_file(recordings)
-    return tuple(f"{file}: {note}" for file, notes in found.items() for note in notes)
+    notes_of = notes_by_file(recordings)
+    return tuple(f"{file}: {note}" for file, notes in notes_of.items() for note in notes)
 
 
 def _grid(time: Array, step: float = 0.0, start: float = 0.0) -> tuple[float, float]:
@@ -633,19 +646,19 @@ def _grid(time: Array, step: float = 0.0, start: float = 0.0) -> tuple[float, fl
 
 def restored(frame: Any) -> Recording | None:
     """Return the recording that a data frame was, or None if it was none or was changed since."""
-    known = frame.attrs.get(OWN)
-    if known is None or known["digest"] != _frame_digest(frame):
+    attributes = frame.attrs.get(OWN)
+    if attributes is None or attributes["digest"] != _frame_digest(frame):
         return None
     channels = {str(name): frame[name].to_numpy() for name in frame}
-    step, start = known["grid"] or (None, 0.0)
-    return Recording(channels, step, known["units"], start, known["meta"])
+    step, start = attributes["grid"] or (None, 0.0)
+    return Recording(channels, step, attributes["units"], start, attributes["meta"])
 
 
 def _frame_digest(frame: Any) -> str:
     """Return a digest of the names and values of a data frame, by which changes are seen."""
     names = repr([frame.index.name, *frame.columns]).encode()
     tables = [frame.index.to_numpy(), *(frame[name].to_numpy() for name in frame)]
-    return digest(names + b"".join(np.ascontiguousarray(one).tobytes() for one in tables))
+    return digest(names + b"".join(np.ascontiguousarray(table).tobytes() for table in tables))
 
 
 def is_frame(given: object) -> bool:
@@ -661,15 +674,17 @@ def listed(recordings: Any) -> list[Recording]:
     DataError
         If something else is given, such as the name of a file.
     """
-    given = recordings
-    several = isinstance(given, Iterable) and not isinstance(given, Recording | str | np.ndarray)
-    found = list(given) if several and not is_frame(given) else [given]
-    found = [Recording.from_frame(one) if is_frame(one) else one for one in found]
-    for one in found:
-        if not isinstance(one, Recording):
+    values = recordings
+    is_collection = isinstance(values, Iterable) and not isinstance(
+        values, Recording | str | np.ndarray
+    )
+    items = list(values) if is_collection and not is_frame(values) else [values]
+    items = [Recording.from_frame(item) if is_frame(item) else item for item in items]
+    for item in items:
+        if not isinstance(item, Recording):
             raise DataError(
-                f"a recording is needed here, not {type(one).__name__} {str(one)[:40]!r}",
+                f"a recording is needed here, not {type(item).__name__} {str(item)[:40]!r}",
                 remedy="read the file with mckibben.read; make one of arrays by "
                 "mckibben.Recording({'pressure': u, 'displacement': y}, sample_time)",
             )
-    return found
+    return items

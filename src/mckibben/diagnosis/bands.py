@@ -59,7 +59,7 @@ SHORTEST_BLOCK = 2.0
 WIDENINGS = (0.0, 0.3, 1.0, 3.0, 10.0)
 """Candidate increases of the width at mean speed, relative to that at rest."""
 
-AT_SPEED = (1.0,)
+HALF_AT_SPEED = (1.0,)
 """The same for motion of another kind than in training, where the narrowest band of these data is no
 better than another: half of the mean width grows with speed.
 """
@@ -193,8 +193,8 @@ def calibrate(
     with telling(progress, "calibrating") as tell:
         runs = [free_run(model, recording) for recording in one_by_one(recordings, tell)]
     # the first sample, a start, is not scored
-    held = [replace(run, counts=np.arange(len(run)) > 0) for run in runs]
-    return replace(find_band(model, held, exchangeable), fitted_known=bool(fitted))
+    scored = [replace(run, counts=np.arange(len(run)) > 0) for run in runs]
+    return replace(find_band(model, scored, exchangeable), fitted_known=bool(fitted))
 
 
 def find_band(
@@ -208,24 +208,24 @@ def find_band(
     errors = [run.errors for run in runs]
     memory = max(correlation_length(x) for x in zip(*(e.T for e in errors), strict=True))
     by_run = unit == "run" or (unit == "auto" and len(runs) >= FEWEST_UNITS)
-    which: Literal["run", "block"] = "run" if by_run else "block"
+    unit_name: Literal["run", "block"] = "run" if by_run else "block"
     units = _units([len(e) for e in errors], None if by_run else memory)
     n = int(units[-1]) + 1
     if n < 2:
         raise DataError(
             f"errors are correlated over {numeral(memory, 3)} samples, so {sum(map(len, errors))} of "
-            f"them are one {which}, which is too few for a band",
+            f"them are one {unit_name}, which is too few for a band",
             remedy="calibrate on more, or longer, recordings",
         )
 
     level = min(LEVEL, n / (n + 1))
     widenings = widenings if all(run.sample_time for run in runs) else WIDENINGS[:1]
     speeds = np.concatenate([run.speeds for run in runs])
-    of_outputs = [
+    bands_of_outputs = [
         _narrowest(np.abs(error), speed, units, level, widenings)
         for error, speed in zip(np.concatenate(errors).T, speeds.T, strict=True)
     ]
-    widening, scores, widths, ratios = zip(*of_outputs, strict=True)
+    widening, scores, widths, ratios = zip(*bands_of_outputs, strict=True)
 
     samples = np.concatenate([np.hstack([run.inputs, run.modelled]) for run in runs])
     band = Band(
@@ -235,7 +235,7 @@ def find_band(
         widening=vector(np.array(widening)),
         scores=rows(np.array(scores)),
         units=n,
-        unit=which,
+        unit=unit_name,
         level=level,
         memory=memory * max(run.sample_time or 0.0 for run in runs),
     )
@@ -384,7 +384,7 @@ def tested_band(
     if not held:
         return None
     try:
-        band = find_band(block, held, "block", AT_SPEED).band
+        band = find_band(block, held, "block", HALF_AT_SPEED).band
     except DataError:
         return None
 
@@ -404,7 +404,7 @@ def tested_band(
         for tables in (inside, widths)
     )
     return Banded(block, band), TestedBand(
-        unknown=next((reason for reason, holds in reasons.items() if holds), None),
+        unknown=next((reason for reason, applies in reasons.items() if applies), None),
         level=band.level,
         units=band.units,
         branches=branches,

@@ -17,7 +17,7 @@ from mckibben.signals import branches
 LEVELS = 41
 """Input levels at which branches are compared, between 5 and 95 % of the range."""
 
-HOLD = 10
+HOLD_RAMPS = 10
 """Length of the synthetic hold, relative to the ramp before it."""
 
 
@@ -60,9 +60,9 @@ def memory_test(
     names = [channel.name for channel in block.inputs]
     pairs = moving_pairs(recordings, pairs, names)
     gaps = paired_gaps(recordings, outputs, pairs)
-    held = [hold_test(block, recordings[0], *pair) for pair in pairs]
-    kept = [share for share in held if share is not None]
-    return Memory(gap_ratio(gaps), len(gaps), float(np.mean(kept)) if kept else None)
+    hold_shares = [hold_test(block, recordings[0], *pair) for pair in pairs]
+    shares = [share for share in hold_shares if share is not None]
+    return Memory(gap_ratio(gaps), len(gaps), float(np.mean(shares)) if shares else None)
 
 
 def paired_gaps(
@@ -79,9 +79,9 @@ def paired_gaps(
     """
     return np.concatenate(
         [
-            branch_gaps(run[given], np.column_stack([run[output], found[:, place]]))
-            for run, found in zip(recordings, outputs, strict=True)
-            for place, (given, output) in enumerate(pairs)
+            branch_gaps(run[input_name], np.column_stack([run[output], modelled[:, place]]))
+            for run, modelled in zip(recordings, outputs, strict=True)
+            for place, (input_name, output) in enumerate(pairs)
         ]
     )
 
@@ -101,7 +101,10 @@ def moving_pairs(
     def moves(name: str) -> bool:
         return any(name in run and np.ptp(run[name]) > 0 for run in recordings)
 
-    return [(next(filter(moves, (given, *names)), given), output) for given, output in pairs]
+    return [
+        (next(filter(moves, (input_name, *names)), input_name), output)
+        for input_name, output in pairs
+    ]
 
 
 def branch_gaps(u: Array, y: Array) -> Array:
@@ -115,9 +118,9 @@ def branch_gaps(u: Array, y: Array) -> Array:
     for start, stop, direction in branches(u):
         piece = slice(start, stop)
         order = np.argsort(u[piece], kind="stable")
-        along, values = u[piece][order], y[piece][order]
-        at = [np.interp(levels, along, column, np.nan, np.nan) for column in values.T]
-        crossings.append((direction, np.column_stack(at)))
+        inputs, values = u[piece][order], y[piece][order]
+        columns = [np.interp(levels, inputs, column, np.nan, np.nan) for column in values.T]
+        crossings.append((direction, np.column_stack(columns)))
     gaps = [
         (after - before) if first > 0 else (before - after)
         for (first, before), (second, after) in pairwise(crossings)
@@ -141,23 +144,23 @@ def hold_test(
     middle = 0.5 * (low + high)
     lengths = [stop - start for start, stop, _ in branches(u)]
     ramp = int(np.clip(np.median(lengths), 20, 5000))
-    hold = np.full(HOLD * ramp, middle)
+    hold = np.full(HOLD_RAMPS * ramp, middle)
     up = np.linspace(low, middle, ramp)
-    over = np.concatenate([np.linspace(low, high, 2 * ramp), np.linspace(high, middle, ramp)])
+    overshoot = np.concatenate([np.linspace(low, high, 2 * ramp), np.linspace(high, middle, ramp)])
     names = [channel.name for channel in block.inputs]
     rest = 0.5 * (recording.matrix(names).min(axis=0) + recording.matrix(names).max(axis=0))
     place = [channel.name for channel in block.outputs].index(output_name)
     ends = []
-    for way in (up, over):
-        inputs = np.tile(rest, (way.size + hold.size, 1))
-        inputs[:, names.index(input_name)] = np.concatenate([way, hold])
+    for approach in (up, overshoot):
+        inputs = np.tile(rest, (approach.size + hold.size, 1))
+        inputs[:, names.index(input_name)] = np.concatenate([approach, hold])
         try:
-            found = block.simulate(
+            response = block.simulate(
                 inputs, initial="first_sample", sample_time=recording.sample_time
             )
         except MckibbenError:
             return None
-        ends.append(found[:, place])
-    before = float(ends[1][over.size] - ends[0][up.size])
+        ends.append(response[:, place])
+    before = float(ends[1][overshoot.size] - ends[0][up.size])
     after = float(ends[1][-1] - ends[0][-1])
     return after / before if before != 0 else None

@@ -36,20 +36,20 @@ PER_COLUMN = 6
 KNOTS = 8
 """Total number of knots of curves over the inputs."""
 
-WAYS = (0.05, 0.2, 0.6)
+REVERSAL_SHARES = (0.05, 0.2, 0.6)
 """Distances of reversal, in shares of half the range, after which the input is on the other branch.
 """
 
 HOLDS_SHARE = 0.15
 """Share of samples in holds above which creep is distinguished from the loop."""
 
-MOST_DELAY, LONGER = 50, 8
+MOST_DELAY, DELAYS_PER_RECORDING = 50, 8
 """Largest shift of outputs [samples], and the shortest recording as its multiple."""
 
 CAUSES = ("pressure", "voltage", "force", "torque")
 """Channels that may explain a residual although the model does not use them."""
 
-SEGMENTS, FEWEST_SEGMENTS, MEMORIES = 40, 8, 4.0
+SEGMENTS, FEWEST_SEGMENTS, SEGMENT_MEMORIES = 40, 8, 4.0
 """Largest and smallest number of segments of cross-validation; their length in correlation lengths of
 what no regressor explains.
 """
@@ -105,7 +105,7 @@ class _Group:
 
 
 def causes(
-    block: Block, runs: Sequence[FreeRun], output: int, residuals: Sequence[Array], every: int
+    block: Block, runs: Sequence[FreeRun], output: int, residuals: Sequence[Array], block_size: int
 ) -> tuple[tuple[Cause, ...], tuple[Cause, ...]]:
     """Return the significant causes of a residual, largest first, and every cause by itself.
 
@@ -116,22 +116,24 @@ def causes(
     residuals : sequence of array, shape (n,)
         Of every run, as means over blocks of ``every`` samples.
     """
-    groups, tables = _groups(block, runs, output, every)
-    slow = [place for one in groups if one.kind in ("offset", "drift") for place in one.columns]
+    groups, tables = _groups(block, runs, output, block_size)
+    slow = [
+        place for group in groups if group.kind in ("offset", "drift") for place in group.columns
+    ]
     test = _Test(residuals, tables, slow)
-    found: list[Cause] = []
-    known: tuple[int, ...] = (0,)
-    left = [group for group in groups if group.kind != "offset"]
-    while significant := [group for group in left if test.significant(group, known)]:
-        best = max(significant, key=lambda group: test.total_gain(group, known))
-        found.append(test.cause(best, known))
-        known = (*known, *best.given, *best.columns)
-        left = [group for group in left if group is not best and group.kind != "drift"]
+    significant_causes: list[Cause] = []
+    columns: tuple[int, ...] = (0,)
+    candidates = [group for group in groups if group.kind != "offset"]
+    while significant := [group for group in candidates if test.significant(group, columns)]:
+        best = max(significant, key=lambda group: test.total_gain(group, columns))
+        significant_causes.append(test.cause(best, columns))
+        columns = (*columns, *best.given, *best.columns)
+        candidates = [group for group in candidates if group is not best and group.kind != "drift"]
     offset = groups[0]
-    if not found and test.significant(offset, ()):
-        found.append(test.cause(offset, ()))
-    every_cause = [test.cause(one, (0,) if one.columns != (0,) else ()) for one in groups]
-    return tuple(found), tuple(every_cause)
+    if not significant_causes and test.significant(offset, ()):
+        significant_causes.append(test.cause(offset, ()))
+    every_cause = [test.cause(group, (0,) if group.columns != (0,) else ()) for group in groups]
+    return tuple(significant_causes), tuple(every_cause)
 
 
 class _Test:
@@ -142,17 +144,17 @@ class _Test:
     ) -> None:
         x, e = np.concatenate(tables), np.concatenate(residuals)
         self.mean, self.n = float(e.mean()), e.size
-        ends = np.cumsum([len(one) for one in residuals])[:-1]
+        ends = np.cumsum([len(piece) for piece in residuals])[:-1]
 
         def memory(columns: Array) -> float:
-            rest = e - columns @ np.linalg.lstsq(columns, e, rcond=None)[0]
-            return correlation_length(np.split(rest, ends))
+            residual = e - columns @ np.linalg.lstsq(columns, e, rcond=None)[0]
+            return correlation_length(np.split(residual, ends))
 
         self.long_enough = e.size >= FEWEST_SEGMENTS * memory(x[:, slow])
-        wanted = min(int(e.size / (MEMORIES * memory(x))), SEGMENTS)
+        n_segments = min(int(e.size / (SEGMENT_MEMORIES * memory(x))), SEGMENTS)
         segments = [
             part
-            for run in blocks_of(np.split(np.column_stack([x, e]), ends), wanted)
+            for run in blocks_of(np.split(np.column_stack([x, e]), ends), n_segments)
             for part in run
             if part.size
         ]
@@ -161,49 +163,51 @@ class _Test:
 
     def errors(self, columns: tuple[int, ...]) -> Array:
         """Return the squared error of every segment, with columns fitted to the other folds."""
-        places = [*dict.fromkeys(columns), -1]
-        some = self.products[:, places][:, :, places]
-        weights = solve_products(sums_of_others(some, self.folds), len(places) - 1, RIDGE)
-        return squared_errors(some, weights[self.folds])[:, 0]
+        indices = [*dict.fromkeys(columns), -1]
+        products = self.products[:, indices][:, :, indices]
+        weights = solve_products(sums_of_others(products, self.folds), len(indices) - 1, RIDGE)
+        return squared_errors(products, weights[self.folds])[:, 0]
 
-    def gains(self, group: _Group, known: tuple[int, ...]) -> Array:
+    def gains(self, group: _Group, columns: tuple[int, ...]) -> Array:
         """Return the reduction of every segment's squared error by a cause."""
-        before = (*known, *group.given)
-        return self.errors(before) - self.errors((*before, *group.columns))
+        given_columns = (*columns, *group.given)
+        return self.errors(given_columns) - self.errors((*given_columns, *group.columns))
 
-    def total_gain(self, group: _Group, known: tuple[int, ...]) -> float:
+    def total_gain(self, group: _Group, columns: tuple[int, ...]) -> float:
         """Return the reduction of the squared error by a cause and what it is given."""
-        every = (*known, *group.given, *group.columns)
-        return float((self.errors(known) - self.errors(every)).sum())
+        all_columns = (*columns, *group.given, *group.columns)
+        return float((self.errors(columns) - self.errors(all_columns)).sum())
 
-    def significant(self, group: _Group, known: tuple[int, ...]) -> bool:
+    def significant(self, group: _Group, columns: tuple[int, ...]) -> bool:
         """Return whether a cause reduces the error, beyond chance and by a share that matters."""
-        gains, total = self.gains(group, known), float(self.errors(known).sum())
+        gains, total = self.gains(group, columns), float(self.errors(columns).sum())
         if gains.size < 2 or not self.long_enough or not gains.sum() > LEAST_SHARE * total:
             return False
         return bool(gains.mean() > half_interval(gains, 1 - 2 * LEVEL))
 
-    def cause(self, group: _Group, known: tuple[int, ...]) -> Cause:
+    def cause(self, group: _Group, columns: tuple[int, ...]) -> Cause:
         """Return what a group explains in addition to known columns."""
-        gain = max(float(self.gains(group, known).sum()), 0.0)
+        gain = max(float(self.gains(group, columns).sum()), 0.0)
         total = float(self.errors((0,) if group.kind != "offset" else ()).sum())
         coefficient = {"lag": float(group.delay), "offset": self.mean}.get(group.kind)
         share = min(gain / total, 1.0) if total > 0 else 0.0
         return Cause(group.kind, group.channel, share, float(np.sqrt(gain / self.n)), coefficient)
 
 
-def averaged(samples: Array, every: int) -> Array:
+def averaged(samples: Array, block_size: int) -> Array:
     """Return the means over blocks of so many samples, shape (n // every, ...)."""
-    n = len(samples) // every
-    return np.asarray(samples[: n * every].reshape(n, every, *samples.shape[1:]).mean(axis=1))
+    n = len(samples) // block_size
+    return np.asarray(
+        samples[: n * block_size].reshape(n, block_size, *samples.shape[1:]).mean(axis=1)
+    )
 
 
 def _groups(
-    block: Block, runs: Sequence[FreeRun], output: int, every: int
+    block: Block, runs: Sequence[FreeRun], output: int, block_size: int
 ) -> tuple[list[_Group], list[Array]]:
     """Return the groups of regressors, and their columns (blocks, k) of every run; the first is 1."""
-    room = max(sum(len(run) // every for run in runs) // PER_COLUMN, 1)
-    tables = [np.ones((len(run) // every, 1)) for run in runs]
+    room = max(sum(len(run) // block_size for run in runs) // PER_COLUMN, 1)
+    tables = [np.ones((len(run) // block_size, 1)) for run in runs]
     groups = [_Group("offset", "", (0,))]
     modelled = _scaled([run.modelled[:, output] for run in runs])
     for kind, channel, delay, columns in _regressors(block, runs, output, modelled):
@@ -214,7 +218,7 @@ def _groups(
             places = tuple(range(first, first + more))
             groups.append(_Group(kind, channel, places, given, delay))
             for i, part in enumerate(columns):
-                tables[i] = np.column_stack([tables[i], averaged(part, every)])
+                tables[i] = np.column_stack([tables[i], averaged(part, block_size)])
     return groups, tables
 
 
@@ -245,9 +249,12 @@ def block_length(block: Block, runs: Sequence[FreeRun]) -> int:
     """Return the number of samples per block: short compared with a branch, with a limited total."""
     sizes = [len(run) for run in runs]
     branches = _branch_lengths(block, runs)
-    usual = int(np.median(branches)) // PER_BRANCH if branches else 1
-    most = max(int(np.median(sizes)) // (2 * PER_COLUMN), 1)
-    return min(max(1, min(usual, sum(sizes) // FEWEST_BLOCKS), -(-sum(sizes) // MOST_BLOCKS)), most)
+    branch_share = int(np.median(branches)) // PER_BRANCH if branches else 1
+    largest = max(int(np.median(sizes)) // (2 * PER_COLUMN), 1)
+    return min(
+        max(1, min(branch_share, sum(sizes) // FEWEST_BLOCKS), -(-sum(sizes) // MOST_BLOCKS)),
+        largest,
+    )
 
 
 def _branch_lengths(block: Block, runs: Sequence[FreeRun]) -> list[int]:
@@ -284,14 +291,17 @@ def _scaled(parts: Sequence[Array]) -> list[Array]:
 
 def _hats(parts: Sequence[Array], knots: int) -> list[Array]:
     """Return piecewise-linear basis functions, without the first, which the mean replaces."""
-    found = hats(np.concatenate(parts), knots)[:, 1:]
-    return np.split(found, np.cumsum([len(part) for part in parts])[:-1])
+    table = hats(np.concatenate(parts), knots)[:, 1:]
+    return np.split(table, np.cumsum([len(part) for part in parts])[:-1])
 
 
 def _branches(x: Array) -> Array:
     """Return the branch of an input, from -1 to 1 after a distance, and its product with the input."""
-    ways = [(x - PI(thresholds=(way,), weights=(1.0,)).simulate(x)) / way for way in WAYS]
-    return np.column_stack([part for way in ways for part in (way, way * x)])
+    plays = [
+        (x - PI(thresholds=(distance,), weights=(1.0,)).simulate(x)) / distance
+        for distance in REVERSAL_SHARES
+    ]
+    return np.column_stack([part for branch in plays for part in (branch, branch * x)])
 
 
 def _lagging(modelled: Array, delay: int) -> Array:
@@ -303,17 +313,19 @@ def _lagging(modelled: Array, delay: int) -> Array:
 
 def _best_delay(runs: Sequence[FreeRun], output: int) -> int:
     """Return the best shift of the modelled output in samples."""
-    most = min(MOST_DELAY, min(len(run) for run in runs) // LONGER)
+    largest = min(MOST_DELAY, min(len(run) for run in runs) // DELAYS_PER_RECORDING)
 
-    def left(delay: int) -> float:
+    def squared_error(delay: int) -> float:
         total = 0.0
         for run in runs:
             n = len(run)  # the same samples at every delay
-            y = run.outputs[most : n - most, output]
-            total += float(np.sum((y - run.modelled[most - delay : n - most - delay, output]) ** 2))
+            y = run.outputs[largest : n - largest, output]
+            total += float(
+                np.sum((y - run.modelled[largest - delay : n - largest - delay, output]) ** 2)
+            )
         return total
 
-    return min(range(-most, most + 1), key=lambda delay: (left(delay), abs(delay)))
+    return min(range(-largest, largest + 1), key=lambda delay: (squared_error(delay), abs(delay)))
 
 
 def _trends(modelled: Sequence[Array]) -> list[Array]:
@@ -336,17 +348,17 @@ def _longest_hold(block: Block, runs: Sequence[FreeRun], names: Sequence[str]) -
     shortest = max(int(np.median(_branch_lengths(block, runs))) // 2, 10)
     tables = [run.source.matrix(names) for run in runs]
     spans = np.ptp(np.concatenate(tables), axis=0).tolist()
-    found = [hold.stop - hold.start for table in tables for hold in holds(table, spans, shortest)]
-    return max(found, default=0) if sum(found) >= HOLDS_SHARE * sum(map(len, tables)) else 0
+    lengths = [hold.stop - hold.start for table in tables for hold in holds(table, spans, shortest)]
+    return max(lengths, default=0) if sum(lengths) >= HOLDS_SHARE * sum(map(len, tables)) else 0
 
 
 def _creeping(modelled: Array, longest: int) -> Array:
     """Return the difference of the modelled output from its own slow lags."""
     from scipy.signal import lfilter
 
-    found = []
+    differences = []
     for time in (longest / 3, longest):
         share = 1 - np.exp(-1 / time)
         start = [(1 - share) * modelled[0]]
-        found.append(modelled - lfilter([share], [1.0, share - 1.0], modelled, zi=start)[0])
-    return np.column_stack(found)
+        differences.append(modelled - lfilter([share], [1.0, share - 1.0], modelled, zi=start)[0])
+    return np.column_stack(differences)

@@ -10,10 +10,10 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.channels import by_name, channels_of, loop_of
-from mckibben.diagnosis.coupling import FOLLOWS
+from mckibben.diagnosis.coupling import SEPARABLE_R2
 from mckibben.diagnosis.excitation import extremes
 from mckibben.diagnosis.loops import (
-    FIGURES,
+    LOOP_FIGURES,
     Branches,
     Cycle,
     Loop,
@@ -39,31 +39,31 @@ from mckibben.signals.holds import STILL, holds, moves
 from mckibben.signals.reversals import whole_cycles
 from mckibben.system.showing import Result
 
-LEVEL = 0.01
+SIGNIFICANCE = 0.01
 """Significance level of the loop test."""
 
-NO_GAP = 0.01
+NO_GAP_SHARE = 0.01
 """Mean gap between branches, relative to the output range, below which there is no loop."""
 
-EXPLAINED = 0.5
+LEAST_EXPLAINED = 0.5
 """Smallest share of the variance explained by branches for their shape to be measured."""
 
-REPEATS = 3
+FEWEST_REPEATS = 3
 """Smallest number of values for an interval."""
 
 MEDIAN_ERROR = 1.2533
 """Standard error of the median of normal values, relative to that of their mean."""
 
-SHAPE = {
+LOOP_QUANTITIES = {
     *("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid"),
     *("dead_zone_upper", "dead_zone_lower", "rate_dependence", "speeds"),
 }
 """Quantities that are measured only if there is a loop."""
 
-OTHERS = {"gain", "drift", "creep", "creep_time"}
+UNEXPLAINED_QUANTITIES = {"gain", "drift", "creep", "creep_time"}
 """Further quantities without meaning if input and direction explain little of the output."""
 
-SAME_LEVEL = 0.02
+SAME_LEVEL_SHARE = 0.02
 """Share of another input's range within which its levels are equal."""
 
 LEAST_COVERED = 0.5
@@ -190,10 +190,10 @@ class Characterization(Result):
 
         None where too few branches, or too much noise, leave it open.
         """
-        if self.p_loop is not None and self.p_loop <= LEVEL:
+        if self.p_loop is not None and self.p_loop <= SIGNIFICANCE:
             return True
         limits = self.intervals.get("branch_gap")
-        small = limits is not None and max(map(abs, limits)) <= NO_GAP * self.output_span
+        small = limits is not None and max(map(abs, limits)) <= NO_GAP_SHARE * self.output_span
         return False if small else None
 
 
@@ -249,13 +249,11 @@ def characterize(
     levels = _levels(runs, drive, response, others)
     if not levels:
         following = [name for name in others if _follows(runs, name, response)]
-        rest = [name for name in others if name not in following]
-        if following and not rest:
-            together = (
-                f"{', '.join(following)} moves with {response}, and its effect is in the loop"
-            )
-            return replace(_measured(runs, drive, response), notes=(together,))
-        levels = _levels(runs, drive, response, rest) if following else []
+        independent = [name for name in others if name not in following]
+        if following and not independent:
+            note = f"{', '.join(following)} moves with {response}, and its effect is in the loop"
+            return replace(_measured(runs, drive, response), notes=(note,))
+        levels = _levels(runs, drive, response, independent) if following else []
     if not levels:
         raise DataError(
             f"it never moves while {', '.join(others)} stay constant: its effect is not identifiable",
@@ -282,7 +280,7 @@ def _follows(runs: Sequence[Recording], load: str, response: str) -> bool:
     if load in by_name(runs)[0]:  # a drive
         return False
     table = np.concatenate([run.matrix([load, response]) for run in runs])
-    return bool(np.corrcoef(table.T)[0, 1] ** 2 > FOLLOWS)
+    return bool(np.corrcoef(table.T)[0, 1] ** 2 > SEPARABLE_R2)
 
 
 def _levels(
@@ -297,7 +295,7 @@ def _levels(
             continue
         result = _measured(segments, drive, response)
         if all(cycle.amplitude < LEAST_COVERED * (high - low) for cycle in result.cycles):
-            result = _blanked(result, SHAPE)  # of small cycles
+            result = _blanked(result, LOOP_QUANTITIES)  # of small cycles
         if result.loop_width is not None or result.branch_gap is not None:
             units = [runs[0].units[name] for name in others]
             held = tuple(zip(others, values, units, strict=True))
@@ -351,10 +349,10 @@ def _measured(runs: Sequence[Recording], drive: str, response: str) -> Character
         intervals={name: ends for name, ends in intervals.items() if ends is not None},
     )
 
-    absent = set() if share >= EXPLAINED else SHAPE | OTHERS
+    absent = set() if share >= LEAST_EXPLAINED else LOOP_QUANTITIES | UNEXPLAINED_QUANTITIES
     low, high = gap_interval or (1.0, 1.0)
     if result.has_loop is False or low <= 0 <= high:
-        absent |= SHAPE
+        absent |= LOOP_QUANTITIES
     return _blanked(result, absent)
 
 
@@ -369,20 +367,20 @@ def _repeated(
 ) -> tuple[dict[str, Any], dict[str, Range | None]]:
     """Return the medians over repeats of what is measured repeatedly, and their intervals."""
     largest = largest_of(loops)
-    crept = creep(runs, drive, response, scale)
+    creeps = creep(runs, drive, response, scale)
     upper, lower = dead_zones(tracks, scale)
     repeats: dict[str, Sequence[float | None]] = {
-        **{name: [loop.figures[name] for loop in largest] for name in FIGURES},
+        **{name: [loop.figures[name] for loop in largest] for name in LOOP_FIGURES},
         "gain": gains_of(branches, largest, scale),
         "dead_zone_upper": upper,
         "dead_zone_lower": lower,
-        "creep": [change for _, change in crept],
-        "creep_time": [time for time, _ in crept],
+        "creep": [change for _, change in creeps],
+        "creep_time": [time for time, _ in creeps],
         "drift": drift(loops),
     }
-    known = {name: [x for x in values if x is not None] for name, values in repeats.items()}
-    medians = {name: float(np.median(xs)) if xs else None for name, xs in known.items()}
-    intervals = {name: _interval(xs) for name, xs in known.items() if name != "creep_time"}
+    values_of = {name: [x for x in values if x is not None] for name, values in repeats.items()}
+    medians = {name: float(np.median(xs)) if xs else None for name, xs in values_of.items()}
+    intervals = {name: _interval(xs) for name, xs in values_of.items() if name != "creep_time"}
     return medians, intervals
 
 
@@ -399,7 +397,7 @@ def _interval(values: Sequence[float]) -> Range | None:
 
     It does not reach beyond zero where all values are of one sign.
     """
-    if len(values) < REPEATS:
+    if len(values) < FEWEST_REPEATS:
         return None
     half = MEDIAN_ERROR * half_interval(np.array(values), 0.95)
     low, high = float(np.median(values)) - half, float(np.median(values)) + half
@@ -462,7 +460,7 @@ def constant_segments(
     groups: list[Group] = []
     for level, number, segment in sorted(segments, key=lambda entry: tuple(entry[0])):
         for values, members in groups:
-            if np.all(np.abs(level - values) <= SAME_LEVEL * ranges):
+            if np.all(np.abs(level - values) <= SAME_LEVEL_SHARE * ranges):
                 members.append((number, segment))
                 break
         else:

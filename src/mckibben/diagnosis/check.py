@@ -32,18 +32,18 @@ FEWEST_IN_ALL, FEWEST_IN_EACH = 60, 10
 FEWEST_BLOCKS = 6
 """Smallest number of blocks of a recording that is tested."""
 
-ROUNDING, STEP = 1e-9, 0.5
+ROUNDING, STEP_SHARE = 1e-9, 0.5
 """RMS residuals that are not tested: shares of the span, and of the sensor's resolution."""
 
-UNMOVED, OFF_GRID = 0.05, 0.01
+UNMOVED_SHARE, OFF_GRID_SHARE = 0.05, 0.01
 """A sensor is quantised if this share of samples equals the preceding one and none is further than
 this from the grid.
 """
 
-TESTED, PER_LAG = 12, 20
+MOST_LAGS_TESTED, SAMPLES_PER_TESTED_LAG = 12, 20
 """Largest number of lags tested together, and samples needed per lag."""
 
-SHOWN, PAIRS = 50, 5
+MOST_LAGS_DRAWN, SAMPLES_PER_DRAWN_LAG = 50, 5
 """Largest number of single lags drawn; samples needed per lag, as its multiple."""
 
 NORMAL_99 = 2.5758
@@ -161,9 +161,9 @@ class OutputCheck(Numbers):
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
-        found = super().to_dict()
-        found["range"] = found.pop("span")
-        return found | {"right": self.right}
+        content = super().to_dict()
+        content["range"] = content.pop("span")
+        return content | {"right": self.right}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -204,22 +204,22 @@ class Validation(Result):
         import pandas as pd
 
         rows = [
-            {"output": one.output, "missing": each in one.missing, **vars(each)}
-            for one in self.outputs
-            for each in one.suspects
+            {"output": output.output, "missing": cause in output.missing, **vars(cause)}
+            for output in self.outputs
+            for cause in output.suspects
         ]
         return pd.DataFrame(rows)
 
     @property
     def right(self) -> bool:
         """Whether no cause is significant."""
-        return all(one.right for one in self.outputs)
+        return all(output.right for output in self.outputs)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything for JSON, without runs."""
         described = {"description": plain(self.description)} if self.description else {}
-        found = {"right": self.right, "outputs": plain(self.outputs), **described}
-        return super().to_dict() | found
+        content = {"right": self.right, "outputs": plain(self.outputs), **described}
+        return super().to_dict() | content
 
 
 def check(
@@ -252,12 +252,12 @@ def check(
     ModelError
         Where the model's output is not finite, or runs away.
     """
-    model, every = inside(model), listed(recordings)
-    check_usable(model, every)
-    inputs, outputs = ([c.name for c in some] for some in (model.inputs, model.outputs))
-    check_shared({"check": every}, inputs, outputs)
+    model, runs = inside(model), listed(recordings)
+    check_usable(model, runs)
+    inputs, outputs = ([c.name for c in channels] for channels in (model.inputs, model.outputs))
+    check_shared({"check": runs}, inputs, outputs)
     with telling(progress, "checking") as tell:
-        return check_runs(model, [free_run(model, one) for one in every], tell)
+        return check_runs(model, [free_run(model, run) for run in runs], tell)
 
 
 def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
@@ -307,13 +307,13 @@ def check_runs(
     means : array, shape (m,), optional
         Of the training outputs, which the model has to beat; default those of the recordings.
     """
-    every = block_length(model, runs)
-    tested = [run for run in runs if len(run) // every >= FEWEST_BLOCKS] or list(runs)
+    block_size = block_length(model, runs)
+    tested = [run for run in runs if len(run) // block_size >= FEWEST_BLOCKS] or list(runs)
     if means is None:
         means = np.concatenate([run.outputs for run in runs]).mean(axis=0)
     with one_blas_thread():
         outputs = tuple(
-            _output(model, runs, tested, every, place, float(means[place]))
+            _output(model, runs, tested, block_size, place, float(means[place]))
             for place in one_by_one(range(len(model.outputs)), tell)
         )
     names = tuple(run.name for run in runs)
@@ -325,7 +325,7 @@ def _output(
     model: Block,
     runs: Sequence[FreeRun],
     tested: Sequence[FreeRun],
-    every: int,
+    block_size: int,
     place: int,
     mean: float,
 ) -> OutputCheck:
@@ -333,21 +333,23 @@ def _output(
     residuals = [run.residual[:, place] for run in runs]
     measured = [run.outputs[:, place] for run in runs]
     span, rmse = float(np.ptp(np.concatenate(measured))), rms(np.concatenate(residuals))
-    exact = rmse <= max(ROUNDING * span, STEP * _resolution(measured))
+    exact = rmse <= max(ROUNDING * span, STEP_SHARE * _resolution(measured))
     if exact:
         # what rounding follows is the arithmetic, or the sensor's steps
         residuals = [0.0 * e for e in residuals]
-    left = [averaged(e, every) for e, run in zip(residuals, runs, strict=True) if run in tested]
-    missing, suspects = causes(model, tested, place, left, every)
-    found = dict.fromkeys((one.kind, one.channel) for one in suspects)
+    means = [
+        averaged(e, block_size) for e, run in zip(residuals, runs, strict=True) if run in tested
+    ]
+    missing, suspects = causes(model, tested, place, means, block_size)
+    tested_causes = dict.fromkeys((cause.kind, cause.channel) for cause in suspects)
     patterns = [
-        _pattern(against, name, runs[0].source.units[name], left, tested, every)
+        _pattern(against, name, runs[0].source.units[name], means, tested, block_size)
         for kind, against in (("curve", "input"), ("hysteresis", "branch"), ("load", "load"))
-        for each, name in found
-        if each == kind
+        for cause_kind, name in tested_causes
+        if cause_kind == kind
     ]
     modelled = [run.modelled[:, place] for run in tested]
-    bins_of = bins(left, [averaged(y, every) for y in modelled], every)
+    bins_of = bins(means, [averaged(y, block_size) for y in modelled], block_size)
     patterns.append(Pattern("output", channel.name, channel.unit, bins_of))
     return OutputCheck(
         output=channel.name,
@@ -365,11 +367,11 @@ def _output(
 
 
 def _pattern(
-    against: str, name: str, unit: str, left: list[Array], runs: Sequence[FreeRun], every: int
+    against: str, name: str, unit: str, means: list[Array], runs: Sequence[FreeRun], block_size: int
 ) -> Pattern:
-    values = [averaged(run.source[name], every) for run in runs]
+    values = [averaged(run.source[name], block_size) for run in runs]
     branches = [np.gradient(x) for x in values] if against == "branch" else None
-    return Pattern(against, name, unit, bins(left, values, every, branches))
+    return Pattern(against, name, unit, bins(means, values, block_size, branches))
 
 
 def whiteness(residuals: Sequence[Array]) -> Whiteness:
@@ -380,30 +382,38 @@ def whiteness(residuals: Sequence[Array]) -> Whiteness:
     """
     from scipy.special import chdtrc
 
-    room, n = max(map(len, residuals)) // (PAIRS + 1), sum(map(len, residuals))
-    lags = np.arange(1, min(SHOWN, room) + 1)
-    if room > SHOWN:
-        lags = np.union1d(lags, np.geomspace(SHOWN, room, SHOWN).astype(int))
+    longest_lag, n = (
+        max(map(len, residuals)) // (SAMPLES_PER_DRAWN_LAG + 1),
+        sum(map(len, residuals)),
+    )
+    lags = np.arange(1, min(MOST_LAGS_DRAWN, longest_lag) + 1)
+    if longest_lag > MOST_LAGS_DRAWN:
+        lags = np.union1d(
+            lags, np.geomspace(MOST_LAGS_DRAWN, longest_lag, MOST_LAGS_DRAWN).astype(int)
+        )
     mean = float(np.concatenate(residuals).mean())
-    left = [e - mean for e in residuals]
-    power = float(sum(e @ e for e in left))
-    found, scatter = np.zeros(lags.size), np.zeros(lags.size)
+    centred = [e - mean for e in residuals]
+    power = float(sum(e @ e for e in centred))
+    products_sum, scatter = np.zeros(lags.size), np.zeros(lags.size)
     for place, lag in enumerate(lags.tolist()):
-        products = np.concatenate([e[lag:] * e[: len(e) - lag] for e in left if len(e) > lag])
+        products = np.concatenate([e[lag:] * e[: len(e) - lag] for e in centred if len(e) > lag])
         # the mean was taken off: what noise itself would give is below zero
-        found[place] = products.sum() + len(products) / n * power / n
+        products_sum[place] = products.sum() + len(products) / n * power / n
         scatter[place] = products @ products
-    tested, deviation = min(TESTED, room, n // PER_LAG), np.sqrt(scatter)
-    ratio = np.divide(found, deviation, out=np.zeros(lags.size), where=deviation > 0)
+    tested, deviation = (
+        min(MOST_LAGS_TESTED, longest_lag, n // SAMPLES_PER_TESTED_LAG),
+        np.sqrt(scatter),
+    )
+    ratio = np.divide(products_sum, deviation, out=np.zeros(lags.size), where=deviation > 0)
     p_value = float(chdtrc(tested, float(np.sum(ratio[:tested] ** 2)))) if tested else None
-    by_lag = [(x / (power or 1.0)).tolist() for x in (found, NORMAL_99 * deviation)]
+    by_lag = [(x / (power or 1.0)).tolist() for x in (products_sum, NORMAL_99 * deviation)]
     return Whiteness(tuple(lags.tolist()), tuple(by_lag[0]), tuple(by_lag[1]), tested, p_value)
 
 
 def bins(
-    left: Sequence[Array],
+    residual_means: Sequence[Array],
     values: Sequence[Array],
-    every: int,
+    block_size: int,
     branches: Sequence[Array] | None = None,
 ) -> tuple[Bin, ...]:
     """Return means of a residual in bins of equal numbers of samples.
@@ -415,22 +425,22 @@ def bins(
     branches : sequence of array, shape (n,), optional
         Positive on the rising branch and negative on the falling one, for a mean of each.
     """
-    e, x = np.concatenate(left), np.concatenate(values)
-    way = np.zeros(x.size) if branches is None else np.sign(np.concatenate(branches))
+    e, x = np.concatenate(residual_means), np.concatenate(values)
+    branch = np.zeros(x.size) if branches is None else np.sign(np.concatenate(branches))
     ends = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)))
-    places = np.clip(np.searchsorted(ends, x, "right") - 1, 0, ends.size - 2)
+    bin_number = np.clip(np.searchsorted(ends, x, "right") - 1, 0, ends.size - 2)
     labels = {"": 0} if branches is None else {"rising": 1, "falling": -1}
-    memory, found = correlation_length(left), []
+    memory, result = correlation_length(residual_means), []
     for k in range(ends.size - 1):
         for label, sign in labels.items():
-            own = e[(places == k) & (way == sign)]
-            if own.size:
-                mean = float(own.mean())
-                half = NORMAL_95 * float(own.std()) * np.sqrt(min(memory / own.size, 1.0))
-                ends_of = float(ends[k]), float(ends[k + 1])
+            members = e[(bin_number == k) & (branch == sign)]
+            if members.size:
+                mean = float(members.mean())
+                half = NORMAL_95 * float(members.std()) * np.sqrt(min(memory / members.size, 1.0))
+                ends_of_bin = float(ends[k]), float(ends[k + 1])
                 limits = mean - half, mean + half
-                found.append(Bin(label, *ends_of, own.size * every, mean, limits))
-    return tuple(found)
+                result.append(Bin(label, *ends_of_bin, members.size * block_size, mean, limits))
+    return tuple(result)
 
 
 def _resolution(measured: Sequence[Array]) -> float:
@@ -439,8 +449,8 @@ def _resolution(measured: Sequence[Array]) -> float:
     steps = np.diff(values)
     steps = steps[steps > ROUNDING * (values[-1] - values[0])]
     unmoved = np.mean(np.concatenate([np.diff(y) for y in measured]) == 0)
-    if not steps.size or unmoved < UNMOVED:
+    if not steps.size or unmoved < UNMOVED_SHARE:
         return 0.0
     step = float(steps.min())
     places = (values - values[0]) / step
-    return step if np.abs(places - np.round(places)).max() < OFF_GRID else 0.0
+    return step if np.abs(places - np.round(places)).max() < OFF_GRID_SHARE else 0.0

@@ -13,10 +13,10 @@ from mckibben.numerics.statistics import dependence
 from mckibben.recording import Recording
 from mckibben.signals.lags import lag
 
-FOLLOWS = 0.9
+SEPARABLE_R2 = 0.9
 """R² of an input's regression on the others above which their effects are not separable."""
 
-LITTLE = 0.1
+LEAST_EXPLAINED = 0.1
 """Share of an output's variance below which its inputs explain hardly any of it."""
 
 
@@ -92,17 +92,17 @@ def coupling(
     highest = np.max([r.matrix(inputs).max(axis=0) for r in recordings], axis=0)
     ranges = highest - np.min([r.matrix(inputs).min(axis=0) for r in recordings], axis=0)
     effects = (gains / np.where(size > 0, size, 1.0)[:, np.newaxis] * ranges[:, np.newaxis]).T
-    if (dependence(u) > FOLLOWS).any():
+    if (dependence(u) > SEPARABLE_R2).any():
         effects = np.full_like(effects, np.nan)
     total = np.sum(y**2, axis=0)
-    left = np.sum((y - scaled @ gains) ** 2, axis=0)
-    explained = 1 - left / np.where(total > 0, total, 1.0)
+    unexplained_sum = np.sum((y - scaled @ gains) ** 2, axis=0)
+    explained = 1 - unexplained_sum / np.where(total > 0, total, 1.0)
     units = tuple(recordings[0].units[name] for name in outputs)
     return Coupling(tuple(inputs), tuple(outputs), effects, units, tuple(explained.tolist()))
 
 
-def unexplained(recordings: Sequence[Recording], found: Coupling) -> list[str]:
-    """Return the outputs of which inputs explain less than `LITTLE` of the variance.
+def unexplained(recordings: Sequence[Recording], effects: Coupling) -> list[str]:
+    """Return the outputs of which inputs explain less than `LEAST_EXPLAINED` of the variance.
 
     That is the larger of the share of linear regression on all inputs, and of one input at any lag.
     """
@@ -114,7 +114,11 @@ def unexplained(recordings: Sequence[Recording], found: Coupling) -> list[str]:
 
     return [
         output
-        for output, share in zip(found.outputs, found.explained, strict=True)
-        if share < LITTLE
-        and all(correlated(r, name, output) < LITTLE for r in recordings for name in found.inputs)
+        for output, share in zip(effects.outputs, effects.explained, strict=True)
+        if share < LEAST_EXPLAINED
+        and all(
+            correlated(r, name, output) < LEAST_EXPLAINED
+            for r in recordings
+            for name in effects.inputs
+        )
     ]

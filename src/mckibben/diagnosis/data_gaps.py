@@ -33,12 +33,12 @@ AT_END, OFF_REST = 0.1, 0.1
 frequent value to be away from rest.
 """
 
-LARGE, SIMILAR, FEWEST_BRANCHES = 0.25, 1.5, 4
+LARGE_BRANCH_SHARE, SIMILAR_FACTOR, FEWEST_BRANCHES = 0.25, 1.5, 4
 """Speeds are compared among branches over this share of the range, whose lengths differ by at most
 this factor, if there are this many.
 """
 
-Found = Iterator[tuple[float, tuple[str, ...]]]
+GapNumbers = Iterator[tuple[float, tuple[str, ...]]]
 """A value and the channels it belongs to."""
 
 
@@ -77,7 +77,7 @@ class Rule:
     """
 
     what: str
-    number: Callable[[Excitation], Found]
+    number: Callable[[Excitation], GapNumbers]
     beyond: Callable[[float, float], bool]
     needed: float
     run: str
@@ -127,11 +127,16 @@ def data_gaps(
     return gaps_of(excitation(recordings, inputs, outputs, tests))
 
 
-def gaps_of(known: Excitation) -> tuple[Gap, ...]:
+def gaps_of(excitation: Excitation) -> tuple[Gap, ...]:
     """Return the data gaps for given excitation, most important first."""
-    found = [gap for rule in RULES if known.timed or not rule.timed for gap in _gaps(rule, known)]
-    still = [gap for gap in found if gap.what == "still"]
-    return tuple(still or sorted(found, key=lambda gap: -gap.severity))
+    gaps = [
+        gap
+        for rule in RULES
+        if excitation.timed or not rule.timed
+        for gap in _gaps(rule, excitation)
+    ]
+    still = [gap for gap in gaps if gap.what == "still"]
+    return tuple(still or sorted(gaps, key=lambda gap: -gap.severity))
 
 
 def excitation(
@@ -141,14 +146,14 @@ def excitation(
     tests: Sequence[Recording] = (),
 ) -> Excitation:
     """Return the excitation of recordings; parameters and errors as in `data_gaps`."""
-    every = listed(recordings)
-    if not every:
+    runs = listed(recordings)
+    if not runs:
         problem = "there are none to judge"
         raise DataError(problem, parameter="recordings", remedy="give at least one")
-    found = channels_of(every, inputs, outputs)
-    driven = (*(name for name in found.offered if name == PRESSURE), *found.inputs)
-    names = (*driven, *found.outputs)
-    for recording in every:
+    channels = channels_of(runs, inputs, outputs)
+    driven = (*(name for name in channels.offered if name == PRESSURE), *channels.inputs)
+    names = (*driven, *channels.outputs)
+    for recording in runs:
         if len(recording) < FEWEST_SAMPLES:
             raise DataError(
                 f"{len(recording)} samples are too few for any model",
@@ -162,138 +167,163 @@ def excitation(
                 channel=absent[0],
                 remedy="name them with `input` and `output`, or give recordings with the same channels",
             )
-    further = (name for name in found.further if name not in names)
-    loads = tuple(name for name in further if all(name in recording for recording in every))
-    kept = tuple(without_copies(every, driven, found.outputs))
-    return Excitation(kept, tuple(tests), driven, loads, found.outputs)
+    further = (name for name in channels.further if name not in names)
+    loads = tuple(name for name in further if all(name in recording for recording in runs))
+    distinct = tuple(without_copies(runs, driven, channels.outputs))
+    return Excitation(distinct, tuple(tests), driven, loads, channels.outputs)
 
 
-def _gaps(rule: Rule, known: Excitation) -> Iterator[Gap]:
+def _gaps(rule: Rule, excitation: Excitation) -> Iterator[Gap]:
     """Yield the gap of a rule: its worst number, with the channels of all that exceed it."""
-    numbers = rule.number(known)
+    numbers = rule.number(excitation)
     beyond = [(value, names) for value, names in numbers if rule.beyond(value, rule.needed)]
     if beyond:
         worst = min if rule.beyond(-np.inf, rule.needed) else max
         value = worst(value for value, _ in beyond)
         channels = tuple(dict.fromkeys(name for _, names in beyond for name in names))
-        ranges = {name: known.ranges[name] for name in channels}
+        ranges = {name: excitation.ranges[name] for name in channels}
         yield Gap(rule.what, value, rule.needed, channels, ranges, rule.run, rule.severity)
 
 
 # -- rules -----------------------------------------------------------------------------------------
 
 
-def _still(known: Excitation) -> Found:
+def _still(excitation: Excitation) -> GapNumbers:
     """Yield the outputs that are constant, or all inputs if they are."""
-    names = [name for name in known.outputs if known.constant(name)]
-    for name in names or (known.driven if all(map(known.constant, known.driven)) else ()):
+    names = [name for name in excitation.outputs if excitation.constant(name)]
+    for name in names or (
+        excitation.driven if all(map(excitation.constant, excitation.driven)) else ()
+    ):
         yield 0.0, (name,)
 
 
-def _constant(channels: Callable[[Excitation], Sequence[str]]) -> Callable[[Excitation], Found]:
+def _constant(
+    channels: Callable[[Excitation], Sequence[str]],
+) -> Callable[[Excitation], GapNumbers]:
     """Return the rule of channels that are constant while others move."""
 
-    def number(known: Excitation) -> Found:
-        for name in channels(known) if known.moving else ():
-            yield float(known.moves(name)), (name,)
+    def number(excitation: Excitation) -> GapNumbers:
+        for name in channels(excitation) if excitation.moving else ():
+            yield float(excitation.moves(name)), (name,)
 
     return number
 
 
-def _reversals(known: Excitation) -> Found:
+def _reversals(excitation: Excitation) -> GapNumbers:
     """Yield the number of turning points of every input."""
-    for name in known.swinging:
-        yield sum(turns.size - 2 for turns in known.turns[name]), (name,)
+    for name in excitation.swinging:
+        yield sum(turns.size - 2 for turns in excitation.turns[name]), (name,)
 
 
-def _inner_reversals(known: Excitation) -> Found:
+def _inner_reversals(excitation: Excitation) -> GapNumbers:
     """Yield the number of turning points inside the range, upper or lower, whichever is smaller."""
-    for name in known.swinging:
+    for name in excitation.swinging:
         counts = np.zeros(2, dtype=int)
-        for recording, turns in zip(known.recordings, known.turns[name], strict=True):
-            heights = (recording[name][turns] - known.ranges[name][0]) / known.span(name)
+        for recording, turns in zip(excitation.recordings, excitation.turns[name], strict=True):
+            heights = (recording[name][turns] - excitation.ranges[name][0]) / excitation.span(name)
             inner = (heights > AT_END) & (heights < 1 - AT_END)
             upper = np.diff(heights) > 0
-            counts += [int((inner[1:-1] & (upper[:-1] == way)).sum()) for way in (True, False)]
-        if sum(turns.size - 2 for turns in known.turns[name]):
+            counts += [
+                int((inner[1:-1] & (upper[:-1] == direction)).sum()) for direction in (True, False)
+            ]
+        if sum(turns.size - 2 for turns in excitation.turns[name]):
             yield int(counts.min()), (name,)
 
 
-def _speed_ratio(known: Excitation) -> Found:
+def _speed_ratio(excitation: Excitation) -> GapNumbers:
     """Yield the ratio of speeds among similar branches of an input.
 
     Quantiles are of the time of motion, so that a few ways to where something is held do not count.
     """
-    for name in known.swinging:
-        branches = [b for b in known.branches[name] if b.travel >= LARGE * known.span(name)]
+    for name in excitation.swinging:
+        branches = [
+            b
+            for b in excitation.branches[name]
+            if b.travel >= LARGE_BRANCH_SHARE * excitation.span(name)
+        ]
         travel = np.array([branch.travel for branch in branches])
-        speeds = np.array([known.speed(name, branch) for branch in branches])
+        speeds = np.array([excitation.speed(name, branch) for branch in branches])
         order = np.argsort(speeds)
         ratio = 1.0
         for least in np.unique(np.quantile(travel, np.linspace(0, 1, 20))) if branches else ():
-            like = order[(travel[order] >= 0.999 * least) & (travel[order] <= SIMILAR * least)]
-            if like.size >= FEWEST_BRANCHES:
-                time = np.cumsum(travel[like] / speeds[like])
-                slow, fast = speeds[like[np.searchsorted(time, np.array([0.15, 0.85]) * time[-1])]]
+            similar = order[
+                (travel[order] >= 0.999 * least) & (travel[order] <= SIMILAR_FACTOR * least)
+            ]
+            if similar.size >= FEWEST_BRANCHES:
+                time = np.cumsum(travel[similar] / speeds[similar])
+                slow, fast = speeds[
+                    similar[np.searchsorted(time, np.array([0.15, 0.85]) * time[-1])]
+                ]
                 ratio = max(ratio, float(fast / slow))
-        if known.branches[name]:
+        if excitation.branches[name]:
             yield ratio, (name,)
 
 
-def _hold(known: Excitation) -> Found:
+def _hold(excitation: Excitation) -> GapNumbers:
     """Yield the longest hold [s]."""
-    if known.moving:
-        yield known.longest_hold, known.moving
+    if excitation.moving:
+        yield excitation.longest_hold, excitation.moving
 
 
-def _beyond_range(known: Excitation) -> Found:
+def _beyond_range(excitation: Excitation) -> GapNumbers:
     """Yield how far tests exceed the recorded range of an input or load, as a share of it."""
-    for name in known.moving:
-        if any(name in test for test in known.tests):
-            (low, high), (lowest, highest) = known.ranges[name], extremes(known.tests, name)
-            yield max(low - lowest, highest - high) / known.span(name), (name,)
+    for name in excitation.moving:
+        if any(name in test for test in excitation.tests):
+            (low, high), (lowest, highest) = (
+                excitation.ranges[name],
+                extremes(excitation.tests, name),
+            )
+            yield max(low - lowest, highest - high) / excitation.span(name), (name,)
 
 
-def _dependence(known: Excitation) -> Found:
+def _dependence(excitation: Excitation) -> GapNumbers:
     """Yield the R² of an input on the others within recordings."""
-    names = [name for name in known.moving if known.branches[name]]
+    names = [name for name in excitation.moving if excitation.branches[name]]
     if len(names) < 2:
         return
     samples = np.concatenate(
-        [one.matrix(names) - one.matrix(names).mean(axis=0) for one in known.recordings]
+        [
+            recording.matrix(names) - recording.matrix(names).mean(axis=0)
+            for recording in excitation.recordings
+        ]
     )
     shares = dependence(samples[:: max(1, len(samples) // MOST_SAMPLES)])
     for name, share in zip(names, shares.tolist(), strict=True):
         yield share, (name,)
 
 
-def _load_by_output(known: Excitation) -> Found:
+def _load_by_output(excitation: Excitation) -> GapNumbers:
     """Yield the R² of a load on one output, as for a spring."""
-    for load in known.loads:
-        for output in known.outputs:
-            if known.moves(load) and known.moves(output):
-                together = np.corrcoef(known.pooled([load, output]).T)
-                yield float(together[0, 1] ** 2), (load, output)
+    for load in excitation.loads:
+        for output in excitation.outputs:
+            if excitation.moves(load) and excitation.moves(output):
+                correlation = np.corrcoef(excitation.pooled([load, output]).T)
+                yield float(correlation[0, 1] ** 2), (load, output)
 
 
-def _together(known: Excitation) -> Found:
+def _together(excitation: Excitation) -> GapNumbers:
     """Yield the share of samples in which two channels are both away from their most frequent values."""
-    if len(known.moving) < 2:
+    if len(excitation.moving) < 2:
         return
-    samples = known.pooled(known.moving)[:: max(1, sum(map(len, known.recordings)) // MOST_SAMPLES)]
-    off = np.empty(samples.shape, dtype=bool)
-    for place, name in enumerate(known.moving):
-        counts, edges = np.histogram(samples[:, place], bins=50)
+    samples = excitation.pooled(excitation.moving)[
+        :: max(1, sum(map(len, excitation.recordings)) // MOST_SAMPLES)
+    ]
+    away = np.empty(samples.shape, dtype=bool)
+    for column, name in enumerate(excitation.moving):
+        counts, edges = np.histogram(samples[:, column], bins=50)
         rest = float(edges[counts.argmax() : counts.argmax() + 2].mean())
-        off[:, place] = np.abs(samples[:, place] - rest) > OFF_REST * known.span(name)
-    for one, other in combinations(range(len(known.moving)), 2):
-        share = float((off[:, one] & off[:, other]).mean())
-        yield share, (known.moving[one], known.moving[other])
+        away[:, column] = np.abs(samples[:, column] - rest) > OFF_REST * excitation.span(name)
+    for first, second in combinations(range(len(excitation.moving)), 2):
+        share = float((away[:, first] & away[:, second]).mean())
+        yield share, (excitation.moving[first], excitation.moving[second])
 
 
-def _untimed(known: Excitation) -> Found:
+def _untimed(excitation: Excitation) -> GapNumbers:
     """Yield the share of recordings with time."""
-    yield float(np.mean([one.sample_time is not None for one in known.recordings])), known.inputs
+    yield (
+        float(np.mean([recording.sample_time is not None for recording in excitation.recordings])),
+        excitation.inputs,
+    )
 
 
 RULES = (

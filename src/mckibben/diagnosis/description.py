@@ -116,20 +116,20 @@ def describe(
 def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, float]:
     """Return the covariance of a model's parameters, NaN if unknown, and a half width in errors."""
     share = min(1.0, MOST_OPERATIONS / max(_operations(block, recordings), 1.0))
-    kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
-    share = sum(map(len, kept)) / sum(map(len, recordings))
+    shortened = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
+    share = sum(map(len, shortened)) / sum(map(len, recordings))
     if _means_nothing(block):
         return unknown(block), np.nan
-    runs = FreeRuns.of(block, kept)
+    runs = FreeRuns.of(block, shortened)
     if not np.isfinite(runs.residual).all():
         return unknown(block), np.nan
     if balance_in(block) is not None:
         return share * covariance_of_balance(runs, fixed_in(block))[1], NORMAL_95
     covariance = share * covariance_of(runs, np.flatnonzero(fixed(block)).tolist())[1]
     pairs = zip(runs.runs, runs.modelled, strict=True)
-    left = [np.where(r.counts[:, None], r.outputs - found, np.nan) for r, found in pairs]
-    n = sum(int(own.sum()) for own in runs.rows)
-    n_effective = min(m.effective_sample_size(n) for m in autoregressions(left)) / share
+    residuals = [np.where(r.counts[:, None], r.outputs - modelled, np.nan) for r, modelled in pairs]
+    n = sum(int(rows.sum()) for rows in runs.rows)
+    n_effective = min(m.effective_sample_size(n) for m in autoregressions(residuals)) / share
     freedom = n_effective - np.isfinite(np.diag(covariance)).sum()
     return covariance, student(max(freedom, 1.0))
 
@@ -139,19 +139,26 @@ def parameters(block: Block, covariance: Array, half_width: float) -> tuple[Para
 
     Values that are rounding compared with the others, such as a weight of 1e-17, are shown as 0.
     """
-    values, errors, chosen = block.pack(), np.sqrt(np.diag(covariance)), fixed(block)
-    known = np.isfinite(errors)
-    other = "unknown" if _means_nothing(block) else "undetermined"
-    status = np.where(known, "estimated", np.where(chosen, "fixed", other)).tolist()
+    values, errors, is_fixed = block.pack(), np.sqrt(np.diag(covariance)), fixed(block)
+    is_known = np.isfinite(errors)
+    otherwise = "unknown" if _means_nothing(block) else "undetermined"
+    status = np.where(is_known, "estimated", np.where(is_fixed, "fixed", otherwise)).tolist()
     shown = np.where(vanishing(values), 0.0, values)
     ends = np.transpose(shown + half_width * np.outer([-1, 1], errors))
     return tuple(
         Parameter(
-            *(what.name, what.symbol, what.unit, what.meaning, float(shown[place]), status[place]),
-            float(errors[place]) if known[place] else None,
-            (float(ends[place, 0]), float(ends[place, 1])) if known[place] else None,
+            *(
+                quantity.name,
+                quantity.symbol,
+                quantity.unit,
+                quantity.meaning,
+                float(shown[place]),
+                status[place],
+            ),
+            float(errors[place]) if is_known[place] else None,
+            (float(ends[place, 0]), float(ends[place, 1])) if is_known[place] else None,
         )
-        for place, what in enumerate(quantities(block))
+        for place, quantity in enumerate(quantities(block))
     )
 
 
@@ -169,5 +176,5 @@ def _means_nothing(block: Block) -> bool:
 
 def _operations(block: Block, recordings: Sequence[Recording]) -> float:
     """Return about how many operations all sensitivities take."""
-    each = 2 * block.n_parameters + 4 * block.n_states
-    return float(each * block.n_parameters * sum(map(len, recordings)))
+    per_sample = 2 * block.n_parameters + 4 * block.n_states
+    return float(per_sample * block.n_parameters * sum(map(len, recordings)))

@@ -23,12 +23,12 @@ from mckibben.signals.reversals import (
     third_differences,
 )
 
-MOVES, LOAD_MOVES = 0.01, 0.1
+MOVES_SHARE, LOAD_MOVES_SHARE = 0.01, 0.1
 """Range, relative to the largest magnitude, above which a channel varies; the second is for loads,
 which inertia disturbs.
 """
 
-BRANCH = 0.1
+BRANCH_SHARE = 0.1
 """Smallest share of its range that a channel covers in a branch."""
 
 MOST_BRANCHES, NOISY_RECORDINGS = 2000, 8
@@ -91,9 +91,11 @@ class Excitation:
     @cached_property
     def noise(self) -> Mapping[str, float]:
         """Standard deviation of the white noise of every channel, 0 if motion hides it."""
-        every = self.recordings[:: -(-len(self.recordings) // NOISY_RECORDINGS)]
-        found = {name: [_white(one[name]) for one in every] for name in self.ranges}
-        noise = {name: float(np.median(values)) for name, values in found.items()}
+        recordings = self.recordings[:: -(-len(self.recordings) // NOISY_RECORDINGS)]
+        levels = {
+            name: [_white(recording[name]) for recording in recordings] for name in self.ranges
+        }
+        noise = {name: float(np.median(values)) for name, values in levels.items()}
         for name in self.inputs:
             # levels at random, of which each was recorded once, scatter as noise does
             unit, units = self.recordings[0].units[name], self.recordings[0].units
@@ -110,8 +112,8 @@ class Excitation:
     @property
     def swinging(self) -> tuple[str, ...]:
         """Inputs that vary within a recording; all varying ones if none does."""
-        found = [name for name in self.moving if name in self.inputs]
-        return tuple(name for name in found if self.branches[name]) or tuple(found)
+        varying = [name for name in self.moving if name in self.inputs]
+        return tuple(name for name in varying if self.branches[name]) or tuple(varying)
 
     def span(self, channel: str) -> float:
         """Return the range of a channel."""
@@ -124,7 +126,7 @@ class Excitation:
 
     def constant(self, channel: str) -> bool:
         """Return whether a channel varies by at most a small share of its magnitude."""
-        share = LOAD_MOVES if channel in self.loads else MOVES
+        share = LOAD_MOVES_SHARE if channel in self.loads else MOVES_SHARE
         return self.span(channel) <= max(share * max(map(abs, self.ranges[channel])), NARROWEST)
 
     def pooled(self, channels: Sequence[str]) -> Array:
@@ -135,28 +137,31 @@ class Excitation:
     def turns(self) -> Mapping[str, tuple[NDArray[np.int64], ...]]:
         """Turning points of all varying channels, with both ends, of every recording."""
 
-        def found(name: str, u: Array) -> NDArray[np.int64]:
+        def turning_points(name: str, u: Array) -> NDArray[np.int64]:
             noise = swing_threshold(self.noise[name], 0.0, u.size)
-            return reversals(u, max(noise, BRANCH * self.span(name)))
+            return reversals(u, max(noise, BRANCH_SHARE * self.span(name)))
 
         return {
-            name: tuple(found(name, one[name]) for one in self.recordings) for name in self.moving
+            name: tuple(turning_points(name, recording[name]) for recording in self.recordings)
+            for name in self.moving
         }
 
     @cached_property
     def branches(self) -> Mapping[str, tuple[Branch, ...]]:
         """Branches of all varying channels."""
-        found = {}
+        branches_of = {}
         for name in self.moving:
-            every = [
+            pieces = [
                 Branch(number, first, stop - 1, float(u[first]), float(u[stop - 1]))
                 for number, turns in enumerate(self.turns[name])
                 for u in [self.recordings[number][name]]
                 for first, stop, _ in branches_between(u, turns)
             ]
-            whole = [branch for branch in every if branch.travel >= BRANCH * self.span(name)]
-            found[name] = tuple(whole[:: max(1, len(whole) // MOST_BRANCHES)])
-        return found
+            long_enough = [
+                branch for branch in pieces if branch.travel >= BRANCH_SHARE * self.span(name)
+            ]
+            branches_of[name] = tuple(long_enough[:: max(1, len(long_enough) // MOST_BRANCHES)])
+        return branches_of
 
     def speed(self, name: str, branch: Branch) -> float:
         """Return the speed of a branch, excluding holds [unit/s]."""
@@ -188,10 +193,10 @@ class Excitation:
 
 def extremes(recordings: Sequence[Recording], name: str) -> tuple[float, float]:
     """Return the lowest and the highest value of a channel in the recordings that have it."""
-    values = [one[name] for one in recordings if name in one]
+    values = [recording[name] for recording in recordings if name in recording]
     return min(float(x.min()) for x in values), max(float(x.max()) for x in values)
 
 
 def _white(x: Array) -> float:
-    one, two = third_differences(x) if x.size >= FEWEST_FOR_NOISE else (0.0, 0.0)
-    return one / OF_NORMAL if two < GROWS * one else 0.0
+    first, second = third_differences(x) if x.size >= FEWEST_FOR_NOISE else (0.0, 0.0)
+    return first / OF_NORMAL if second < GROWS * first else 0.0

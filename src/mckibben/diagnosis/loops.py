@@ -25,10 +25,10 @@ from mckibben.signals.reversals import (
 
 Range = tuple[float, float]
 
-QUIET, ROUNDING = 1e-3, 1e-12
+NOISE_SHARE, ROUNDING = 1e-3, 1e-12
 """Shares of the range: noise below the first is not averaged; below the second it is rounding."""
 
-MAJOR = 0.1
+MAJOR_SWING_SHARE = 0.1
 """Smallest swing of the input, as a share of its range, that separates cycles."""
 
 
@@ -65,8 +65,8 @@ class Spread:
                 remedy="record while it moves, check its column and unit, or name another channel",
             )
         levels = [noise_level(signal, span) for signal in signals if signal.size > 1]
-        known = [level for level in levels if not np.isnan(level)]
-        noise = float(np.median(known)) if known else float("nan")
+        known_levels = [level for level in levels if not np.isnan(level)]
+        noise = float(np.median(known_levels)) if known_levels else float("nan")
         steps = np.diff(readings)
         step = float(steps[steps > ROUNDING * span].min())
         return cls(low, high, 0.0 if noise < ROUNDING * span else noise, step)
@@ -101,8 +101,8 @@ class Track:
     @property
     def branches(self) -> list[tuple[slice, int]]:
         """Samples between major turning points, with 1 if the input rises, else -1."""
-        found = branches_between(self.u, self.major_turns)
-        return [(slice(start, stop), way) for start, stop, way in found]
+        pieces = branches_between(self.u, self.major_turns)
+        return [(slice(start, stop), direction) for start, stop, direction in pieces]
 
 
 def prepare(
@@ -118,7 +118,7 @@ def prepare(
     if not recordings:
         problem = "there are none to characterize"
         raise DataError(problem, parameter="recordings", remedy="give at least one")
-    us, ys = ([one[name] for one in recordings] for name in (input_name, output_name))
+    us, ys = ([recording[name] for recording in recordings] for name in (input_name, output_name))
     source, n = recordings[0].source, sum(map(len, recordings))
     if n < FEWEST_SAMPLES:
         raise DataError(
@@ -129,15 +129,16 @@ def prepare(
         )
     scale = Scale(Spread.of(us, source, input_name), Spread.of(ys, source, output_name))
     tracks = [
-        _track(u, y, one.sample_time, scale) for u, y, one in zip(us, ys, recordings, strict=True)
+        _track(u, y, recording.sample_time, scale)
+        for u, y, recording in zip(us, ys, recordings, strict=True)
     ]
     # what the output does along the branches: neither drift nor another level between runs turns it
-    follows = sum(
-        way * float(track.y[part][-1] - track.y[part][0])
+    travel = sum(
+        direction * float(track.y[part][-1] - track.y[part][0])
         for track in tracks
-        for part, way in track.branches
+        for part, direction in track.branches
     )
-    return replace(scale, sign=-1.0 if follows < 0 else 1.0), tracks
+    return replace(scale, sign=-1.0 if travel < 0 else 1.0), tracks
 
 
 def _track(u: Array, y: Array, sample_time: float | None, scale: Scale) -> Track:
@@ -147,7 +148,7 @@ def _track(u: Array, y: Array, sample_time: float | None, scale: Scale) -> Track
             u, y = u[:-1], y[:-1]
         start = int(np.argmin(u))
         u, y = (np.append(np.roll(x, -start), x[start]) for x in (u, y))
-    noisy = any(spread.noise > QUIET * spread.span for spread in (scale.u, scale.y))
+    noisy = any(spread.noise > NOISE_SHARE * spread.span for spread in (scale.u, scale.y))
     # so many samples take the input over 1 % of its range
     window = max(1, shortest_hold(u, scale.u.span) // 50 - 1) | 1 if noisy else 1
     if window > 1:
@@ -159,14 +160,14 @@ def _track(u: Array, y: Array, sample_time: float | None, scale: Scale) -> Track
     )
     threshold = swing_threshold(u_noise, scale.u.span, u.size)
     turns = reversals(u, threshold)
-    major_turns = reversals(u, max(threshold, MAJOR * scale.u.span))
+    major_turns = reversals(u, max(threshold, MAJOR_SWING_SHARE * scale.u.span))
     return Track(u, y, sample_time, y_noise, turns, major_turns, periodic)
 
 
 def _closes(x: Array, noise: float) -> bool:
     """Return whether a signal is periodic: its end continues at its beginning."""
-    usual = float(np.quantile(np.abs(np.diff(x)), 0.99)) if x.size > FEWEST_SAMPLES else 0.0
-    return bool(abs(x[0] - x[-1]) <= max(1.5 * usual, 4 * np.nan_to_num(noise)))
+    usual_step = float(np.quantile(np.abs(np.diff(x)), 0.99)) if x.size > FEWEST_SAMPLES else 0.0
+    return bool(abs(x[0] - x[-1]) <= max(1.5 * usual_step, 4 * np.nan_to_num(noise)))
 
 
 SHARES = np.linspace(0.02, 0.98, 49)
@@ -177,12 +178,12 @@ WINDOW, FEWEST_IN_WINDOW = 0.025, 8
 in it.
 """
 
-LARGE, CLOSED = 0.9, 0.02
+LARGEST_SHARE, CLOSURE_SHARE = 0.9, 0.02
 """Share of the largest amplitude above which a cycle is a largest one; largest closure error of a
 closed loop, relative to its amplitude.
 """
 
-PART, SLIGHT = 0.5, 0.005
+BRANCH_SHARE, NARROW_SHARE = 0.5, 0.005
 """Share of the other branch that a branch at either end of a recording must have to make a loop; mean
 width over the output range below which it is not measured where a loop is wide."""
 
@@ -216,7 +217,14 @@ class Cycle:
         return distance <= within * self.amplitude
 
 
-FIGURES = ("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid")
+LOOP_FIGURES = (
+    "loop_width",
+    "mid_width",
+    "loop_area",
+    "loop_area_share",
+    "asymmetry",
+    "width_centroid",
+)
 """Quantities of a loop, as in `Characterization`; asymmetry only of closed loops, centroid only of
 wide ones.
 """
@@ -249,9 +257,11 @@ def loops_of(tracks: Sequence[Track], scale: Scale) -> list[Loop]:
     pieces = (
         (number, track, piece)
         for number, track in enumerate(tracks)
-        for piece in whole_cycles(track.u, track.major_turns, PART)
+        for piece in whole_cycles(track.u, track.major_turns, BRANCH_SHARE)
     )
-    return [loop for each in pieces if (loop := _loop(*each, scale)) is not None]
+    return [
+        loop for place_of_piece in pieces if (loop := _loop(*place_of_piece, scale)) is not None
+    ]
 
 
 def _loop(number: int, track: Track, piece: slice, scale: Scale) -> Loop | None:
@@ -269,16 +279,16 @@ def _loop(number: int, track: Track, piece: slice, scale: Scale) -> Loop | None:
     up, down = (curve(u[part], y[part], levels, half) for part in (rise, fall))
     if not np.isfinite(up + down).all():
         return None
-    widths, closed = np.abs(down - up), bool(abs(u[-1] - u[0]) <= CLOSED * amplitude)
+    widths, closed = np.abs(down - up), bool(abs(u[-1] - u[0]) <= CLOSURE_SHARE * amplitude)
     mid = float(widths[SHARES.size // 2])
     seconds = None if track.sample_time is None else track.sample_time * (u.size - 1)
     rate = None if seconds is None else float((2 * u[top] - u[0] - u[-1]) / seconds)
-    area, wide = loop_area(u[covered], y[covered]), widths.mean() >= SLIGHT * span
+    area, wide = loop_area(u[covered], y[covered]), widths.mean() >= NARROW_SHARE * span
     asymmetry = 100 * float(np.std(up + down[::-1])) / span if closed else None
     centroid = float((2 * SHARES - 1) @ widths / widths.sum()) if wide else None
     first = piece.start <= track.major_turns[1] and not track.periodic
     width, share = 100 * mid / span, 100 * area / (amplitude * span)
-    figures = dict(zip(FIGURES, (width, mid, area, share, asymmetry, centroid), strict=True))
+    figures = dict(zip(LOOP_FIGURES, (width, mid, area, share, asymmetry, centroid), strict=True))
     cycle = Cycle(number, low, high, rate, width)
     return Loop(cycle, levels, up, down, piece.start, piece.stop - 1, closed, first, figures)
 
@@ -288,8 +298,8 @@ def largest_of(loops: Sequence[Loop]) -> list[Loop]:
 
     The first of a recording, which starts from an unknown memory, counts where there is no other.
     """
-    most = max((loop.cycle.amplitude for loop in loops), default=0.0)
-    large = [loop for loop in loops if loop.cycle.amplitude >= LARGE * most]
+    largest = max((loop.cycle.amplitude for loop in loops), default=0.0)
+    large = [loop for loop in loops if loop.cycle.amplitude >= LARGEST_SHARE * largest]
     closed = [loop for loop in large if loop.closed]
     return [loop for loop in closed if not loop.first] or closed or large
 
@@ -306,13 +316,13 @@ def curve(u: Array, y: Array, levels: Array, half: float) -> Array:
     count = np.searchsorted(x, levels + half, side="right") - first
     sums = (np.concatenate([[0.0], np.cumsum(q)]) for q in (x, z))
     means = [(total[first + count] - total[first]) / np.maximum(count, 1) for total in sums]
-    near, known = count > 2, (x[0] <= levels) & (levels <= x[-1])
-    places = np.where(near, means[0], levels)[known]
-    heights = np.where(near, means[1], np.interp(levels, x, z))[known]
+    is_averaged, inside = count > 2, (x[0] <= levels) & (levels <= x[-1])
+    inputs = np.where(is_averaged, means[0], levels)[inside]
+    outputs = np.where(is_averaged, means[1], np.interp(levels, x, z))[inside]
     # the ends as they are, so that nothing is cut off within half a window of them
-    places, which = np.unique(np.concatenate([places, x[[0, -1]]]), return_index=True)
-    heights = np.concatenate([heights, z[[0, -1]]])[which]
-    return np.interp(levels, places, heights, left=np.nan, right=np.nan)
+    inputs, order_of_inputs = np.unique(np.concatenate([inputs, x[[0, -1]]]), return_index=True)
+    outputs = np.concatenate([outputs, z[[0, -1]]])[order_of_inputs]
+    return np.interp(levels, inputs, outputs, left=np.nan, right=np.nan)
 
 
 def _half(scale: Scale, amplitude: float) -> float:
@@ -339,9 +349,9 @@ class Branches:
 
 def _mean(x: Array, axis: int) -> Array:
     """Return the mean of known values along an axis, NaN if there are none."""
-    known = np.isfinite(x)
-    count = np.where(known.any(axis=axis), known.sum(axis=axis), np.nan)
-    return np.asarray(np.where(known, x, 0.0).sum(axis=axis) / count)
+    is_known = np.isfinite(x)
+    count = np.where(is_known.any(axis=axis), is_known.sum(axis=axis), np.nan)
+    return np.asarray(np.where(is_known, x, 0.0).sum(axis=axis) / count)
 
 
 def branches_of(tracks: Sequence[Track], scale: Scale) -> Branches:
@@ -350,18 +360,18 @@ def branches_of(tracks: Sequence[Track], scale: Scale) -> Branches:
     The first of five or more of a recording, which starts from an unknown memory, is left out.
     """
     levels, half = scale.u.low + SHARES * scale.u.span, _half(scale, scale.u.span)
-    found = [
-        (curve(track.u[part], track.y[part], levels, half), way, number)
+    pieces = [
+        (curve(track.u[part], track.y[part], levels, half), direction, number)
         for number, track in enumerate(tracks)
-        for part, way in track.branches[len(track.branches) > 4 and not track.periodic :]
+        for part, direction in track.branches[len(track.branches) > 4 and not track.periodic :]
         if part.stop - part.start >= 3
     ]
-    curves, ways, owners = zip(*found, strict=True) if found else ((), (), ())
-    shape = (len(found), levels.size)
-    return Branches(levels, np.reshape(curves, shape), np.array(ways), np.array(owners))
+    curves, directions, owners = zip(*pieces, strict=True) if pieces else ((), (), ())
+    shape = (len(pieces), levels.size)
+    return Branches(levels, np.reshape(curves, shape), np.array(directions), np.array(owners))
 
 
-def gap_of(found: Branches, sign: float) -> tuple[float | None, Range | None, float | None]:
+def gap_of(branches: Branches, sign: float) -> tuple[float | None, Range | None, float | None]:
     """Return the gap between falling and rising branches, its 95 % interval, and p without a loop.
 
     Every branch is compared with the mean of those before and after, so that drift cancels. The error
@@ -371,16 +381,19 @@ def gap_of(found: Branches, sign: float) -> tuple[float | None, Range | None, fl
     """
     from scipy.special import fdtrc
 
-    curves, same = found.curves, np.diff(found.owners) == 0
-    ways, inner = found.ways[:, np.newaxis], same[1:] & same[:-1]
-    here, before, after = curves[1:-1], curves[:-2], curves[2:]
-    again = np.where(np.isfinite(here), after - before, np.nan)
+    curves, same = branches.curves, np.diff(branches.owners) == 0
+    directions, inner = branches.ways[:, np.newaxis], same[1:] & same[:-1]
+    middle, before, after = curves[1:-1], curves[:-2], curves[2:]
+    repeats = np.where(np.isfinite(middle), after - before, np.nan)
     pairs, gaps, rising, falling = (
         means[np.isfinite(means)]
         for means in (
-            _mean((ways[1:] * (curves[:-1] - curves[1:]))[same], axis=1),
-            _mean((ways[1:-1] * (0.5 * (before + after) - here))[inner], axis=1),
-            *(_mean(again[inner & (found.ways[1:-1] == way)], axis=1) for way in (1, -1)),
+            _mean((directions[1:] * (curves[:-1] - curves[1:]))[same], axis=1),
+            _mean((directions[1:-1] * (0.5 * (before + after) - middle))[inner], axis=1),
+            *(
+                _mean(repeats[inner & (branches.ways[1:-1] == direction)], axis=1)
+                for direction in (1, -1)
+            ),
         )
     )
     if not pairs.size:
@@ -397,7 +410,7 @@ def gap_of(found: Branches, sign: float) -> tuple[float | None, Range | None, fl
     return gap, (gap - half, gap + half), p
 
 
-def gains_of(found: Branches, loops: Sequence[Loop], scale: Scale) -> list[float]:
+def gains_of(branches: Branches, loops: Sequence[Loop], scale: Scale) -> list[float]:
     """Return the mean slope of rising and falling output at mid input, over a fifth of the range.
 
     Of the largest loops where they cover the input range, else of all branches.
@@ -405,15 +418,15 @@ def gains_of(found: Branches, loops: Sequence[Loop], scale: Scale) -> list[float
     curves = [
         (loop.levels, loop.up, loop.down)
         for loop in loops
-        if loop.cycle.amplitude >= LARGE * scale.u.span
-    ] or [(found.levels, *found.means)]
-    centre, fifth = 0.5 * (scale.u.low + scale.u.high), 0.1 * scale.u.span
-    ends, gains = [centre - fifth, centre + fifth], []
+        if loop.cycle.amplitude >= LARGEST_SHARE * scale.u.span
+    ] or [(branches.levels, *branches.means)]
+    centre, tenth = 0.5 * (scale.u.low + scale.u.high), 0.1 * scale.u.span
+    ends, gains = [centre - tenth, centre + tenth], []
     for u, up, down in curves:
         known = np.isfinite(up + down)
         if known.any() and u[known][0] <= ends[0] and u[known][-1] >= ends[1]:
             low, high = np.interp(ends, u[known], 0.5 * (up + down)[known])
-            gains.append(float(high - low) / (2 * fifth))
+            gains.append(float(high - low) / (2 * tenth))
     return gains
 
 
@@ -424,32 +437,46 @@ def explained(tracks: Sequence[Track]) -> float:
     ends = np.quantile(u, np.linspace(0, 1, BINS + 1)[1:-1])
     bins = 2 * np.searchsorted(ends, u) + rising
     count, total = np.bincount(bins), np.bincount(bins, y)
-    left = np.var(y - (total / np.maximum(count, 1))[bins])
-    return float(1 - left / np.var(y)) if np.ptp(y) > 0 else 0.0
+    unexplained = np.var(y - (total / np.maximum(count, 1))[bins])
+    return float(1 - unexplained / np.var(y)) if np.ptp(y) > 0 else 0.0
 
 
 def drift(loops: Sequence[Loop]) -> list[float]:
     """Return the changes of the output from one closed cycle to the next between the same extremes."""
     changes = []
-    for one, other in pairwise(loops):
-        follows = one.cycle.recording == other.cycle.recording and one.ends == other.begins
-        if follows and one.closed and other.closed and one.cycle.like(other.cycle, CLOSED):
-            common = (one.levels >= other.levels[0]) & (one.levels <= other.levels[-1])
-            later = [np.interp(one.levels[common], other.levels, x) for x in (other.up, other.down)]
-            changes.append(float(np.mean(np.subtract(later, [one.up[common], one.down[common]]))))
+    for cycle, next_cycle in pairwise(loops):
+        follows = (
+            cycle.cycle.recording == next_cycle.cycle.recording and cycle.ends == next_cycle.begins
+        )
+        if (
+            follows
+            and cycle.closed
+            and next_cycle.closed
+            and cycle.cycle.like(next_cycle.cycle, CLOSURE_SHARE)
+        ):
+            common = (cycle.levels >= next_cycle.levels[0]) & (
+                cycle.levels <= next_cycle.levels[-1]
+            )
+            later = [
+                np.interp(cycle.levels[common], next_cycle.levels, x)
+                for x in (next_cycle.up, next_cycle.down)
+            ]
+            changes.append(
+                float(np.mean(np.subtract(later, [cycle.up[common], cycle.down[common]])))
+            )
     return changes
 
 
-MOVED = 0.02
+MOVED_SHARE = 0.02
 """Output change, relative to its range, above which the output has moved."""
 
-DENSE = 8
+FEWEST_IN_BRANCH = 8
 """Smallest number of samples of an interpolated branch."""
 
-SETTLED = 0.1
+SETTLING_SHARE = 0.1
 """Share of a hold that is discarded at its start, so that lag does not count as creep."""
 
-ALIKE, SPEED_RATIO = 0.05, 1.5
+LIKE_SHARE, SPEED_RATIO = 0.05, 1.5
 """Cycles are compared if their extremes differ by at most this share of the amplitude, and their
 speeds by at least this ratio.
 """
@@ -466,32 +493,32 @@ def dead_zones(tracks: Sequence[Track], scale: Scale) -> tuple[list[float], list
     upper: list[float] = []
     lower: list[float] = []
     for track in tracks:
-        threshold = max(MOVED * scale.y.span, 6 * track.y_noise, 2 * scale.y.step)
+        threshold = max(MOVED_SHARE * scale.y.span, 6 * track.y_noise, 2 * scale.y.step)
         for k in range(1, track.turns.size - 1):
             u, y = (x[track.turns[k] : track.turns[k + 1] + 1] for x in (track.u, track.y))
-            if u.size <= DENSE:
+            if u.size <= FEWEST_IN_BRANCH:
                 continue
-            way = float(np.sign(u[-1] - u[0]))
-            travel, moved = way * (u - u[0]), scale.sign * way * (y - y[0])
+            direction = float(np.sign(u[-1] - u[0]))
+            travel, moved = direction * (u - u[0]), scale.sign * direction * (y - y[0])
             once, twice = (_first_reach(travel, moved, limit * threshold) for limit in (1, 2))
             if once is not None and twice is not None:
-                (upper if way < 0 else lower).append(max(0.0, 2 * once - twice))
+                (upper if direction < 0 else lower).append(max(0.0, 2 * once - twice))
     return upper, lower
 
 
-def _first_reach(wanted: Array, x: Array, limit: float) -> float | None:
+def _first_reach(values: Array, x: Array, limit: float) -> float | None:
     """Return ``wanted`` where ``x`` first reaches a limit, interpolated; None if it never does."""
-    i = int(np.argmax(x >= limit))
-    if not x[i] >= limit:
+    index = int(np.argmax(x >= limit))
+    if not x[index] >= limit:
         return None
-    if i == 0:
-        return float(wanted[0])
-    share = (limit - x[i - 1]) / (x[i] - x[i - 1])
-    return float(wanted[i - 1] + share * (wanted[i] - wanted[i - 1]))
+    if index == 0:
+        return float(values[0])
+    share = (limit - x[index - 1]) / (x[index] - x[index - 1])
+    return float(values[index - 1] + share * (values[index] - values[index - 1]))
 
 
 def creep(
-    runs: Sequence[Recording], given: str, wanted: str, scale: Scale
+    runs: Sequence[Recording], drive: str, response: str, scale: Scale
 ) -> list[tuple[float, float]]:
     """Return the times [s] and creep [output unit] of the holds at least half as long as the longest.
 
@@ -499,23 +526,25 @@ def creep(
     positive where the output went on as it was going. Holds into which the input did not move are left
     out.
     """
-    span, found = scale.u.span, []
+    span, changes = scale.u.span, []
     for run in runs:
-        u, y = run[given], run[wanted]
+        u, y = run[drive], run[response]
         if run.sample_time is None:
             continue
         for hold in holds(u[:, np.newaxis], [span], shortest_hold(u, span)):
-            lasts = hold.stop - hold.start
-            before = u[max(0, hold.start - lasts) : hold.start]
+            length = hold.stop - hold.start
+            before = u[max(0, hold.start - length) : hold.start]
             if before.size == 0 or np.ptp(before) < 2 * STILL * span:
                 continue
-            came = u[hold.start] - before[np.argmax(np.abs(before - u[hold.start]))]
-            part = max(1, round(SETTLED * lasts))
-            early, late = (y[at : at + part].mean() for at in (hold.start + part, hold.stop - part))
-            crept = scale.sign * float(np.sign(came) * (late - early))
-            found.append((run.sample_time * (lasts - 2 * part), crept))
-    longest = max((time for time, _ in found), default=0.0)
-    return [(time, crept) for time, crept in found if time >= 0.5 * longest]
+            approach = u[hold.start] - before[np.argmax(np.abs(before - u[hold.start]))]
+            part = max(1, round(SETTLING_SHARE * length))
+            early, late = (
+                y[start : start + part].mean() for start in (hold.start + part, hold.stop - part)
+            )
+            crept = scale.sign * float(np.sign(approach) * (late - early))
+            changes.append((run.sample_time * (length - 2 * part), crept))
+    longest = max((time for time, _ in changes), default=0.0)
+    return [(time, crept) for time, crept in changes if time >= 0.5 * longest]
 
 
 def rate_dependence(loops: Sequence[Loop]) -> tuple[float, Range, Range] | None:
@@ -532,18 +561,20 @@ def rate_dependence(loops: Sequence[Loop]) -> tuple[float, Range, Range] | None:
     ]
     # Any cycle may be the one to compare with; of very many, fifty will do.
     groups = [
-        [(rate, cycle.width) for cycle, rate in timed if one.like(cycle, ALIKE)]
-        for one, _ in timed[:: max(1, len(timed) // 50)]
+        [(rate, cycle.width) for cycle, rate in timed if reference.like(cycle, LIKE_SHARE)]
+        for reference, _ in timed[:: max(1, len(timed) // 50)]
     ]
     if not groups:
         return None
     speed, widths = np.transpose(max(groups, key=lambda group: np.ptp([rate for rate, _ in group])))
     if speed.size < 3 or np.ptp(speed) < np.log2(SPEED_RATIO):
         return None
-    _, place, count = np.unique(np.round(4 * speed), return_inverse=True, return_counts=True)
+    _, speed_number, count = np.unique(np.round(4 * speed), return_inverse=True, return_counts=True)
     # every speed weighs the same, however many cycles have it
-    found, spread = np.polyfit(speed, widths, 1, w=1 / np.sqrt(count[place]), cov=True)
-    growth = float(found[0])
+    coefficients, spread = np.polyfit(
+        speed, widths, 1, w=1 / np.sqrt(count[speed_number]), cov=True
+    )
+    growth = float(coefficients[0])
     half = float(np.sqrt(spread[0, 0])) * student(speed.size - 2)
     ends = float(2 ** speed.min()), float(2 ** speed.max())
     return growth, (growth - half, growth + half), ends

@@ -153,29 +153,33 @@ def review(
     ModelError
         Where no model is given, or model and compensator do not belong together.
     """
-    every = listed(log)
-    logs = [one for one in every if has_reference(one)]
-    model, compensator = _ran(model, compensator)
+    recordings = listed(log)
+    logs = [recording for recording in recordings if has_reference(recording)]
+    model, compensator = _model_and_compensator(model, compensator)
     inputs = [c.name for c in model.inputs if c.name not in model.scheduling]
-    outputs = [c for c in model.outputs if all(REFERENCE + c.name in one for one in logs)]
+    outputs = [
+        c for c in model.outputs if all(REFERENCE + c.name in recording for recording in logs)
+    ]
     _check(logs, model, inputs, bool(outputs))
     check_shared({"review": logs}, inputs, [channel.name for channel in model.outputs])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
-        links = [_link(one, model, compensator, inputs) for one in logs]
-    found = Review(
-        logs=tuple(one.name for one in logs),
+        links = [_link_of(recording, model, compensator, inputs) for recording in logs]
+    result = Review(
+        logs=tuple(recording.name for recording in logs),
         model=model.kind,
         outputs=tuple(_followed(links, channel) for channel in outputs),
-        delays=tuple(each for link in links for each in link.delays if each is not None),
+        delays=tuple(delay for link in links for delay in link.delays if delay is not None),
         clipped=sum(link.clipped for link in links),
         n_samples=sum(len(link.log) for link in links),
         judged_by=links[0].judged_by,
     )
-    if not refit or all(one.achieved <= ROUNDING * np.ptp(one.reference) for one in found.outputs):
-        return found
-    older = [one for one in every if not has_reference(one)]
-    return replace(found, refit=refitted(model, [link.log for link in links], older, seed=seed))
+    if not refit or all(
+        recording.achieved <= ROUNDING * np.ptp(recording.reference) for recording in result.outputs
+    ):
+        return result
+    older = [recording for recording in recordings if not has_reference(recording)]
+    return replace(result, refit=refitted(model, [link.log for link in links], older, seed=seed))
 
 
 def has_reference(recording: Recording) -> bool:
@@ -183,7 +187,9 @@ def has_reference(recording: Recording) -> bool:
     return any(name.startswith(REFERENCE) for name in recording.channels)
 
 
-def _ran(model: Block | None, compensator: Block | None) -> tuple[Block, Block | None]:
+def _model_and_compensator(
+    model: Block | None, compensator: Block | None
+) -> tuple[Block, Block | None]:
     """Return the model and the compensator of the run; None if the model has no inverse."""
     if isinstance(compensator, FeedforwardFeedback):
         compensator = compensator.compensator
@@ -240,7 +246,9 @@ class _Link:
     judged_by: str
 
 
-def _link(log: Recording, model: Block, compensator: Block | None, inputs: Sequence[str]) -> _Link:
+def _link_of(
+    log: Recording, model: Block, compensator: Block | None, inputs: Sequence[str]
+) -> _Link:
     names = [channel.name for channel in model.outputs]
     sent, judged_by = _commands(log, model, compensator, inputs)
     measured = [name for name in inputs if name in log]
@@ -276,45 +284,47 @@ def _commands(
     log: Recording, model: Block, compensator: Block | None, inputs: Sequence[str]
 ) -> tuple[dict[str, Array] | None, str]:
     """Return the commands by input, logged or computed, and which; None if unknown."""
-    asked = _asked(log, model, compensator, inputs)
+    computed = _computed_commands(log, model, compensator, inputs)
     if any(COMMAND + name not in log for name in inputs):
-        return asked, "" if asked is None else "compensator"
+        return computed, "" if computed is None else "compensator"
     sent = {name: log[COMMAND + name] for name in inputs}
     later = {name: _shifted(values, 1.0) for name, values in sent.items()}
-    expected = asked or {name: log[name] for name in inputs if name in log}
+    expected = computed or {name: log[name] for name in inputs if name in log}
 
-    def off(way: Mapping[str, Array]) -> float:
-        return float(sum(np.sum((way[name] - values) ** 2) for name, values in expected.items()))
+    def deviation(commands: Mapping[str, Array]) -> float:
+        return float(
+            sum(np.sum((commands[name] - values) ** 2) for name, values in expected.items())
+        )
 
     # a command is logged when it is sent, for the reference of the next sample, or together with it
-    return min((later, sent), key=off), "command"
+    return min((later, sent), key=deviation), "command"
 
 
-def _asked(
+def _computed_commands(
     log: Recording, model: Block, compensator: Block | None, inputs: Sequence[str]
 ) -> dict[str, Array] | None:
     """Return a compensator's outputs for the reference; None if it needs other inputs."""
-    wanted = [channel.name for channel in model.outputs]
-    if compensator is None or any(REFERENCE + name not in log for name in wanted):
+    outputs = [channel.name for channel in model.outputs]
+    if compensator is None or any(REFERENCE + name not in log for name in outputs):
         return None
     if any(channel.name.endswith(MEASURED) for channel in compensator.inputs):
         return None
     ahead = compensator.samples_ahead
-    desired = log.with_channels(**{n: _shifted(log[REFERENCE + n], -ahead) for n in wanted})
-    given = compensator.simulate(desired.select([c.name for c in compensator.inputs]))
-    return {name: given[name] for name in inputs}
+    desired = log.with_channels(**{n: _shifted(log[REFERENCE + n], -ahead) for n in outputs})
+    commands = compensator.simulate(desired.select([c.name for c in compensator.inputs]))
+    return {name: commands[name] for name in inputs}
 
 
 def _at_limit(command: Array, references: Sequence[Array]) -> Array:
     """Return where a command stays at an extreme while a reference moves, bool (n,)."""
-    found = np.zeros(command.size, dtype=bool)
-    near = ROUNDING * max(float(np.ptp(command)), 1.0)
+    limited = np.zeros(command.size, dtype=bool)
+    tolerance = ROUNDING * max(float(np.ptp(command)), 1.0)
     for extreme in (command.min(), command.max()):
-        flat = np.abs(command - extreme) <= near
+        flat = np.abs(command - extreme) <= tolerance
         for begin, end in true_runs(flat):
             moves = any(np.ptp(r[begin:end]) > ROUNDING * np.ptp(r) for r in references)
-            found[begin:end] |= end - begin >= SAMPLES_AT_LIMIT and moves
-    return found
+            limited[begin:end] |= end - begin >= SAMPLES_AT_LIMIT and moves
+    return limited
 
 
 def _followed(links: Sequence[_Link], channel: Channel) -> Followed:
@@ -326,13 +336,13 @@ def _followed(links: Sequence[_Link], channel: Channel) -> Followed:
     pairs = [(link.modelled[name], link.log[name]) for link in links]
     modelled = np.concatenate([model for model, _ in pairs])
     parts = {"model": measured - modelled}
-    given = [link.commanded[name] for link in links if link.commanded is not None]
-    if len(given) == len(links):
-        commanded = np.concatenate(given)
+    commanded_parts = [link.commanded[name] for link in links if link.commanded is not None]
+    if len(commanded_parts) == len(links):
+        commanded = np.concatenate(commanded_parts)
         parts |= {"pressure": modelled - commanded, "command": commanded - reference}
-    least = ROUNDING * float(np.ptp(reference))
-    sizes = {kind: size if (size := rms(part)) > least else 0.0 for kind, part in parts.items()}
-    slope, half = _slope([got - model for model, got in pairs], step)
+    rounding = ROUNDING * float(np.ptp(reference))
+    sizes = {kind: size if (size := rms(part)) > rounding else 0.0 for kind, part in parts.items()}
+    slope, half = _slope([measured_part - model for model, measured_part in pairs], step)
     time = logs[0].time if len(logs) == 1 else step * np.arange(measured.size)
     return Followed(
         output=name,
@@ -355,8 +365,8 @@ def _slope(series: Sequence[Array], step: float) -> tuple[float, float]:
     times = [step * (np.arange(y.size) - 0.5 * (y.size - 1)) for y in series]
     power = sum(float(t @ t) for t in times)
     slope = sum(float(t @ y) for t, y in zip(times, series, strict=True)) / power
-    left = [y - y.mean() - slope * t for y, t in zip(series, times, strict=True)]
-    variance = float(np.var(np.concatenate(left))) * correlation_length(left)
+    residuals = [y - y.mean() - slope * t for y, t in zip(series, times, strict=True)]
+    variance = float(np.var(np.concatenate(residuals))) * correlation_length(residuals)
     return slope, NORMAL_95 * float(np.sqrt(variance / power))
 
 
@@ -369,9 +379,9 @@ def _delay(where: str, first: Array, then: Array, step: float) -> Delay | None:
     if most < 1 or np.ptp(first) == 0 or np.ptp(then) == 0:
         return None
     inner = slice(most, len(first) - most)
-    got = then[inner] - then[inner].mean()
+    centred = then[inner] - then[inner].mean()
 
-    def later(samples: float) -> Array:
+    def columns_at(samples: float) -> Array:
         moved = _shifted(first, samples)
         columns = np.column_stack([moved, -np.gradient(moved)])[inner]
         return columns - columns.mean(axis=0)
@@ -379,20 +389,22 @@ def _delay(where: str, first: Array, then: Array, step: float) -> Delay | None:
     def explained(samples: float) -> float:
         x = _shifted(first, samples)[inner]
         x -= x.mean()
-        return float((x @ got) ** 2 / (x @ x))
+        return float((x @ centred) ** 2 / (x @ x))
 
-    late, gain = float(max(range(-most, most + 1), key=explained)), 1.0
+    delay, gain = float(max(range(-most, most + 1), key=explained)), 1.0
     for _ in range(3):
-        gain, change = np.linalg.lstsq(later(late), got, rcond=None)[0]
-        late = float(np.clip(late + change / gain, -most, most))
-    x, slope = later(late).T
-    alone = slope - x * (x @ slope) / (x @ x)
-    product = alone * (got - gain * x)
+        gain, change = np.linalg.lstsq(columns_at(delay), centred, rcond=None)[0]
+        delay = float(np.clip(delay + change / gain, -most, most))
+    x, slope = columns_at(delay).T
+    independent = slope - x * (x @ slope) / (x @ x)
+    product = independent * (centred - gain * x)
     block = block_length(product.size, correlation_length([product]))
     sums = [part.sum() for part in np.array_split(product, max(product.size // block, 2))]
-    half = NORMAL_95 * float(np.linalg.norm(sums) / (abs(gain) * (alone @ alone)))
+    half = NORMAL_95 * float(np.linalg.norm(sums) / (abs(gain) * (independent @ independent)))
     # decimals behind the ninth of a sample are rounding
-    low, middle, high = (round(samples, 9) * step for samples in (late - half, late, late + half))
+    low, middle, high = (
+        round(samples, 9) * step for samples in (delay - half, delay, delay + half)
+    )
     return Delay(where, middle, (low, high))
 
 
@@ -451,51 +463,70 @@ def refitted(
     ``older`` recordings are fitted as well; those without its channels are left out.
     """
     kinds = " ".join(_kinds(old))
-    known = map(declared, registry.names("estimators"))
-    estimator = next((one for one in known if kinds in one.makes), None)
+    estimators = map(declared, registry.names("estimators"))
+    estimator = next((kind for kind in estimators if kinds in kind.makes), None)
     if estimator is None:
         return f"No estimator makes models of kind {old.kind!r}."
     inputs, outputs = ([c.name for c in channels] for channels in (old.inputs, old.outputs))
     names = [*inputs, *outputs]
-    whole = [log.select(names) for log in logs]
-    older_runs = [one.select(names) for one in older if all(name in one for name in names)]
+    runs = [log.select(names) for log in logs]
+    older_runs = [run.select(names) for run in older if all(name in run for name in names)]
     driving = [name for name in inputs if name not in old.scheduling]
-    channels = channels_of(whole, driving, outputs, old.scheduling)
-    settings = {"seed": seed} | estimator.channel_settings(channels)
-    for part in old.parts if isinstance(old, Series) else (old,):
-        thresholds = getattr(part, "thresholds", None)
-        if thresholds is not None and "n_operators" in {one.name for one in fields(estimator)}:
-            settings["n_operators"] = len(thresholds) - (thresholds[0] == 0)
-
-    parts = parts_of(whole, channels)
+    channels = channels_of(runs, driving, outputs, old.scheduling)
+    settings = {"seed": seed} | estimator.channel_settings(channels) | _size(old, estimator)
+    parts = parts_of(runs, channels)
     if not parts:
         return "The log is too short to leave parts of it out."
-    kept = tuple(np.zeros(len(one), dtype=bool) for one in older_runs)
+    not_left_out = tuple(np.zeros(len(run), dtype=bool) for run in older_runs)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)
-            pairs = [(old.simulate(log).matrix(outputs), log.matrix(outputs)) for log in whole]
-            before = [modelled - measured for modelled, measured in pairs]
-            refit = estimator(**settings).fit([*whole, *older_runs])
-            found = refit.held_out([*whole, *older_runs], [(*part, *kept) for part in parts])
+            pairs = [(old.simulate(log).matrix(outputs), log.matrix(outputs)) for log in runs]
+            old_errors = [modelled - measured for modelled, measured in pairs]
+            refit = estimator(**settings).fit([*runs, *older_runs])
+            held_out = refit.held_out(
+                [*runs, *older_runs], [(*part, *not_left_out) for part in parts]
+            )
     except MckibbenError as error:
         return f"No model could be fitted to the log: {error}"
-    if found is None:
+    if held_out is None:
         return "The model has too many parameters to leave parts of the log out."
     new = refit.fitted
     # older recordings come last
-    after = [table - measured for table, (_, measured) in zip(found, pairs, strict=False)]
-    if not any(errors.any() for errors in before):
+    new_errors = [table - measured for table, (_, measured) in zip(held_out, pairs, strict=False)]
+    if not any(errors.any() for errors in old_errors):
         return "The model has no error on the log."
     spans = np.ptp(np.concatenate([measured for _, measured in pairs]), axis=0)
-    sizes = spans if len(outputs) > 1 else np.ones(1)
-    squares = [((errors / sizes) ** 2).mean(axis=1) for errors in after]
-    bootstrap = BlockBootstrap([len(log) for log in whole], seed, correlation_length(squares))
-    errors = [np.concatenate(each) / sizes for each in (before, after)]
-    of_old, of_new = (bootstrap.rmse(each) for each in errors)
-    ratio = interval(of_new / np.maximum(of_old, np.finfo(float).tiny))
-    missed_by = [float(np.sqrt((each**2).mean(axis=0)).mean()) for each in errors]
-    return Refit(new, missed_by[0], missed_by[1], ratio, len(parts), len(older_runs))
+    scales = spans if len(outputs) > 1 else np.ones(1)
+    rmse, ratio = _compared(old_errors, new_errors, scales, seed)
+    return Refit(new, *rmse, ratio, len(parts), len(older_runs))
+
+
+def _size(old: Block, estimator: Any) -> dict[str, int]:
+    """Return the setting by which an estimator fits as many operators as a model has."""
+    n_operators = {}
+    for part in old.parts if isinstance(old, Series) else (old,):
+        thresholds = getattr(part, "thresholds", None)
+        if thresholds is not None and "n_operators" in {field.name for field in fields(estimator)}:
+            n_operators["n_operators"] = len(thresholds) - (thresholds[0] == 0)
+    return n_operators
+
+
+def _compared(
+    old: Sequence[Array], new: Sequence[Array], scales: Array, seed: int
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the RMSE of two models relative to scales, and the 95 % interval of their ratio.
+
+    The errors, shape (n, k) each, are those of every log.
+    """
+    squares = [((errors / scales) ** 2).mean(axis=1) for errors in new]
+    bootstrap = BlockBootstrap([len(errors) for errors in old], seed, correlation_length(squares))
+    old_scaled, new_scaled = (np.concatenate(errors) / scales for errors in (old, new))
+    old_rmse, new_rmse = (bootstrap.rmse(errors) for errors in (old_scaled, new_scaled))
+    ratio = interval(new_rmse / np.maximum(old_rmse, np.finfo(float).tiny))
+    means = (np.sqrt((errors**2).mean(axis=0)).mean() for errors in (old_scaled, new_scaled))
+    old_mean, new_mean = map(float, means)
+    return (old_mean, new_mean), ratio
 
 
 def _kinds(block: Block) -> list[str]:

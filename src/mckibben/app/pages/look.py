@@ -119,7 +119,7 @@ def _recordings(state: State, used: dict[str, Recording], shown: list[str]) -> N
         [partial(box, name), partial(chip, roles[name]), length]
         for name, length in zip(used, lengths, strict=True)
     ]
-    widgets.table(["ModelledRun", "Role", "Length"], rows)
+    widgets.table(["Shown", "Role", "Length"], rows)
 
 
 def _coupling(state: State, effects_of: Coupling, pair: Pair) -> None:

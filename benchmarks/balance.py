@@ -32,7 +32,7 @@ from mckibben.measured.running import span_of
 from mckibben.measured.sets import parted, sets_in
 from mckibben.papers.activation_pressure.protocol import FORCES
 from mckibben.papers.recognising import EXTENSOR
-from mckibben.papers.sdchm.loops import MOVES, held, widths
+from mckibben.papers.sdchm.loops import MOVES, single_task, widths
 from mckibben.papers.sdchm.protocol import PERIOD
 from mckibben.registry import load
 from mckibben.rigs import record
@@ -235,7 +235,7 @@ def arm(seeds: int) -> Iterator[Row]:
     across: Figures = defaultdict(list)
     time = np.arange(0, 3 * PERIOD, CONTROL_TIME, dtype=np.float64)
     for (_, p0), moving in zip(MOVES, OUTPUTS, strict=True):
-        task = held(OUTPUTS, moving, time, p0)
+        task = single_task(OUTPUTS, moving, time, p0)
         for name, model in first.items():
             found = track(model.inverse(), rig, task.reference, settle=task.settle)
             errors[name] += found.rmse.values()

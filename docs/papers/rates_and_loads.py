@@ -30,7 +30,7 @@ from mckibben.papers.sdchm.loops import (
     SINGLE,
     SWING,
     F,
-    held,
+    single_task,
 )
 from mckibben.papers.sdchm.run import PAPERS
 from mckibben.recording import Recording
@@ -92,7 +92,7 @@ def reference(rig: Rig, frequency: float) -> Recording:
     time = np.arange(round(max(SHORTEST, CYCLES / frequency) / STEP)) * STEP
     outputs = [name for name in rig.outputs if name.startswith("displacement")]
     grid = np.asarray(time, dtype=np.float64)
-    return held(outputs, outputs[0], grid, MOVES[0][1], f=frequency).reference
+    return single_task(outputs, outputs[0], grid, MOVES[0][1], f=frequency).reference
 
 
 HEAD = """# Frequency and load: the soft arm's compensators

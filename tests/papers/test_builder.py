@@ -31,7 +31,7 @@ def experiment(name: str = "field-models", quick: bool = True) -> Experiment:
         quick=quick,
         seed=0,
         jobs=1,
-        kept=Checkpoints(None),
+        checkpoints=Checkpoints(None),
         progress=lambda share, text: None,
     )
 
@@ -105,7 +105,7 @@ def test_printed_figures_in_units_are_of_rigs_of_the_papers_size() -> None:
     profile = experiment("activation-pressure")
     profile.of_its_size = False
     profile.table("points", ["e_1"], {"0 N, printed": [0.1], "0 N, here": [0.2]})
-    profile.says(slope=0.2, slope_printed=0.267)
+    profile.add_facts(slope=0.2, slope_printed=0.267)
     x = np.linspace(0.0, 1.0, 9)
     profile.figure("rates", {"gamma": {"printed": (x, x), "here": (x, x)}})
     assert profile.tables[0].rows == (("0 N, here", 0.2),)
@@ -125,13 +125,13 @@ def test_recordings_that_are_there_are_no_part_of_the_work() -> None:
     made.data, made.progress = runs, lambda share, text: shares.append(share)
     made.record(until=0.8)
     for share in (0.8, 0.9, 1.0):
-        made.tell(share, "")
+        made.report(share, "")
     assert shares == pytest.approx([0.0, 0.5, 1.0])
 
 
 def test_a_sentence_without_its_facts_is_left_out_and_models_that_warn_are_named() -> None:
     made = experiment()
-    made.says(best="NARX", n_seeds=3, best_seeds=3, best_plain=1.5, best_matched=1.6)
+    made.add_facts(best="NARX", n_seeds=3, best_seeds=3, best_plain=1.5, best_matched=1.6)
     found = made.done("a rig")
     assert len(found.summary) == 1
     assert "1.50 mm" in found.summary[0]
@@ -139,7 +139,7 @@ def test_a_sentence_without_its_facts_is_left_out_and_models_that_warn_are_named
     loaded = experiment("mpi-narmax")
     gains = {"status_4_gains": [2.7, 3.0], "status_4_gains_rmse": [1.5, 2.5]}
     for better, text in ((True, "As in"), (False, "Unlike")):
-        loaded.says(**gains, status_4_better=Verdict(better))
+        loaded.add_facts(**gains, status_4_better=Verdict(better))
         (sentence,) = loaded.done("a rig").summary
         assert sentence.startswith(text)
         assert "2.7" in sentence
@@ -149,7 +149,7 @@ def test_pages_name_the_paper_and_its_figures() -> None:
     made = experiment()
     x = np.linspace(0.0, 1.0, 100)
     made.figure("signals", {"calibration": {"": (x, x)}, "test": {"": (x, x), "ours": (x, x)}})
-    made.says(best="NARX", n_seeds=3, best_seeds=3, best_plain=1.5, best_matched=1.6)
+    made.add_facts(best="NARX", n_seeds=3, best_seeds=3, best_plain=1.5, best_matched=1.6)
     found = made.done("rig mas20-hanging")
     (figure,) = found.figures
     assert [panel.title for panel in drawing(figure).panels] == ["calibration", "test"]

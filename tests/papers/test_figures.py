@@ -28,7 +28,7 @@ def pictures(found: Reproduction) -> list[Drawing]:
 
 def drawn(name: str, key: str, panels: dict[str, Axes]) -> Drawing:
     """Return a figure of a paper with panels by hand."""
-    experiment = Experiment(name, None, None, kept=Checkpoints(None))
+    experiment = Experiment(name, None, None, checkpoints=Checkpoints(None))
     experiment.figure(key, panels, unit="[V]")
     return drawing(experiment.figures[-1])
 

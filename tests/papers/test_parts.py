@@ -52,7 +52,7 @@ def experiment(folder: Path, name: str = "multistate-friction") -> Experiment:
         quick=True,
         seed=0,
         jobs=1,
-        kept=Checkpoints(folder, name),
+        checkpoints=Checkpoints(folder, name),
         progress=lambda share, text: None,
     )
 

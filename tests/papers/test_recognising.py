@@ -116,7 +116,7 @@ def test_channels_of_other_names_are_known_by_their_units() -> None:
         for name, one in ((run.name, measured(run, run.name)) for run in plan.runs)
     ]
     found = recognise("field-models", own)
-    assert found.measured == {"regulator": "pressure", "wire": "displacement"}
+    assert found.by_units == {"regulator": "pressure", "wire": "displacement"}
     assert found.runs.names("train") == ["decaying-triangle"]
 
 
@@ -133,8 +133,8 @@ def test_of_several_muscles_the_one_that_moves_is_the_papers() -> None:
         still = np.zeros(len(one := measured(run, run.name)))
         own.append(alone(one, names, p1_ist=still, laser1=still))
     found = recognise("field-models", [by_words_of(one) for one in own])
-    assert {*found.measured.values()} == {"pressure", "displacement"}
-    assert all("2" in own for own in found.measured)
+    assert {*found.by_units.values()} == {"pressure", "displacement"}
+    assert all("2" in own for own in found.by_units)
     assert found.runs.names("train") == ["decaying-triangle"]
 
 
@@ -149,7 +149,7 @@ def test_beside_numbered_pressures_that_of_another_name_is_the_extensors() -> No
     runs = [measured(run, f"{k}") for k, run in enumerate(protocol("sdchm").runs)]
     own = [alone(one, names) for one in runs]
     found = recognise("sdchm", own)
-    assert found.measured == {"p_core": "pressure_extensor"}
+    assert found.by_units == {"p_core": "pressure_extensor"}
     assert found.absent == ""
 
 
@@ -159,7 +159,7 @@ def test_a_supply_beside_the_muscle_is_not_its_pressure() -> None:
         supply = np.full(len(one := measured(run, run.name)), 7.0)
         own.append(alone(one, {"pressure": "pressure_1", "displacement": "wire"}, p_supply=supply))
     found = recognise("field-models", own)
-    assert found.measured["pressure_1"] == "pressure"
+    assert found.by_units["pressure_1"] == "pressure"
     assert max(one["pressure"].max() for one in found.runs.values()) < 7.0
 
 
@@ -169,7 +169,7 @@ def test_what_a_channel_measures_is_the_same_in_all_runs() -> None:
         one = measured(run, f"{place}")
         wire = 200.0 * (place % 2) + 10 * one["pressure"]  # alone, one of two is as a length
         own.append(alone(one, {"pressure": "pressure"}, wire=wire))
-    assert recognise("field-models", own).measured == {"wire": "displacement"}
+    assert recognise("field-models", own).by_units == {"wire": "displacement"}
 
 
 def test_pulls_of_the_wrong_sign_are_refused() -> None:

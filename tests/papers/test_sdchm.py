@@ -15,7 +15,7 @@ from mckibben.papers.sdchm.loops import (
     PUBLISHED,
     SDIHC,
     SDIHC_OURS,
-    held,
+    single_task,
     widths,
 )
 from mckibben.papers.sdchm.protocol import strength
@@ -35,7 +35,7 @@ def rows(found: Reproduction, key: str) -> dict[str, dict[str, Any]]:
 
 def test_widths_are_of_the_own_range_and_of_the_range_that_moves() -> None:
     time = np.asarray(np.arange(0.0, 150.0, 0.05), dtype=np.float64)
-    reference = held(OUTPUTS, OUTPUTS[0], time, 0.7).reference
+    reference = single_task(OUTPUTS, OUTPUTS[0], time, 0.7).reference
     late = 2 * np.pi * 0.02 * time - 0.1
     channels = {f"reference_{y}": reference[y] for y in OUTPUTS}
     channels |= {OUTPUTS[0]: 3 * np.sin(late), OUTPUTS[1]: np.sin(late), OUTPUTS[2]: 0 * time}

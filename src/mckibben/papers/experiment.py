@@ -171,7 +171,7 @@ class Experiment:
         Whether to leave out what takes long.
     seed, jobs
         Of everything random; processes, default as many as there are cores.
-    kept : Checkpoints
+    checkpoints : Checkpoints
         Fits, until all is done.
     progress : callable
         Called with the share done, and what is next.
@@ -183,7 +183,7 @@ class Experiment:
     quick: bool = False
     seed: int = 0
     jobs: int | None = None
-    kept: Checkpoints = field(default_factory=lambda: Checkpoints(None))
+    checkpoints: Checkpoints = field(default_factory=lambda: Checkpoints(None))
     progress: Progress = _no_progress
 
     def __post_init__(self) -> None:
@@ -199,7 +199,7 @@ class Experiment:
         self.reached, self.bounds = 0.0, (0.0, 1.0)
         self._free: dict[tuple[str, int], tuple[Recording, Recording]] = {}
 
-    def tell(self, share: float, text: str) -> None:
+    def report(self, share: float, text: str) -> None:
         """Report a share of the whole, unless more was done; what is not to be done is no part of it."""
         low, high = self.bounds
         self.reached = min(max(share, self.reached, low), high)
@@ -207,18 +207,18 @@ class Experiment:
 
     def within(self, low: float, high: float) -> Progress:
         """Return the progress callback of a part."""
-        return lambda share, text: self.tell(low + (high - low) * share, text)
+        return lambda share, text: self.report(low + (high - low) * share, text)
 
     def steps(self, low: float, high: float, items: Sequence[Item]) -> Iterator[Item]:
         """Yield items between two shares of the whole; a fit reports how far it is in its own."""
-        for place, item in enumerate(items):
-            each = (high - low) / len(items)
-            self.part = low + each * place, low + each * (place + 1)
+        for i, item in enumerate(items):
+            width = (high - low) / len(items)
+            self.part = low + width * i, low + width * (i + 1)
             yield item
 
     def record(
         self,
-        what: Protocol | None = None,
+        plan: Protocol | None = None,
         names: Sequence[str] | None = None,
         *,
         until: float = 0.3,
@@ -228,7 +228,7 @@ class Experiment:
 
         Parameters
         ----------
-        what : Protocol, optional
+        plan : Protocol, optional
             Default the one registered under the paper's name, for the rig.
         names : sequence of str, optional
             Of the runs that are needed; default all.
@@ -237,19 +237,19 @@ class Experiment:
         """
         self.bounds = 0.0 if self.data is None else until, loops if self.rig is None else 1.0
         runs = (
-            self._recorded(what, names, until) if self.data is None else self._recognised(self.data)
+            self._recorded(plan, names, until) if self.data is None else self._recognised(self.data)
         )
         self.of_its_size = of_its_size(self.name, runs)
         return runs
 
     def _recognised(self, data: Sequence[Recording]) -> Runs:
-        found = recognise(self.name, data)
-        self.tables.append(recognised_table(found))
-        self.absent = [f"Not recorded: {found.absent}."] if found.absent else []
-        return found.runs
+        recognised = recognise(self.name, data)
+        self.tables.append(recognised_table(recognised))
+        self.absent = [f"Not recorded: {recognised.absent}."] if recognised.absent else []
+        return recognised.runs
 
-    def _recorded(self, what: Protocol | None, names: Sequence[str] | None, until: float) -> Runs:
-        plan = protocol(self.name, self.rig) if what is None else what
+    def _recorded(self, plan: Protocol | None, names: Sequence[str] | None, until: float) -> Runs:
+        plan = protocol(self.name, self.rig) if plan is None else plan
         rows = [(o.what, *o.printed, *o.here, o.factor) for o in scaling(self.name, self.rig)]
         if any(abs(row[-1] - 1) > 1e-6 for row in rows):
             self.tables.append(Table("scaled", SCALED, SCALED_COLUMNS, tuple(rows)))
@@ -275,31 +275,33 @@ class Experiment:
         name; ``how`` is what else its ``fit`` takes. Errors are those of its ``fit``; a model that is no
         better than the mean is returned, as its errors in the tables tell.
         """
-        made = registry.load("estimators", model)
-        estimator: Any = made(**{"seed": self.seed} | dict(settings or {}))
+        estimator_class = registry.load("estimators", model)
+        estimator: Any = estimator_class(**{"seed": self.seed} | dict(settings or {}))
         search: list[float] = []
 
         def fit() -> Fitted:
-            def heard(share: float, best: float) -> None:
+            def on_progress(share: float, best: float) -> None:
                 search.append(float(best))
                 self.within(*self.part)(share, f"{name}, {words_of(best)}")
 
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ModelWarning)
                 try:
-                    estimator.fit(recordings, **{"progress": heard} | how)
+                    estimator.fit(recordings, **{"progress": on_progress} | how)
                 except ModelError:
                     if not hasattr(estimator, "model_"):
                         raise
-            found = estimator.diagnostics_
-            errors = tuple(getattr(found, "standard_errors", ()))
+            diagnostics = estimator.diagnostics_
+            errors = tuple(getattr(diagnostics, "standard_errors", ()))
             best = tuple(cost for cost in search if np.isfinite(cost))
-            error = float(np.max(found.rmse))
-            return Fitted(estimator.model_, error, found.seconds, found.n_free, errors, best)
+            error = float(np.max(diagnostics.rmse))
+            return Fitted(
+                estimator.model_, error, diagnostics.seconds, diagnostics.n_free, errors, best
+            )
 
         self.within(*self.part)(0.0, name)
         depends = model, estimator.get_params(), recordings, how
-        fitted = self.kept.once(name, Fitted, fit, *depends)
+        fitted = self.checkpoints.once(name, Fitted, fit, *depends)
         self.models[name] = fitted.block
         return fitted
 
@@ -309,9 +311,12 @@ class Experiment:
         if key not in self._free:
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always", ModelWarning)
-                found = self.models[name].simulate(recording)
+                free_run = self.models[name].simulate(recording)
             self.warned |= {f"{name} on {recording.name}: {w.message}.": None for w in caught}
-            self._free[key] = recording, found  # with the recording, so that its id stays its own
+            self._free[key] = (
+                recording,
+                free_run,
+            )  # with the recording, so that its id stays its own
         return self._free[key][1]
 
     def table(
@@ -343,10 +348,12 @@ class Experiment:
         if not lines:
             return
         ours = dict(zip([text.rows, *columns], zip(*lines, strict=True), strict=True))
-        shown = {of: cells for of, cells in self._columns(text, ours) if {*cells} - {None}}
+        kept_columns = {of: cells for of, cells in self._columns(text, ours) if {*cells} - {None}}
         words = {"title": text.title.format(**facts), "note": text.note.format(**facts)}
-        filled = text.model_copy(update=words)
-        self.tables.append(Table(key, filled, (*shown,), (*zip(*shown.values(), strict=True),)))
+        filled_text = text.model_copy(update=words)
+        self.tables.append(
+            Table(key, filled_text, (*kept_columns,), (*zip(*kept_columns.values(), strict=True),))
+        )
 
     def _compares(self, text: TableText, name: Cell) -> bool:
         """Return whether a row or column of some name has a meaning for a rig of this size."""
@@ -358,10 +365,10 @@ class Experiment:
     ) -> Iterator[tuple[str, Sequence[Cell]]]:
         """Yield columns, the paper's before ours of the same quantity."""
         # recordings need not have all that the paper has
-        theirs = [of for of in text.printed if self.data is None or of in ours]
-        for column in dict.fromkeys((*ours, *theirs)):
+        paper_columns = [of for of in text.printed if self.data is None or of in ours]
+        for column in dict.fromkeys((*ours, *paper_columns)):
             heading = f"{column}, printed"
-            if column in theirs and self._compares(text, heading):
+            if column in paper_columns and self._compares(text, heading):
                 yield heading, [text.printed[column].get(str(name)) for name in ours[text.rows]]
             if column in ours and (column == text.rows or self._compares(text, column)):
                 yield column, ours[column]
@@ -374,19 +381,19 @@ class Experiment:
         if not panels:
             return
         drawn: dict[str, Axes] = {}
-        for title, given in panels.items():
-            axes = given if isinstance(given, Axes) else Axes(given)
-            few = {
+        for title, panel in panels.items():
+            axes = panel if isinstance(panel, Axes) else Axes(panel)
+            thin = {
                 name: (thinned(x), thinned(y))
                 for name, (x, y) in axes.curves.items()
                 if self.of_its_size or name != "printed"
             }
-            drawn[title] = replace(axes, curves=few)
+            drawn[title] = replace(axes, curves=thin)
         text = self.paper.figures[key].filled(facts)
         others = {name: labels.filled(facts) for name, labels in text.axes.items()}
         self.figures.append(Figure(key, text.model_copy(update={"axes": others}), drawn))
 
-    def says(self, **facts: Any) -> None:
+    def add_facts(self, **facts: Any) -> None:
         """Set facts of sentences in ``paper.toml``; ``*_printed`` are in units of the paper's rig."""
         for name, fact in facts.items():
             if self.of_its_size or not name.endswith("_printed"):
@@ -399,8 +406,8 @@ class Experiment:
             fields = (name for _, name, _, _ in string.Formatter().parse(text) if name)
             if {name.partition("[")[0] for name in fields} <= {*self.facts}:
                 sentences.append(text.format(**self.facts))
-        own = [*self.paper.rig_notes] if self.data is None else [OWN, *self.absent]
-        own += [] if self.of_its_size else [OTHER_SIZE]
+        notes = [*self.paper.rig_notes] if self.data is None else [OWN, *self.absent]
+        notes += [] if self.of_its_size else [OTHER_SIZE]
         return Reproduction(
             self.name,
             self.paper,
@@ -408,17 +415,17 @@ class Experiment:
             tuple(sentences),
             tuple(self.tables),
             tuple(self.figures),
-            (*own, *self.paper.notes, *([self.paper.quick] if self.quick else []), *self.warned),
+            (*notes, *self.paper.notes, *([self.paper.quick] if self.quick else []), *self.warned),
             self.quick,
             self.seed,
         )
 
 
-def recognised_table(found: Recognised) -> Table:
+def recognised_table(recognised: Recognised) -> Table:
     """Return the table of which run of the paper each recording is, and why."""
-    by = ", ".join(f"{own} is {channel}" for own, channel in found.measured.items())
+    by = ", ".join(f"{original} is {channel}" for original, channel in recognised.by_units.items())
     text = TableText(title=RECOGNISED, rows="file", note=f"By their units: {by}." if by else "")
-    return Table("recognised", text, ("file", "run of the paper", "role", "why"), found.rows)
+    return Table("recognised", text, ("file", "run of the paper", "role", "why"), recognised.rows)
 
 
 def reproduce(
@@ -453,12 +460,14 @@ def reproduce(
     """
     run: Callable[[Experiment], None] = registry.load("papers", name)
     plant = _plant(name, rig, data)
-    kept = Checkpoints(folder, name, quick, seed)
+    checkpoints = Checkpoints(folder, name, quick, seed)
     with one_blas_thread(), telling(progress, name) as tell:
-        experiment = Experiment(name, plant, data, quick, seed, jobs, kept, tell or _no_progress)
+        experiment = Experiment(
+            name, plant, data, quick, seed, jobs, checkpoints, tell or _no_progress
+        )
         run(experiment)
     if clear:
-        kept.clear()
+        checkpoints.clear()
     on = f"{len(data)} recordings" if data is not None else f"rig {plant.name}" if plant else ""
     return experiment.done(on)
 
@@ -471,12 +480,12 @@ def _plant(name: str, rig: Rig | str | None, data: Sequence[Recording] | None) -
     if rig is None and data is not None:
         return None
     plant = load_rig(rig or protocol(name).rig)
-    known = {*plant.inputs, *plant.outputs}
-    known |= {"contraction"} if "displacement" in known else set()
+    measurable = {*plant.inputs, *plant.outputs}
+    measurable |= {"contraction"} if "displacement" in measurable else set()
     for channel in paper(name).channels:
-        if channel not in known:
+        if channel not in measurable:
             raise DataError(
-                f"{name} needs it, and the rig {plant.name!r} has {', '.join(sorted(known))}",
+                f"{name} needs it, and the rig {plant.name!r} has {', '.join(sorted(measurable))}",
                 channel=channel,
                 remedy=f"give a rig like {protocol(name).rig}",
             )

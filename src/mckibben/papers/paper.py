@@ -144,9 +144,9 @@ class Paper(_Strict):
 
     def kind_of(self, role: str, labels: Mapping[str, Any]) -> RunKind | None:
         """Return the kind of a run by its role and labels, None if it is of none."""
-        own = {"role": role, **labels}
-        each = (kind for kind in self.runs.values() if kind.where.items() <= own.items())
-        return next(each, None)
+        labels_of_run = {"role": role, **labels}
+        kinds = (kind for kind in self.runs.values() if kind.where.items() <= labels_of_run.items())
+        return next(kinds, None)
 
     def printed(self, name: str) -> Any:
         """Return the block of a model as printed."""
@@ -163,13 +163,13 @@ def paper(name: str) -> Paper:
 
 def papers() -> Mapping[str, Paper]:
     """Return all papers by their short names, in the order of their numbers."""
-    found = {name: paper(name) for name in registry.names("papers")}
-    return dict(sorted(found.items(), key=lambda item: item[1].number))
+    by_name = {name: paper(name) for name in registry.names("papers")}
+    return dict(sorted(by_name.items(), key=lambda item: item[1].number))
 
 
 def printed_models() -> tuple[str, ...]:
     """Return the names of all models as printed."""
-    return tuple(sorted(name for each in papers().values() for name in each.models))
+    return tuple(sorted(name for each_paper in papers().values() for name in each_paper.models))
 
 
 def printed(name: str) -> Any:
@@ -186,9 +186,9 @@ def printed(name: str) -> Any:
     >>> printed("field-models-pi").thresholds[1]
     0.3392
     """
-    for each in papers().values():
-        if name in each.models:
-            return each.printed(name)
+    for each_paper in papers().values():
+        if name in each_paper.models:
+            return each_paper.printed(name)
     raise ModelError(
         f"there is no printed model {name!r}", remedy=f"use one of {', '.join(printed_models())}"
     )

@@ -53,9 +53,9 @@ class Runs(dict[str, Recording]):
         """Return the names of recordings of a role that have all of the labels."""
         return [
             name
-            for name, given in self.labels.items()
-            if role in (None, given.role)
-            and all(given.labels.get(key) == value for key, value in labels.items())
+            for name, run_labels in self.labels.items()
+            if role in (None, run_labels.role)
+            and all(run_labels.labels.get(key) == value for key, value in labels.items())
         ]
 
     def select(self, role: Role | None = None, **labels: Any) -> list[Recording]:
@@ -72,7 +72,7 @@ class Recognised(NamedTuple):
 
     runs: Runs
     rows: tuple[tuple[str, str | None, str | None, str], ...]
-    measured: Mapping[str, str]
+    by_units: Mapping[str, str]
     absent: str
 
 
@@ -86,90 +86,103 @@ def recognise(name: str, data: Sequence[Recording]) -> Recognised:
     """
     about = paper(name)
     names = _channels(data, of_arm=EXTENSOR in about.channels)
-    measured = {own: channel for own, channel in names.items() if own != channel}
-    every = dict[str, Recording]()
-    for one in data:
-        whole = renamed(one.select([own for own in one if own in names]), names)
-        wanted = (re.sub("^length_", "displacement_", channel) for channel in whole)
-        whole = whole.with_derived([*about.channels, *wanted])
-        whole.matrix(about.channels)  # raises an error for what is absent
-        every[f"{one.name}, {len(every) + 1}" if one.name in every else str(one.name)] = whole
-    _check_sign(every.values())
-    noted = {n for n, one in every.items() if one.meta.get("protocol") == name}
-    labels = _labels(name, every, noted)
-    kinds = {n: about.kind_of(*own) for n, own in labels.items()}
+    by_units = {original: channel for original, channel in names.items() if original != channel}
+    recordings = dict[str, Recording]()
+    for recording in data:
+        standard = _standard(recording, names, about.channels)
+        is_repeated = recording.name in recordings
+        key = f"{recording.name}, {len(recordings) + 1}" if is_repeated else str(recording.name)
+        recordings[key] = standard
+    _check_sign(recordings.values())
+    noted = {key for key, run in recordings.items() if run.meta.get("protocol") == name}
+    labels = _labels(name, recordings, noted)
+    kinds = {key: about.kind_of(*run_labels) for key, run_labels in labels.items()}
     counts = [(kind, [*kinds.values()].count(kind)) for kind in about.runs.values()]
     if few := [f"{k.what} ({k.least} needed, {n} there)" for k, n in counts if n < k.least]:
         remedy = "record them: move what the paper moves, at levels of your own"
         raise DataError(f"runs are missing: {'; '.join(few)}", file=data[0].source, remedy=remedy)
     absent = "; ".join(f"{kind.what} (for {kind.gives})" for kind, n in counts if not n)
     rows: list[tuple[str, str | None, str | None, str]] = []
-    for n, kind in kinds.items():
+    for key, kind in kinds.items():
         if kind is None:
-            rows.append((n, None, None, UNLIKE))
+            rows.append((key, None, None, UNLIKE))
         else:
-            why = NOTED if n in noted else kind.why.format(**labels[n].labels)
-            rows.append((n, kind.what, labels[n].role, why))
-    used = {n: one for n, one in every.items() if kinds[n] is not None}
-    return Recognised(Runs(used, {n: labels[n] for n in used}), tuple(rows), measured, absent)
+            reason = NOTED if key in noted else kind.why.format(**labels[key].labels)
+            rows.append((key, kind.what, labels[key].role, reason))
+    used = {key: run for key, run in recordings.items() if kinds[key] is not None}
+    return Recognised(Runs(used, {key: labels[key] for key in used}), tuple(rows), by_units, absent)
+
+
+def _standard(recording: Recording, names: Mapping[str, str], channels: Sequence[str]) -> Recording:
+    """Return a recording with the paper's names and channels; raise an error for an absent one."""
+    standard = renamed(recording.select([name for name in recording if name in names]), names)
+    displacements = (re.sub("^length_", "displacement_", channel) for channel in standard)
+    standard = standard.with_derived([*channels, *displacements])
+    standard.matrix(channels)  # raises the error
+    return standard
 
 
 def _channels(data: Sequence[Recording], *, of_arm: bool) -> dict[str, str]:
     """Return own names of channels and what they are: by their names, units, and what moves most."""
-    units = {name: one.units.get(name) or "" for one in data for name in one}
-    samples = {name: np.concatenate([one[name] for one in data if name in one]) for name in units}
-    known = {name: name for name in units} | by_unit(samples, units)
+    units = {name: run.units.get(name) or "" for run in data for name in run}
+    samples = {name: np.concatenate([run[name] for run in data if name in run]) for name in units}
+    channels = {name: name for name in units} | by_unit(samples, units)
     if of_arm:
-        plain = {"pressure_1"} <= {*known.values()} and EXTENSOR not in known.values()
-        return {own: EXTENSOR if plain and c == "pressure" else c for own, c in known.items()}
-    each: dict[str, dict[str, str]] = {}
-    for own, channel in known.items():
+        is_misnamed = {"pressure_1"} <= {*channels.values()} and EXTENSOR not in channels.values()
+        return {
+            column: EXTENSOR if is_misnamed and c == "pressure" else c
+            for column, c in channels.items()
+        }
+    by_quantity: dict[str, dict[str, str]] = {}
+    for column, channel in channels.items():
         base = re.sub(r"_?\d*$", "", channel)
-        each.setdefault(base, {})[channel[len(base) :].lstrip("_")] = own
+        by_quantity.setdefault(base, {})[channel[len(base) :].lstrip("_")] = column
     muscle = ""
     for drive in ("voltage", "pressure"):
-        numbered = each.get(drive, {})
-        moved = {n: np.ptp(np.percentile(samples[own], (1, 99))) for n, own in numbered.items()}
-        muscle = max(moved, key=moved.__getitem__) if len(moved) > 1 else muscle
-    found = dict[str, str]()
-    for base, by_number in each.items():
+        numbered = by_quantity.get(drive, {})
+        spans = {
+            n: np.ptp(np.percentile(samples[column], (1, 99))) for n, column in numbered.items()
+        }
+        muscle = max(spans, key=spans.__getitem__) if len(spans) > 1 else muscle
+    result = dict[str, str]()
+    for base, by_number in by_quantity.items():
         likely = (muscle, "", *by_number) if len(by_number) == 1 else (muscle, "")
-        number = next((one for one in likely if one in by_number), None)
-        found |= {} if number is None else {by_number[number]: base}
-    return found
+        number = next((n for n in likely if n in by_number), None)
+        result |= {} if number is None else {by_number[number]: base}
+    return result
 
 
-def _check_sign(every: Collection[Recording]) -> None:
+def _check_sign(runs: Collection[Recording]) -> None:
     """Raise an error where pulls are negative, or a shortening falls as its drive rises."""
-    pulls = [(float(one["force"].mean()), one) for one in every if "force" in one]
+    pulls = [(float(run["force"].mean()), run) for run in runs if "force" in run]
     if pulls and sum(force for force, _ in pulls) < FALLS * sum(abs(force) for force, _ in pulls):
         problem, remedy = (
             "it is negative, and a pull is positive",
             "turn it with `calibration[force]=-1:0`",
         )
         raise DataError(problem, file=pulls[0][1].source, channel="force", remedy=remedy)
-    for drive, moved in product(("pressure", "voltage"), ("displacement", "contraction")):
+    for drive, output in product(("pressure", "voltage"), ("displacement", "contraction")):
         pairs = [
-            (one[drive], one[moved], one) for one in every if {drive, moved} <= {*one.channels}
+            (run[drive], run[output], run) for run in runs if {drive, output} <= {*run.channels}
         ]
         products = [float(np.cov(u, y)[0, 1]) for u, y, _ in pairs]
         spans = [float(np.std(u) * np.std(y)) for u, y, _ in pairs]
         if sum(products) < FALLS * sum(spans):
             remedy = (
                 "if it is a length, name it so with `columns[length]=COLUMN` and state `rest_length`; "
-                f"else turn it with `calibration[{moved}]=-1:0`"
+                f"else turn it with `calibration[{output}]=-1:0`"
             )
             problem = f"it falls as {drive} rises, and a shortening rises"
-            raise DataError(problem, file=pairs[0][2].source, channel=moved, remedy=remedy)
+            raise DataError(problem, file=pairs[0][2].source, channel=output, remedy=remedy)
 
 
-def _labels(name: str, every: Mapping[str, Recording], noted: Collection[str]) -> dict[str, Labels]:
-    others = [one for n, one in every.items() if n not in noted]
+def _labels(name: str, runs: Mapping[str, Recording], noted: Collection[str]) -> dict[str, Labels]:
+    unnoted = [run for n, run in runs.items() if n not in noted]
     by_signals = import_module(registry.load("protocols", name).__module__).recognised
-    found = iter(by_signals(features_of(others)) if others else ())
+    recognised = iter(by_signals(features_of(unnoted)) if unnoted else ())
     return {
-        n: Labels(one.meta["role"], one.meta["labels"]) if n in noted else next(found)
-        for n, one in every.items()
+        n: Labels(run.meta["role"], run.meta["labels"]) if n in noted else next(recognised)
+        for n, run in runs.items()
     }
 
 
@@ -180,22 +193,26 @@ def of_its_size(name: str, runs: Runs) -> bool:
     """
     about, plan = paper(name), protocol(name)
     kinds = [about.kind_of(*labels) for labels in runs.labels.values()]
-    alike = (run for run in plan.runs if about.kind_of(run.role, run.labels) in kinds)
+    paper_runs = (run for run in plan.runs if about.kind_of(run.role, run.labels) in kinds)
     weight = {run.name: GRAVITY * run.settings.get("payload", 0.0) for run in plan.runs}
-    printed = _highest((run.inputs, {"force": weight[run.name]}) for run in alike)
+    printed = _highest((run.inputs, {"force": weight[run.name]}) for run in paper_runs)
     printed["length at rest"] = load_rig(plan.rig).rest_length or 0.0
-    here = _highest((one, {}) for one in runs.values())
+    highest = _highest((one, {}) for one in runs.values())
     lengths = [one.rest_length for one in runs.values() if one.rest_length]
-    here |= {"length at rest": max(lengths)} if lengths else {}
-    pairs = [(here[what], high) for what, high in printed.items() if what in here]
-    return all(abs(found - high) <= SIZE * high for found, high in pairs)
+    highest |= {"length at rest": max(lengths)} if lengths else {}
+    pairs = [
+        (highest[quantity], paper_value)
+        for quantity, paper_value in printed.items()
+        if quantity in highest
+    ]
+    return all(abs(value - paper_value) <= SIZE * paper_value for value, paper_value in pairs)
 
 
-def _highest(every: Iterable[tuple[Recording, Mapping[str, float]]]) -> dict[str, float]:
+def _highest(runs: Iterable[tuple[Recording, Mapping[str, float]]]) -> dict[str, float]:
     """Return the highest value of every channel, to which something may be added."""
     highest = dict[str, float]()
-    for one, more in every:
-        for channel, samples in one.channels.items():
-            value = float(np.percentile(samples, PEAK)) + more.get(channel, 0.0)
+    for run, additions in runs:
+        for channel, samples in run.channels.items():
+            value = float(np.percentile(samples, PEAK)) + additions.get(channel, 0.0)
             highest[channel] = max(value, highest.get(channel, value))
     return highest

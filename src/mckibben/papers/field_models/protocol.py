@@ -34,7 +34,7 @@ TURNS, SEED = 17, 5
 
 def field_models(rig: Rig | None = None) -> Protocol:
     """Return both runs; on another rig, pressures in proportion to its highest."""
-    wide = share(rig, "pressure", RANGE)
+    pressure_share = share(rig, "pressure", RANGE)
     time = np.arange(round(PERIOD * len(PEAKS) / SAMPLE_TIME) + 1) * SAMPLE_TIME
     falling = triangle(time, PERIOD, (*PEAKS, LOW), LOW)
     irregular = irregular_triangle(time, TURNS, HIGH, LOW, seed=SEED)
@@ -43,8 +43,8 @@ def field_models(rig: Rig | None = None) -> Protocol:
         rig="mas20-hanging",
         source="Analysis and modeling of a pneumatic artificial muscle system, Sections 2.1 and 3.1",
         runs=(
-            _run("decaying-triangle", "train", wide * falling),
-            _run("irregular-triangle", "test", wide * irregular),
+            _run("decaying-triangle", "train", pressure_share * falling),
+            _run("irregular-triangle", "test", pressure_share * irregular),
         ),
         notes="Peaks and turning points are ours: the paper shows them in a figure only.",
     )
@@ -57,7 +57,7 @@ def _run(name: str, role: Role, wave: Array) -> PlannedRun:
 
 def recognised(runs: Sequence[Features]) -> list[Labels]:
     """Return which run calibrates, by cycles of equal times, and which tests, by irregular ones."""
-    roles: list[Role] = ["train" if one.regular("pressure") else "test" for one in runs]
+    roles: list[Role] = ["train" if run.regular("pressure") else "test" for run in runs]
     if len({*roles}) == 1:  # signals of other shapes, told apart by their names, or their order
-        roles = [one.hint or ("test" if k else "train") for k, one in enumerate(runs)]
+        roles = [run.hint or ("test" if k else "train") for k, run in enumerate(runs)]
     return [Labels(role, {}) for role in roles]

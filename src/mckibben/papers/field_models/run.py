@@ -86,25 +86,25 @@ def run(experiment: Experiment) -> None:
     runs = experiment.record(until=0.05)
     (train, *_), (test, *_) = runs.select("train"), runs.select("test")
     seeds = range(experiment.seed, experiment.seed + (QUICK_SEEDS if experiment.quick else SEEDS))
-    tried = _tried(experiment, train, test, seeds)
-    board = compare(
+    results = _identify(experiment, train, test, seeds)
+    leaderboard = compare(
         train,
         test,
         models=QUICK if experiment.quick else "all",
         seed=experiment.seed,
         jobs=experiment.jobs,
-        folder=experiment.kept.inside("field"),
+        folder=experiment.checkpoints.inside("field"),
         clear=False,
         progress=lambda now: experiment.within(0.3, 0.95)(now.share, str(now)),
     )
-    if board.stopped:
+    if leaderboard.stopped:
         raise KeyboardInterrupt
-    experiment.says(seeds=f"{seeds[0]} to {seeds[-1]}", n_seeds=len(seeds))
-    _errors_tables(experiment, tried)
-    _parameters(experiment, tried, train.step)
-    _board_table(experiment, board)
-    shown = _summary(experiment, tried, board)
-    _figures(experiment, {"calibration": train, "test": test}, tried, shown)
+    experiment.add_facts(seeds=f"{seeds[0]} to {seeds[-1]}", n_seeds=len(seeds))
+    _error_tables(experiment, results)
+    _parameter_tables(experiment, results, train.step)
+    _field_table(experiment, leaderboard)
+    charted = _summarise(experiment, results, leaderboard)
+    _figures(experiment, {"calibration": train, "test": test}, results, charted)
 
 
 def matched(model: Block, recording: Recording) -> Series:
@@ -124,76 +124,80 @@ def matched(model: Block, recording: Recording) -> Series:
     return Series((model, Affine(gain, float(z[0] - gain * x[0]), channel, channel)))
 
 
-def _tried(
+def _identify(
     experiment: Experiment, train: Recording, test: Recording, seeds: range
 ) -> dict[str, MethodResult]:
     span = float(np.ptp(np.percentile(train["pressure"], (1, 99))))
-    every = methods(1.0 if experiment.of_its_size else span / (HIGH - LOW))
-    found: dict[str, MethodResult] = {}
-    for name, (model, settings) in experiment.steps(0.05, 0.3, [*every.items()]):
+    candidates = methods(1.0 if experiment.of_its_size else span / (HIGH - LOW))
+    results: dict[str, MethodResult] = {}
+    for name, (model, settings) in experiment.steps(0.05, 0.3, [*candidates.items()]):
         models: list[tuple[Block, Series]] = []
         errors, failures, part = [], [], experiment.part
         for seed in experiment.steps(*part, seeds):
             try:
-                own = settings | {"seed": seed}
-                plain = experiment.fit(f"{name} {seed}", model, train, own).block
-                both = plain, matched(plain, train)
-                errors.append([_errors(model, train, test) for model in both])
-                models.append(both)
+                seeded = settings | {"seed": seed}
+                unmatched = experiment.fit(f"{name} {seed}", model, train, seeded).block
+                pair = unmatched, matched(unmatched, train)
+                errors.append([_free_run_errors(model, train, test) for model in pair])
+                models.append(pair)
             except MckibbenError as error:
                 failures.append(str(error))
                 errors.append([FAILED, FAILED])
         first = models[0] if models else None
-        found[name] = MethodResult(first, np.array(errors).swapaxes(0, 1), failures)
-    return found
+        results[name] = MethodResult(first, np.array(errors).swapaxes(0, 1), failures)
+    return results
 
 
-def _errors(model: Block, *recordings: Recording) -> list[float]:
-    found: list[float] = []
+def _free_run_errors(model: Block, *recordings: Recording) -> list[float]:
+    errors: list[float] = []
     with np.errstate(over="ignore", invalid="ignore"):
         for recording in recordings:
-            scored = score(recording["displacement"], model.simulate(recording)["displacement"])
-            found += [scored.rmse, 100 * scored.r2]
-    if not np.isfinite(found).all():
+            fit = score(recording["displacement"], model.simulate(recording)["displacement"])
+            errors += [fit.rmse, 100 * fit.r2]
+    if not np.isfinite(errors).all():
         raise ModelError(
             "its free run overflows", remedy="use fewer units or terms, or another seed"
         )
-    return found
+    return errors
 
 
-def _errors_tables(experiment: Experiment, tried: Mapping[str, MethodResult]) -> None:
+def _error_tables(experiment: Experiment, results: Mapping[str, MethodResult]) -> None:
     columns = ("RMSE calibration [mm]", "fitness [%]", "RMSE test [mm]", "fitness [%] test")
     rows: dict[str, list[Cell]] = {}
     spread: list[list[Cell]] = []
-    for name, one in tried.items():
-        n, n_failed = one.errors.shape[1], len(one.failures)
-        reason = f"{n_failed} of {n} seeds: {one.failures[0]}" if one.failures else None
-        rows[name] = [*finite(np.median(one.errors[1], axis=0)), reason]
-        for match, errors in (("by range", one.errors[1]), ("none", one.errors[0])):
+    for name, result in results.items():
+        n_seeds, n_failed = result.errors.shape[1], len(result.failures)
+        reason = f"{n_failed} of {n_seeds} seeds: {result.failures[0]}" if result.failures else None
+        rows[name] = [*finite(np.median(result.errors[1], axis=0)), reason]
+        for match, errors in (("by range", result.errors[1]), ("none", result.errors[0])):
             rmses = errors[:, ::2]
-            ends = rmses.min(axis=0), np.where(np.isinf(rmses), -np.inf, rmses).max(axis=0)
-            cells = finite(np.ravel([np.median(rmses, axis=0), *ends], order="F"))
-            spread.append([name, match, *cells, n - n_failed])
+            extremes = rmses.min(axis=0), np.where(np.isinf(rmses), -np.inf, rmses).max(axis=0)
+            cells = finite(np.ravel([np.median(rmses, axis=0), *extremes], order="F"))
+            spread.append([name, match, *cells, n_seeds - n_failed])
     experiment.table("errors", [*columns, "failed because"], rows, **experiment.facts)
-    sides, ways = ("calibration", "test"), ("median", "lowest", "highest")
-    each = [f"RMSE {side} [mm], {way}" for side in sides for way in ways]
-    experiment.table("seeds", ["match", *each, "seeds that worked"], spread, **experiment.facts)
+    sides, statistics = ("calibration", "test"), ("median", "lowest", "highest")
+    seed_columns = [f"RMSE {side} [mm], {way}" for side in sides for way in statistics]
+    experiment.table(
+        "seeds", ["match", *seed_columns, "seeds that worked"], spread, **experiment.facts
+    )
 
 
-def _parameters(experiment: Experiment, tried: Mapping[str, MethodResult], step: float) -> None:
+def _parameter_tables(
+    experiment: Experiment, results: Mapping[str, MethodResult], step: float
+) -> None:
     """Add Table 1, and the parameters of P2UZ, Box-Jenkins and PI with the printed ones."""
-    models = {name: one.models for name, one in tried.items() if one.models is not None}
-    match: dict[str, Any] = {name: both[1].parts[1] for name, both in models.items()}
-    plain = {name: both[0] for name, both in models.items()}
-    lines = {name: [one.gain, one.offset] for name, one in match.items()}
+    models = {name: result.models for name, result in results.items() if result.models is not None}
+    match: dict[str, Any] = {name: pair[1].parts[1] for name, pair in models.items()}
+    plain = {name: pair[0] for name, pair in models.items()}
+    lines = {name: [line.gain, line.offset] for name, line in match.items()}
     experiment.table("match", ["a", "b [mm]"], lines)
     if P2UZ in plain:
-        both = experiment.paper.printed(PRINTED_P2UZ), plain[P2UZ]
+        pair = experiment.paper.printed(PRINTED_P2UZ), plain[P2UZ]
         rows = {
-            "K": [one.gain for one in both],
-            "T_z [s]": [one.zero_time for one in both],
-            "T_w [s]": [one.time_constants[0] for one in both],
-            "zeta": [one.damping for one in both],
+            "K": [p2uz.gain for p2uz in pair],
+            "T_z [s]": [p2uz.zero_time for p2uz in pair],
+            "T_w [s]": [p2uz.time_constants[0] for p2uz in pair],
+            "zeta": [p2uz.damping for p2uz in pair],
         }
         experiment.table("p2uz", ["printed", "here"], rows)
     if BJ in plain:
@@ -202,18 +206,18 @@ def _parameters(experiment: Experiment, tried: Mapping[str, MethodResult], step:
         terms: dict[str, list[Cell]] = {"B": [*map(float, bj.numerator)]}
         terms |= {name: [1.0, *map(float, values)] for name, values in monic.items()}
         experiment.table("bj", ["z^0", "z^-1", "z^-2"], terms, step=step)
-    every = {
+    sources = {
         "share printed": experiment.paper.printed(PRINTED_PI),
         "share by slopes": plain.get(SLOPES),
         "share by least squares, ours": plain.get(LEAST_SQUARES),
     }
-    shares = {n: np.divide(pi.weights, sum(pi.weights)).tolist() for n, pi in every.items() if pi}
+    shares = {n: np.divide(pi.weights, sum(pi.weights)).tolist() for n, pi in sources.items() if pi}
     thresholds = experiment.paper.models[PRINTED_PI]["thresholds"]
     weights = {f"{r:g}": row for r, *row in zip(thresholds, *shares.values(), strict=True)}
     experiment.table("weights", [*shares], weights)
 
 
-def _board_table(experiment: Experiment, board: Leaderboard) -> None:
+def _field_table(experiment: Experiment, leaderboard: Leaderboard) -> None:
     columns = {
         "CV RMSE [mm]": "validation_rmse",
         "test RMSE [mm]": "test.rmse",
@@ -224,76 +228,86 @@ def _board_table(experiment: Experiment, board: Leaderboard) -> None:
         "parameters": "n_parameters",
     }
     rows: dict[str, list[Cell]] = {}
-    for row in sorted(board.rows, key=lambda row: row.test_error):
-        given = row.to_dict()
-        cells = [_inside(given, at, 100.0 if "[%]" in of else 1) for of, at in columns.items()]
+    for row in sorted(leaderboard.rows, key=lambda row: row.test_error):
+        values = row.to_dict()
+        cells = [
+            _value_at(values, path, 100.0 if "[%]" in column else 1)
+            for column, path in columns.items()
+        ]
         rows[row.model] = [*cells, row.reason or None]
     experiment.table("field", [*columns, "failed because"], rows)
 
 
-def _inside(row: Mapping[str, Any], path: str, scale: float) -> Cell:
-    found: Any = row
+def _value_at(row: Mapping[str, Any], path: str, scale: float) -> Cell:
+    value: Any = row
     for name in path.split("."):
-        found = (found or {}).get(name)
-    return None if found is None else scale * found
+        value = (value or {}).get(name)
+    return None if value is None else scale * value
 
 
-def _summary(
-    experiment: Experiment, tried: Mapping[str, MethodResult], board: Leaderboard
+def _summarise(
+    experiment: Experiment, results: Mapping[str, MethodResult], leaderboard: Leaderboard
 ) -> dict[str, Row]:
     """Set the summary's facts, and return the named models of the field.
 
     The field runs plain, so that is compared with the paper's methods run plain; their order is that of
     the paper's own errors, matched.
     """
-    plain, matched_ = ({n: tried[n].medians[k] for n in PAPERS} for k in (0, 1))
+    plain, matched_ = ({n: results[n].medians[k] for n in PAPERS} for k in (0, 1))
     printed = experiment.paper.tables["errors"].printed["RMSE test [mm]"]
-    order, theirs = (sorted(PAPERS, key=lambda n: by[n]) for by in (matched_, printed))
-    good = sum(fitness > GOOD for _, fitness in matched_.values())
-    experiment.says(
+    order, paper_order = (sorted(PAPERS, key=lambda n: by[n]) for by in (matched_, printed))
+    n_good = sum(fitness > GOOD for _, fitness in matched_.values())
+    experiment.add_facts(
         order=", ".join(f"{n} {matched_[n][0]:.2f} mm" for n in order),
-        order_theirs=", ".join(theirs),
-        same_order=Verdict(order == theirs),
-        good=good,
-        all_good=Verdict(good == len(PAPERS)),
+        order_theirs=", ".join(paper_order),
+        same_order=Verdict(order == paper_order),
+        good=n_good,
+        all_good=Verdict(n_good == len(PAPERS)),
     )
-    worked = {name: test for name, (test, fitness) in plain.items() if fitness > 0}
-    best = min(worked, key=worked.__getitem__, default=None)
+    usable = {name: test for name, (test, fitness) in plain.items() if fitness > 0}
+    best = min(usable, key=usable.__getitem__, default=None)
     if best is not None:
-        n_worked = len(tried[best].errors[0]) - len(tried[best].failures)
-        both = {"best_plain": plain[best][0], "best_matched": matched_[best][0]}
-        experiment.says(best=best, best_seeds=n_worked, **both)
-    shown = {}
-    chosen = "fitted" if board.chosen_by == "fit" else "chosen"
-    for key, row in ((chosen, board.best), ("lowest", board.lowest)):
+        n_worked = len(results[best].errors[0]) - len(results[best].failures)
+        errors = {"best_plain": plain[best][0], "best_matched": matched_[best][0]}
+        experiment.add_facts(best=best, best_seeds=n_worked, **errors)
+    charted = {}
+    choice_key = "fitted" if leaderboard.chosen_by == "fit" else "chosen"
+    for key, row in ((choice_key, leaderboard.best), ("lowest", leaderboard.lowest)):
         if row is not None and row.sound:
-            experiment.says(**{key: row.model, f"{key}_error": row.test_error})
+            experiment.add_facts(**{key: row.model, f"{key}_error": row.test_error})
             if best is not None:
-                experiment.says(**{f"{key}_ratio": row.test_error / worked[best]})
-            shown[row.model] = row
-    if board.not_recommended:
-        experiment.says(none=board.not_recommended)
-    return shown
+                experiment.add_facts(**{f"{key}_ratio": row.test_error / usable[best]})
+            charted[row.model] = row
+    if leaderboard.not_recommended:
+        experiment.add_facts(none=leaderboard.not_recommended)
+    return charted
 
 
 def _figures(
     experiment: Experiment,
     runs: Mapping[str, Recording],
-    tried: Mapping[str, MethodResult],
-    shown: Mapping[str, Row],
+    results: Mapping[str, MethodResult],
+    charted: Mapping[str, Row],
 ) -> None:
     """Add signals, loops and responses."""
-    theirs = {name: both[1] for name in PAPERS if (both := tried[name].models)}
-    ours: dict[str, Block] = {name: row.block for name, row in shown.items() if row.block}
-    if (both := tried[LEAST_SQUARES].models) is not None:
-        ours[LEAST_SQUARES] = both[0]
-    experiment.figure("signals", {of: {"": (r.time, r["pressure"])} for of, r in runs.items()})
-    loops = {of: {r.origin: (r["pressure"], r["displacement"])} for of, r in runs.items()}
+    paper_models = {name: pair[1] for name in PAPERS if (pair := results[name].models)}
+    our_models: dict[str, Block] = {name: row.block for name, row in charted.items() if row.block}
+    if (pair := results[LEAST_SQUARES].models) is not None:
+        our_models[LEAST_SQUARES] = pair[0]
+    experiment.figure(
+        "signals", {which: {"": (r.time, r["pressure"])} for which, r in runs.items()}
+    )
+    loops = {which: {r.origin: (r["pressure"], r["displacement"])} for which, r in runs.items()}
     experiment.figure("loops", loops)
-    for title, one in runs.items():
-        y = one["displacement"]
+    for title, recording in runs.items():
+        y = recording["displacement"]
         panels: dict[str, Curves] = {}
-        for whose, models in (("the paper's methods", theirs), ("ours", ours)):
-            every = {name: model.simulate(one)["displacement"] for name, model in models.items()}
-            panels[whose] = {name: (one.time, x) for name, x in ({one.origin: y} | every).items()}
+        for owner, models in (("the paper's methods", paper_models), ("ours", our_models)):
+            outputs = {
+                name: model.simulate(recording)["displacement"] for name, model in models.items()
+            }
+            panels[owner] = {
+                name: (recording.time, output)
+                for name, output in ({recording.origin: y} | outputs).items()
+            }
         experiment.figure(title, panels)

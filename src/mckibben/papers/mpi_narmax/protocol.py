@@ -153,44 +153,44 @@ def recognised(runs: Sequence[Features]) -> list[Labels]:
     drive = driven([run.recording for run in runs])
     strongest = max(float(np.percentile(run.recording["force"], 99)) for run in runs)
     labels = [_stage(run, drive, strongest) for run in runs]
-    frequencies = sorted(own["frequency"] for own in labels if own["stage"] == "free")
+    frequencies = sorted(entry["frequency"] for entry in labels if entry["stage"] == "free")
     usual = frequencies[len(frequencies) // 2] if frequencies else 0.0
 
-    def rest(stage: str) -> list[dict[str, Any]]:
+    def unmarked(stage: str) -> list[dict[str, Any]]:
         """Return the labels of the runs of a stage that have no status."""
-        return [own for own in labels if own["stage"] == stage and "status" not in own]
+        return [entry for entry in labels if entry["stage"] == stage and "status" not in entry]
 
     def mark(status: int, stage: str, rank: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
         """Give a status to the run of a stage that ranks highest; return its labels."""
-        chosen = max(rest(stage), key=rank, default={})
-        chosen |= {"status": status} if chosen else {}
-        return chosen
+        highest_ranked: dict[str, Any] = max(unmarked(stage), key=rank, default={})
+        highest_ranked |= {"status": status} if highest_ranked else {}
+        return highest_ranked
 
-    heavy = mark(3, "weight", lambda own: (own["mass"], own["frequency"]))
+    heavy = mark(3, "weight", lambda entry: (entry["mass"], entry["frequency"]))
 
-    def lighter_and_fast(own: dict[str, Any]) -> tuple[bool, float, float]:
-        return own["mass"] < LIGHTER * heavy["mass"], own["frequency"], own["mass"]
+    def lighter_and_fast(entry: dict[str, Any]) -> tuple[bool, float, float]:
+        return (entry["mass"] < LIGHTER * heavy["mass"], entry["frequency"], entry["mass"])
 
     mark(2, "weight", lighter_and_fast)
-    mark(1, "free", lambda own: -abs(own["frequency"] - usual))
-    mark(VARYING, "pulls", lambda own: own["hand"])
+    mark(1, "free", lambda entry: -abs(entry["frequency"] - usual))
+    mark(VARYING, "pulls", lambda entry: entry["hand"])
 
-    train = [own for own in labels if own["stage"] == "free" or own.get("status") in (2, 3)]
-    train += rest("random")[:-1]
-    train += sorted(rest("pulls"), key=lambda own: abs(own["frequency"] - usual))[:1]
-    ids = {id(own) for own in train}
-    return [Labels("train" if id(own) in ids else "test", own) for own in labels]
+    train = [entry for entry in labels if entry["stage"] == "free" or entry.get("status") in (2, 3)]
+    train += unmarked("random")[:-1]
+    train += sorted(unmarked("pulls"), key=lambda entry: abs(entry["frequency"] - usual))[:1]
+    ids = {id(entry) for entry in train}
+    return [Labels("train" if id(entry) in ids else "test", entry) for entry in labels]
 
 
 def _stage(run: Features, drive: str, strongest: float) -> dict[str, Any]:
     """Return the labels of a run by what moves in it; ``strongest`` is the largest force of all [N]."""
     u, force = run.recording[drive], run.recording["force"]
     level = float(np.median(u[len(u) // 2 :]))
-    varying = np.flatnonzero(np.abs(u - level) > STILL * run.spans[drive])
-    start = 0 if not varying.size else int(varying[-1]) + 1
+    last_changes = np.flatnonzero(np.abs(u - level) > STILL * run.spans[drive])
+    start = 0 if not last_changes.size else int(last_changes[-1]) + 1
     if start < len(u) // 2 and run.moves("force"):
-        pulled = np.abs(force[start:] - force[start]) > STILL * run.spans["force"]
-        start += int(np.argmax(pulled))
+        is_pulled = np.abs(force[start:] - force[start]) > STILL * run.spans["force"]
+        start += int(np.argmax(is_pulled))
         return {"stage": "held", "level": round(level, 2), "start": start * run.recording.step}
     if not run.regular(drive):
         return {"stage": "random"}

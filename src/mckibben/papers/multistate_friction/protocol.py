@@ -129,19 +129,25 @@ def _time(duration: float) -> Array:
 
 def recognised(runs: Sequence[Features]) -> list[Labels]:
     """Return stages by what moves; the friction is identified at two thirds of the highest pressure."""
-    isometric = [one.moved("pressure") > one.moved("length") for one in runs]
-    held = ["length" if length_held else "pressure" for length_held in isometric]
-    levels = [one.level(channel) for one, channel in zip(runs, held, strict=True)]
-    cycled = [k for k, one in enumerate(runs) if not isometric[k] and one.regular("length")]
+    isometric = [run.moved("pressure") > run.moved("length") for run in runs]
+    held_channels = ["length" if length_held else "pressure" for length_held in isometric]
+    levels = [run.level(channel) for run, channel in zip(runs, held_channels, strict=True)]
+    cycled = [k for k, run in enumerate(runs) if not isometric[k] and run.regular("length")]
     target = IDENTIFIED_AT / HIGHEST * max((levels[k] for k in cycled), default=0.0)
-    chosen = min(cycled, key=lambda k: abs(levels[k] - target), default=None)
+    training = min(cycled, key=lambda k: abs(levels[k] - target), default=None)
     tolerance = {channel: 0.02 * span for channel, span in runs[0].spans.items()}
-    found: list[Labels] = []
-    for k, (length_held, channel) in enumerate(zip(isometric, held, strict=True)):
-        alike = [level for level, other in zip(levels, held, strict=True) if other == channel]
-        level = dict(zip(alike, grouped(alike, tolerance[channel]), strict=True))[levels[k]]
-        role: Role = "train" if length_held or k == chosen else "test"
-        found.append(
+    labels: list[Labels] = []
+    for k, (length_held, channel) in enumerate(zip(isometric, held_channels, strict=True)):
+        similar_levels = [
+            level
+            for level, other_channel in zip(levels, held_channels, strict=True)
+            if other_channel == channel
+        ]
+        level = dict(zip(similar_levels, grouped(similar_levels, tolerance[channel]), strict=True))[
+            levels[k]
+        ]
+        role: Role = "train" if length_held or k == training else "test"
+        labels.append(
             Labels(role, {"stage": "static" if length_held else "friction", channel: level})
         )
-    return found
+    return labels

@@ -77,43 +77,44 @@ def run(experiment: Experiment) -> None:
     """Record isometric and isobaric runs, and identify force laws and friction."""
     runs = experiment.record(until=0.4, loops=0.75)
     isometric = runs.select(stage="static")
-    experiment.tell(0.42, "static laws")
-    found = _hysteresis(runs, _static_laws(experiment, isometric))
+    experiment.report(0.42, "static laws")
+    isobaric = _hysteresis(runs, _static_laws(experiment, isometric))
     for model, name in experiment.steps(0.45, 0.65, [*CLOSED.items()]):
-        of, settings = MODELS[model]
-        fewer = {"n_refined": 4} if experiment.quick and model in FRICTIONS else {}
-        closed = settings | FROM_FIRST_SAMPLE | fewer
-        found.fitted[name] = experiment.fit(name, of, found.loop, closed)
-        whole, rested = found.runs[found.chosen], closed | {"initial": "virgin"}
-        found.fitted[model] = experiment.fit(model, of, whole, rested)
-    _errors(experiment, found)
-    experiment.tell(0.65, "how far parameters are determined")
+        model_name, settings = MODELS[model]
+        quick_settings = {"n_refined": 4} if experiment.quick and model in FRICTIONS else {}
+        loop_settings = settings | FROM_FIRST_SAMPLE | quick_settings
+        isobaric.fitted[name] = experiment.fit(name, model_name, isobaric.loop, loop_settings)
+        run_at_level = isobaric.runs[isobaric.chosen]
+        rest_settings = loop_settings | {"initial": "virgin"}
+        isobaric.fitted[model] = experiment.fit(model, model_name, run_at_level, rest_settings)
+    _errors(experiment, isobaric)
+    experiment.report(0.65, "how far parameters are determined")
     for key, model in (("friction", PAPERS), ("friction_ours", OURS))[: 2 - experiment.quick]:
-        _parameters(experiment, key, model, found)
-    _figures(experiment, isometric, found)
-    _feedforward(experiment, found)
+        _parameters(experiment, key, model, isobaric)
+    _figures(experiment, isometric, isobaric)
+    _feedforward(experiment, isobaric)
 
 
 def _static_laws(experiment: Experiment, isometric: Sequence[Recording]) -> PolynomialForce:
     """Add errors of force laws on the isometric runs, and coefficients and forces of the paper's."""
     rows: dict[str, list[Cell]] = {}
-    measured = np.concatenate([one["force"] for one in isometric])
+    measured = np.concatenate([run["force"] for run in isometric])
     others = ("force-chou", "force-tondu", "force-petrovic", "force-minh", "force-schindele")
     for name in (LAW, *others)[: 1 if experiment.quick else None]:
         fit = experiment.fit(name, name, isometric)
-        modelled = np.concatenate([experiment.simulate(name, one)["force"] for one in isometric])
+        modelled = np.concatenate([experiment.simulate(name, run)["force"] for run in isometric])
         rows[full_name(name)] = [fit.rmse, score(measured, modelled).r2, fit.block.n_parameters]
     experiment.table("laws", ["RMSE [N]", "r²", "parameters"], rows)
     law = experiment.models[LAW]
     assert isinstance(law, PolynomialForce)
-    top = max(float(one["pressure"].max()) for one in isometric)
-    held = [round(float(one["length"].mean())) for one in isometric]
+    top = max(float(run["pressure"].max()) for run in isometric)
+    lengths = [round(float(run["length"].mean())) for run in isometric]
     names = ("a_1 [N/bar]", "a_3 [N/(bar mm)]", "a_0 [N]", "a_2 [N/mm]", "a_4 [N/mm^2]")
-    both = [experiment.paper.printed("multistate-static-force"), law.unscaled()]
-    cells = sorted(zip(names, *(one.pack().tolist() for one in both), strict=True))
+    laws = [experiment.paper.printed("multistate-static-force"), law.unscaled()]
+    cells = sorted(zip(names, *(each.pack().tolist() for each in laws), strict=True))
     for bar in sorted({float(f"{share * top:.2g}") for share in (1 / 6, 2 / 3, 1.0)}):
-        for length in (min(held), max(held)):
-            forces = [float(np.dot((bar, 1.0), one.terms(np.array(length)))) for one in both]
+        for length in (min(lengths), max(lengths)):
+            forces = [float(np.dot((bar, 1.0), each.terms(np.array(length)))) for each in laws]
             cells.append((f"force at {length} mm, {bar:g} bar [N]", *forces))
     experiment.table("static", ["printed", "here"], cells)
     return law
@@ -124,93 +125,101 @@ def _hysteresis(runs: Runs, law: PolynomialForce) -> Hysteresis:
     (chosen,) = runs.names("train", stage="friction")
     names = runs.names(stage="friction")
     names.sort(key=lambda name: (runs.of(name, "pressure"), name != chosen))
-    rest = float(runs[chosen]["length"][0])
-    found: dict[str, Recording] = {}
-    for name, left in zip(names, extract_hysteresis([runs[n] for n in names], law), strict=True):
-        bar, elongation = f"{runs.of(name, 'pressure'):.3g} bar", left["length"] - rest
-        title = name if bar in found else bar
-        found[title] = left.with_channels({ELONGATION: "mm"}, **{ELONGATION: elongation})
+    start = float(runs[chosen]["length"][0])
+    residuals: dict[str, Recording] = {}
+    for name, residual in zip(
+        names, extract_hysteresis([runs[n] for n in names], law), strict=True
+    ):
+        bar, elongation = f"{runs.of(name, 'pressure'):.3g} bar", residual["length"] - start
+        title = name if bar in residuals else bar
+        residuals[title] = residual.with_channels({ELONGATION: "mm"}, **{ELONGATION: elongation})
     title = f"{(level := float(runs.of(chosen, 'pressure'))):.3g} bar"
     # the first cycle begins at rest; from its end on the loop is closed
-    whole, begun = found[title], cycles(-found[title]["length"])
-    loop = whole.slice(begun[0].stop - 1, len(whole)) if len(begun) > 1 else whole
-    return Hysteresis(law, found, title, level, loop, [one for one in found if one != title], {})
+    free, parts = residuals[title], cycles(-residuals[title]["length"])
+    loop = free.slice(parts[0].stop - 1, len(free)) if len(parts) > 1 else free
+    return Hysteresis(
+        law, residuals, title, level, loop, [other for other in residuals if other != title], {}
+    )
 
 
-def _errors(experiment: Experiment, found: Hysteresis) -> None:
+def _errors(experiment: Experiment, isobaric: Hysteresis) -> None:
     """Add the errors of all models on the loop they are fitted to, and on all loops, best first."""
     rows: dict[str, list[Cell]] = {}
-    errors = {STATIC: {title: rms(one[HYSTERESIS]) for title, one in found.runs.items()}}
+    errors = {STATIC: {title: rms(run[HYSTERESIS]) for title, run in isobaric.runs.items()}}
     for model, name in CLOSED.items():
-        modelled = experiment.simulate(name, found.loop)[HYSTERESIS]
-        r2, fit = score(found.loop[HYSTERESIS], modelled).r2, found.fitted[name]
-        rows[model] = [fit.n_free, fit.rmse, r2]
-        free = {title: experiment.simulate(model, one) for title, one in found.runs.items()}
+        modelled = experiment.simulate(name, isobaric.loop)[HYSTERESIS]
+        r2, fitted = score(isobaric.loop[HYSTERESIS], modelled).r2, isobaric.fitted[name]
+        rows[model] = [fitted.n_free, fitted.rmse, r2]
+        free_runs = {title: experiment.simulate(model, run) for title, run in isobaric.runs.items()}
         errors[model] = {
-            title: rms(free[title][HYSTERESIS] - one[HYSTERESIS])
-            for title, one in found.runs.items()
+            title: rms(free_runs[title][HYSTERESIS] - run[HYSTERESIS])
+            for title, run in isobaric.runs.items()
         }
-    experiment.table("closed", ["parameters", "RMSE [N]", "r²"], rows, at=found.chosen)
-    left = {model: found.fitted[name].rmse for model, name in CLOSED.items()}
-    closer = sum(own < min(left[PAPERS], left[OURS]) for own in left.values())
+    experiment.table("closed", ["parameters", "RMSE [N]", "r²"], rows, at=isobaric.chosen)
+    loop_rmse = {model: isobaric.fitted[name].rmse for model, name in CLOSED.items()}
+    closer = sum(rmse < min(loop_rmse[PAPERS], loop_rmse[OURS]) for rmse in loop_rmse.values())
     r2s = {model: cells[-1] for model, cells in rows.items()}
-    eleven_do = Verdict(left[PAPERS] < NEAR * left[EIGHTEEN])
-    experiment.says(left=left, r2=r2s, closer=closer, n=len(left), eleven_do=eleven_do)
+    eleven_do = Verdict(loop_rmse[PAPERS] < NEAR * loop_rmse[EIGHTEEN])
+    experiment.add_facts(
+        left=loop_rmse, r2=r2s, closer=closer, n=len(loop_rmse), eleven_do=eleven_do
+    )
     worst: dict[str, float] = {
-        model: max((own[t] / errors[STATIC][t] for t in found.unused), default=math.nan)
-        for model, own in errors.items()
+        model: max((rms_by_title[t] / errors[STATIC][t] for t in isobaric.unused), default=math.nan)
+        for model, rms_by_title in errors.items()
     }
-    every = {
-        n: [rows.get(n, [None])[0], *errors[n].values(), worst[n] if found.unused else None]
+    rows_by_error = {
+        n: [rows.get(n, [None])[0], *errors[n].values(), worst[n] if isobaric.unused else None]
         for n in (STATIC, *sorted(MODELS, key=lambda model: worst[model]))
     }
-    columns = ["parameters", *found.runs, "at most, of the static law's"]
-    experiment.table("loops", columns, every, at=found.chosen)
-    if found.unused:
-        better = sum(own < min(worst[PAPERS], worst[OURS]) for own in worst.values())
-        won = sum(errors[EIGHTEEN][title] < errors[PAPERS][title] for title in found.unused)
-        experiment.says(worst=worst, better=better, won=won, unused=len(found.unused))
+    columns = ["parameters", *isobaric.runs, "at most, of the static law's"]
+    experiment.table("loops", columns, rows_by_error, at=isobaric.chosen)
+    if isobaric.unused:
+        better = sum(ratio < min(worst[PAPERS], worst[OURS]) for ratio in worst.values())
+        n_won = sum(errors[EIGHTEEN][title] < errors[PAPERS][title] for title in isobaric.unused)
+        experiment.add_facts(worst=worst, better=better, won=n_won, unused=len(isobaric.unused))
 
 
-def _parameters(experiment: Experiment, key: str, model: str, found: Hysteresis) -> None:
+def _parameters(experiment: Experiment, key: str, model: str, isobaric: Hysteresis) -> None:
     """Add the parameters of a friction model fitted to the closed loop, with standard errors."""
-    fitted = found.fitted[CLOSED[model]]
+    fitted = isobaric.fitted[CLOSED[model]]
     assert isinstance(fitted.block, MultistateFriction)
     friction, order = fitted.block.by_strength()
     errors = np.array(fitted.standard_errors)[order].tolist()
     printed = experiment.paper.printed("multistate-friction").values
-    theirs = printed if model == PAPERS else [math.nan] * len(order)
+    printed_values = printed if model == PAPERS else [math.nan] * len(order)
     rows: dict[str, list[Cell]] = {
-        name: [None if math.isnan(x) else x for x in numbers]
+        name: [None if math.isnan(value) else value for value in numbers]
         for name, *numbers in zip(
-            friction.parameter_names, theirs, friction.values, errors, strict=True
+            friction.parameter_names, printed_values, friction.values, errors, strict=True
         )
     }
-    experiment.table(key, ["printed", "here", "standard error"], rows, at=found.chosen)
+    experiment.table(key, ["printed", "here", "standard error"], rows, at=isobaric.chosen)
 
 
-def _figures(experiment: Experiment, isometric: Sequence[Recording], found: Hysteresis) -> None:
+def _figures(experiment: Experiment, isometric: Sequence[Recording], isobaric: Hysteresis) -> None:
     """Add the runs, the extracted hysteresis, and the residuals of models."""
-    length, extracted = found.loop["length"], found.loop[HYSTERESIS]
-    modelled = {n: experiment.simulate(CLOSED[n], found.loop)[HYSTERESIS] for n in FRICTIONS}
-    held = {f"{one['length'].mean():.0f} mm": one for one in isometric}
-    forces = {title: (one["pressure"], one["force"]) for title, one in held.items()}
+    length, extracted = isobaric.loop["length"], isobaric.loop[HYSTERESIS]
+    modelled = {n: experiment.simulate(CLOSED[n], isobaric.loop)[HYSTERESIS] for n in FRICTIONS}
+    by_length = {f"{run['length'].mean():.0f} mm": run for run in isometric}
+    forces = {title: (run["pressure"], run["force"]) for title, run in by_length.items()}
     laws: dict[str, Curves] = {}
-    for title in [*held][:: max(1, (len(held) - 1) // 2)]:
-        law = held[title]["pressure"], experiment.simulate(LAW, held[title])["force"]
-        laws[title] = {held[title].origin: forces[title], "static law": law}
-    searched = {name: found.fitted[CLOSED[name]].search for name in (PAPERS, EIGHTEEN)}
+    for title in [*by_length][:: max(1, (len(by_length) - 1) // 2)]:
+        law = by_length[title]["pressure"], experiment.simulate(LAW, by_length[title])["force"]
+        laws[title] = {by_length[title].origin: forces[title], "static law": law}
+    searched = {name: isobaric.fitted[CLOSED[name]].search for name in (PAPERS, EIGHTEEN)}
     costs = {name: np.minimum.accumulate(search) for name, search in searched.items()}
     steps = {name: np.cumsum(np.full(cost.size, EVERY)) for name, cost in costs.items()}
     stairs = {n: (np.repeat(steps[n], 2)[1:], np.repeat(cost, 2)[:-1]) for n, cost in costs.items()}
-    experiment.says(near={n: steps[n][np.argmax(c < NEAR * c.min())] for n, c in costs.items()})
-    total: dict[str, Curves] = {}
-    for title, one in ((title, found.runs[title]) for title in found.unused):
-        x, static = one["length"], one["force"] - one[HYSTERESIS]
-        total[title] = {one.origin: (x, one["force"]), STATIC: (x, static)} | {
-            n: (x, static + experiment.simulate(n, one)[HYSTERESIS]) for n in (PAPERS, OURS)
+    experiment.add_facts(
+        near={n: steps[n][np.argmax(c < NEAR * c.min())] for n, c in costs.items()}
+    )
+    unused_panels: dict[str, Curves] = {}
+    for title, run in ((title, isobaric.runs[title]) for title in isobaric.unused):
+        x, static = run["length"], run["force"] - run[HYSTERESIS]
+        unused_panels[title] = {run.origin: (x, run["force"]), STATIC: (x, static)} | {
+            n: (x, static + experiment.simulate(n, run)[HYSTERESIS]) for n in (PAPERS, OURS)
         }
-    loops = {n: (r["length"], r["force"]) for n, r in found.runs.items() if n.endswith(" bar")}
+    loops = {n: (r["length"], r["force"]) for n, r in isobaric.runs.items() if n.endswith(" bar")}
     experiment.figure("isobaric", {"": loops})
     experiment.figure("isometric", {"": dict([*forces.items()][:: -(-len(forces) // 6)])})
     experiment.figure("law", laws)
@@ -218,47 +227,51 @@ def _figures(experiment: Experiment, isometric: Sequence[Recording], found: Hyst
     experiment.figure("loop", {"": of_loop})
     experiment.figure("search", {name: {"": stair} for name, stair in stairs.items()})
     last = cycles(-length)[-1]
-    left = {n: (length[last], (force - extracted)[last]) for n, force in modelled.items()}
-    experiment.figure("left", {"": left})
-    experiment.figure("unused", total)
+    last_residuals = {n: (length[last], (force - extracted)[last]) for n, force in modelled.items()}
+    experiment.figure("left", {"": last_residuals})
+    experiment.figure("unused", unused_panels)
 
 
 STROKE, APPROACH, SWINGING = 0.8, 10.0, 7.0
 """Imposed motion, by that of the loop; time to the first force, and period of the sine [s]."""
 
 
-def _feedforward(experiment: Experiment, found: Hysteresis) -> None:
+def _feedforward(experiment: Experiment, isobaric: Hysteresis) -> None:
     """Add forces tracked on the rig without feedback; references are ours, as the paper has none."""
     if experiment.rig is None:
         return
-    law, (n, turns) = found.law, (1, 5) if experiment.quick else (3, 9)
-    time = np.arange(round(10.0 * (turns - 1) / SAMPLE_TIME) + 1) * SAMPLE_TIME
-    stroke = STROKE * float(np.ptp(found.loop["length"]))
-    length = found.loop["length"].max() - irregular_triangle(time, turns, stroke, seed=7)
-    static = [float((one["force"] - one[HYSTERESIS]).max()) for one in found.runs.values()]
-    held = float(f"{max(static) / 4:.2g}")
+    law, (n_references, n_turns) = isobaric.law, (1, 5) if experiment.quick else (3, 9)
+    time = np.arange(round(10.0 * (n_turns - 1) / SAMPLE_TIME) + 1) * SAMPLE_TIME
+    stroke = STROKE * float(np.ptp(isobaric.loop["length"]))
+    length = isobaric.loop["length"].max() - irregular_triangle(time, n_turns, stroke, seed=7)
+    static = [float((run["force"] - run[HYSTERESIS]).max()) for run in isobaric.runs.values()]
+    level = float(f"{max(static) / 4:.2g}")
     references = {
-        f"static law at {found.chosen}": np.dot((found.bar, 1.0), law.terms(length)),
-        f"{held:.0f} N": np.full(time.size, held),
-        f"{held:.0f} N ± {held / 3:.0f} N": held * (1 + np.sin(2 * np.pi * time / SWINGING) / 3),
+        f"static law at {isobaric.chosen}": np.dot((isobaric.bar, 1.0), law.terms(length)),
+        f"{level:.0f} N": np.full(time.size, level),
+        f"{level:.0f} N ± {level / 3:.0f} N": level * (1 + np.sin(2 * np.pi * time / SWINGING) / 3),
     }
-    ways = {STATIC: ForceFeedforward(law)}
-    for name in FRICTIONS[: max(n, 2)]:
+    inverses = {STATIC: ForceFeedforward(law)}
+    for name in FRICTIONS[: max(n_references, 2)]:
         friction: Any = experiment.models[name]
-        ways[name] = ForceFeedforward(law, replace(friction, output=law.outputs[0]))
+        inverses[name] = ForceFeedforward(law, replace(friction, output=law.outputs[0]))
     rows: list[list[Cell]] = []
     panels: dict[str, dict[str, tuple[Array, Array]]] = {}
-    for title, force in [*references.items()][:n]:
+    for title, force in [*references.items()][:n_references]:
         reference = Recording({"force": force, "length": length}, SAMPLE_TIME)
         panels[title] = {"reference": (length, force)}
-        for name, way in ways.items():
-            experiment.tell(0.75 + len(rows) / 48, f"feedforward of {title}")
-            done = track(way, experiment.rig, reference, approach=APPROACH, seed=experiment.seed)
-            missed = done.rmse["force"], done.largest["force"], float(done.clipped)
-            rows.append([title, name, *missed])
-            last = done.recording.slice(len(done.recording) - time.size, len(done.recording))
+        for name, inverse in inverses.items():
+            experiment.report(0.75 + len(rows) / 48, f"feedforward of {title}")
+            tracked = track(
+                inverse, experiment.rig, reference, approach=APPROACH, seed=experiment.seed
+            )
+            errors = tracked.rmse["force"], tracked.largest["force"], float(tracked.clipped)
+            rows.append([title, name, *errors])
+            last = tracked.recording.slice(
+                len(tracked.recording) - time.size, len(tracked.recording)
+            )
             panels[title][name] = last["length"], last["force"]
     columns = ["compensated by", "RMSE [N]", "largest [N]", "steps at a limit"]
-    experiment.table("feedforward", columns, rows, stroke=stroke, at=found.chosen)
+    experiment.table("feedforward", columns, rows, stroke=stroke, at=isobaric.chosen)
     experiment.figure("feedforward", dict([*panels.items()][:2]))
-    experiment.says(tracked={str(row[1]): row[2] for row in rows[: len(ways)]})
+    experiment.add_facts(tracked={str(row[1]): row[2] for row in rows[: len(inverses)]})

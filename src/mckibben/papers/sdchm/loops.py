@@ -71,7 +71,7 @@ class Task(NamedTuple):
         return (self.reference.duration or 0.0) / 3
 
 
-def held(
+def single_task(
     outputs: Sequence[str], moving: str, time: Array, p0: float, scale: float = 1.0, f: float = F
 ) -> Task:
     """Return a task that moves one output, as in Table 5 or at another frequency."""
@@ -100,7 +100,7 @@ def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
     panels: dict[str, Curves] = {}
     for key in (key for key in tasks if key not in beyond):
         of_task = {name: results[key, name] for name in laws}
-        shown = _shown(experiment, key, tasks[key], of_task)
+        shown = _add_task(experiment, key, tasks[key], of_task)
         panels |= shown if key in table_5 else {}
     experiment.figure("tracking", panels)
 
@@ -110,17 +110,17 @@ def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
         experiment.table("beyond", beyond, rows, **tasks["tracking_1"].facts)
     worst_of_law = {name: max(worst[key, name] for key in table_5) for name in laws}
     tracking = ", ".join(f"{name} {rmse:.2f} mm" for name, rmse in worst_of_law.items())
-    experiment.says(tracking=tracking)
+    experiment.add_facts(tracking=tracking)
     _table_5(experiment, [{n: [*results[key, n].rmse.values()] for n in laws} for key in table_5])
     step_time = results["task", SDIHC_OURS].step_time[0]  # [s]
-    experiment.says(moved=", ".join(key[-1] for key in table_5), step=1e6 * step_time)
+    experiment.add_facts(moved=", ".join(key[-1] for key in table_5), step=1e6 * step_time)
 
 
 def _levels(rig: Rig, runs: Runs) -> list[float]:
     """Return pressures of the extensor for PID, Table 5 and Figure 13, within those recorded [bar]."""
     recorded = [float(run[EXTENSOR].mean()) for run in runs.values()]
-    wanted = np.array([1.0, *(p0 for _, p0 in MOVES), TASK_LEVEL]) * share(rig, EXTENSOR, HIGHEST)
-    clipped: list[float] = np.clip(wanted, min(recorded), max(recorded)).tolist()
+    levels = np.array([1.0, *(p0 for _, p0 in MOVES), TASK_LEVEL]) * share(rig, EXTENSOR, HIGHEST)
+    clipped: list[float] = np.clip(levels, min(recorded), max(recorded)).tolist()
     return clipped
 
 
@@ -138,7 +138,7 @@ def _tasks(
 
     t = times((1.5 if experiment.quick else 3) * PERIOD)
     moving = zip(outputs[: 1 if experiment.quick else len(MOVES)], moving_levels, strict=False)
-    tasks = {f"tracking_{y[-1]}": held(outputs, y, t, p0, scale) for y, p0 in moving}
+    tasks = {f"tracking_{y[-1]}": single_task(outputs, y, t, p0, scale) for y, p0 in moving}
 
     wave = scale * np.abs(AMPLITUDE * np.sin(2 * np.pi * F * t) + OFFSET)
     channels = dict.fromkeys(outputs, wave) | {EXTENSOR: np.full(wave.size, task_level)}
@@ -148,7 +148,7 @@ def _tasks(
     for frequency, mass in () if experiment.quick else BEYOND:
         load, longer = strength(rig) * mass, times(max(40.0, 2 / frequency))
         key = f"{frequency:g} Hz" + (f", {load:.2g} kg" if load else "")
-        task = held(outputs, outputs[0], longer, moving_levels[0], scale, frequency)
+        task = single_task(outputs, outputs[0], longer, moving_levels[0], scale, frequency)
         tasks[key] = task._replace(load=load)
     return tasks
 
@@ -181,7 +181,7 @@ def _table_5(experiment: Experiment, tracked: Sequence[Mapping[str, Sequence[flo
     }
     closer = {name: int(np.sum(np.less(rmse[SDIHC], rmse[name]))) for name in (SINGLE, PID)}
     n = len(rmse[SDIHC])
-    experiment.says(
+    experiment.add_facts(
         table_5=", ".join(f"{name} {max(errors):.2f} mm" for name, errors in rmse.items()),
         table_5_printed=", ".join(f"{value:.2f} mm" for value in printed.values()),
         table_5_closer=closer,
@@ -198,13 +198,13 @@ def compensators(experiment: Experiment, runs: Runs) -> dict[str, Block]:
     search = Search("pso", samples, swarm, experiment.seed)
     patterns = runs.select("train", stage="network") or runs.select("train", stage="hysteresis")
 
-    def learned() -> Series:
+    def train_inverse() -> Series:
         return learned_inverse(models[PUBLISHED], patterns, search=search)
 
     individual: Any = models[INDIVIDUAL]
     return {
-        SDIHC: experiment.kept.once(
-            "learned inverse", Series, learned, models[PUBLISHED], patterns, search
+        SDIHC: experiment.checkpoints.once(
+            "learned inverse", Series, train_inverse, models[PUBLISHED], patterns, search
         ),
         SINGLE: individual.parts[0].inverse(),
         SDIHC_OURS: models[OURS].inverse(),
@@ -235,7 +235,7 @@ def widths(recording: Recording, moving: str, outputs: Sequence[str]) -> dict[st
     return percentages
 
 
-def _shown(
+def _add_task(
     experiment: Experiment, key: str, task: Task, results: Mapping[str, Tracked]
 ) -> dict[str, Curves]:
     """Add the table of a task, and of several moving outputs its figure; return the panels.
@@ -246,24 +246,24 @@ def _shown(
     lines: dict[str, list[Cell]] = {name: [*cells.values()] for name, cells in rows.items()}
     experiment.table(key, [*next(iter(rows.values()))], lines, **task.facts)
 
-    alone, moving = len(task.moving) == 1, task.moving[0]
+    is_single, moving = len(task.moving) == 1, task.moving[0]
     panels: dict[str, dict[str, tuple[Array, Array]]] = {}
     for name, tracked in [*results.items()][:DRAWN]:
-        shown = _scored(task, tracked)
-        if alone:
-            shown = shown.slice(len(shown) - round(PERIOD / shown.step), len(shown))
-        x = shown[REFERENCE + moving] if alone else shown.time
+        scored = _scored(task, tracked)
+        if is_single:
+            scored = scored.slice(len(scored) - round(PERIOD / scored.step), len(scored))
+        x = scored[REFERENCE + moving] if is_single else scored.time
         for y in tracked.rmse:
-            title = f"y{moving[-1]} moves: y{y[-1]}" if alone else f"y{y[-1]}"
-            panels.setdefault(title, {"reference": (x, shown[REFERENCE + y])})
-            panels[title][name] = x, shown[y]
+            title = f"y{moving[-1]} moves: y{y[-1]}" if is_single else f"y{y[-1]}"
+            panels.setdefault(title, {"reference": (x, scored[REFERENCE + y])})
+            panels[title][name] = x, scored[y]
 
-    if not alone:
+    if not is_single:
         experiment.figure(key, panels)
         printed = [experiment.paper.tables[key].printed[end][SDIHC] for end in ENDS]
         steady = [rows[SDIHC][end] for end in ENDS]
         within = Verdict(printed[0] <= steady[0] and steady[1] <= printed[1])
-        experiment.says(steady=steady, steady_printed=printed, steady_within=within)
+        experiment.add_facts(steady=steady, steady_printed=printed, steady_within=within)
     return dict(panels)
 
 

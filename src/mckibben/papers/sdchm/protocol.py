@@ -113,22 +113,22 @@ def _scaled(run: PlannedRun, of_muscles: float, of_extensor: float) -> PlannedRu
 
 def strength(rig: Rig) -> float:
     """Return the force of an arm's muscles by that of the paper's: pressure by cross-section."""
-    wide = rig.muscle.diameter / DIAMETER if isinstance(rig, Arm) else 1.0
-    return share(rig, "pressure_1", HIGHEST) * wide**2
+    diameter_ratio = rig.muscle.diameter / DIAMETER if isinstance(rig, Arm) else 1.0
+    return share(rig, "pressure_1", HIGHEST) * diameter_ratio**2
 
 
 def quick(rig: Rig | None = None) -> tuple[Protocol, list[str]]:
     """Return the protocol with shortened runs, and the names of the runs of a quick run."""
-    whole = sdchm(rig)
-    names = [run.name for run in whole.runs if run.name.startswith(QUICK_RUNS)]
-    return replace(whole, name="sdchm-quick", runs=tuple(map(_shortened, whole.runs))), names
+    protocol = sdchm(rig)
+    names = [run.name for run in protocol.runs if run.name.startswith(QUICK_RUNS)]
+    return replace(protocol, name="sdchm-quick", runs=tuple(map(_shortened, protocol.runs))), names
 
 
 def _shortened(run: PlannedRun) -> PlannedRun:
     stage, inputs = run.labels["stage"], run.inputs
     n = round(QUICK.get(stage, 1.0) * PERIOD / inputs.step)
-    part = inputs.slice(0, n) if stage == "joint" else inputs.slice(len(inputs) - n, len(inputs))
-    return replace(run, inputs=replace(part, start_time=0.0))
+    piece = inputs.slice(0, n) if stage == "joint" else inputs.slice(len(inputs) - n, len(inputs))
+    return replace(run, inputs=replace(piece, start_time=0.0))
 
 
 def _sines(stage: str, role: Role, driven: str, p0: float, peaks: Sequence[float]) -> PlannedRun:
@@ -170,47 +170,51 @@ def recognised(runs: Sequence[Features]) -> list[Labels]:
     if not muscles:
         remedy = "name the columns of its muscles with `columns[pressure_1]=COLUMN` and so on"
         raise DataError("no muscle beside the extensor has a pressure", remedy=remedy)
-    highest = max(float(np.percentile(one.recording[name], 99)) for one in runs for name in muscles)
-    apart = SAME * highest
-    levels = grouped([one.level(EXTENSOR) for one in runs], apart)
-    labels = [_moving(one, muscles, p0, apart) for one, p0 in zip(runs, levels, strict=True)]
-    single = [own for own in labels if own["stage"] == "single"]
-    peaks = grouped([own["peaks"][0] for own in single], apart)
-    for own, peak in zip(single, peaks, strict=True):
-        own["peaks"] = [peak]
-    for own in single:
-        weak = own["peaks"][0] < max(peaks)
-        alone = {len(each["driven"]) for each in single if each["peaks"] == own["peaks"]} == {1}
-        own["stage"] = "stiffness" if weak and alone else "coupling" if weak else "prediction"
-    roles = _roles({own["p0"] for own in labels if own["stage"] == "network"}, max(levels))
-    joint = [k for k, own in enumerate(labels) if own["stage"] == "joint"]
-    found: list[Labels] = []
-    for k, (one, own) in enumerate(zip(runs, labels, strict=True)):
-        alike = [j for j in joint if labels[j].get("extensor") == own.get("extensor")]
-        role: Role = "train" if own["stage"] == "hysteresis" else "test"
-        role = roles[own["p0"]] if own["stage"] == "network" else role
-        if k in joint:  # which are all alike: the last third tests
-            later = alike[::-1].index(k) / len(alike)
-            role = one.hint or (
-                "test" if later < 1 / 3 else "validation" if later < 1 / 2 else "train"
+    highest = max(float(np.percentile(run.recording[name], 99)) for run in runs for name in muscles)
+    tolerance = SAME * highest
+    levels = grouped([run.level(EXTENSOR) for run in runs], tolerance)
+    labels = [_moving(run, muscles, p0, tolerance) for run, p0 in zip(runs, levels, strict=True)]
+    single_runs = [entry for entry in labels if entry["stage"] == "single"]
+    peaks = grouped([entry["peaks"][0] for entry in single_runs], tolerance)
+    for entry, peak in zip(single_runs, peaks, strict=True):
+        entry["peaks"] = [peak]
+    for entry in single_runs:
+        is_weak = entry["peaks"][0] < max(peaks)
+        is_single = {
+            len(other["driven"]) for other in single_runs if other["peaks"] == entry["peaks"]
+        } == {1}
+        entry["stage"] = (
+            "stiffness" if is_weak and is_single else "coupling" if is_weak else "prediction"
+        )
+    roles = _roles({entry["p0"] for entry in labels if entry["stage"] == "network"}, max(levels))
+    joint_runs = [k for k, entry in enumerate(labels) if entry["stage"] == "joint"]
+    result: list[Labels] = []
+    for k, (run, entry) in enumerate(zip(runs, labels, strict=True)):
+        alike = [j for j in joint_runs if labels[j].get("extensor") == entry.get("extensor")]
+        role: Role = "train" if entry["stage"] == "hysteresis" else "test"
+        role = roles[entry["p0"]] if entry["stage"] == "network" else role
+        if k in joint_runs:  # which are all alike: the last third tests
+            share_after = alike[::-1].index(k) / len(alike)
+            role = run.hint or (
+                "test" if share_after < 1 / 3 else "validation" if share_after < 1 / 2 else "train"
             )
-        found.append(Labels(role, own))
-    return found
+        result.append(Labels(role, entry))
+    return result
 
 
-def _moving(one: Features, muscles: Sequence[str], p0: float, apart: float) -> dict[str, Any]:
+def _moving(run: Features, muscles: Sequence[str], p0: float, tolerance: float) -> dict[str, Any]:
     """Return the labels of a run by the muscles that move in it."""
-    moving = [name for name in muscles if one.moves(name)]
+    moving = [name for name in muscles if run.moves(name)]
     driven = "".join(name.rpartition("_")[2] for name in moving)
     labels: dict[str, Any] = {"p0": p0, "driven": driven}
     if not moving:
         return labels | {"stage": "rest"}
-    waves = [one.recording[name] for name in moving]
-    alike = all(np.percentile(np.abs(wave - waves[0]), 90) < 2 * apart for wave in waves)
-    if one.moves(EXTENSOR) or not alike or not one.regular(moving[0]):
-        extensor = "moving" if one.moves(EXTENSOR) else "constant"
+    waves = [run.recording[name] for name in moving]
+    alike = all(np.percentile(np.abs(wave - waves[0]), 90) < 2 * tolerance for wave in waves)
+    if run.moves(EXTENSOR) or not alike or not run.regular(moving[0]):
+        extensor = "moving" if run.moves(EXTENSOR) else "constant"
         return labels | {"stage": "joint", "extensor": extensor}
-    peaks = sorted({*grouped(one.peaks(moving[0]), apart)})
+    peaks = sorted({*grouped(run.peaks(moving[0]), tolerance)})
     rising = len(peaks) > 2 and len(moving) == 1
     stage = "single" if len(peaks) == 1 else "hysteresis" if rising else "network"
     return labels | {"stage": stage, "peaks": peaks}
@@ -223,11 +227,16 @@ def _roles(levels: set[float], highest: float) -> dict[float, Role]:
     test: Role = "test"
     printed |= dict.fromkeys(VALIDATION, validation) | dict.fromkeys(TEST, test)
     scaled = {p0: p0 / (highest or 1.0) * HIGHEST for p0 in levels}
-    near = {p0: min(printed, key=lambda known: abs(known - own)) for p0, own in scaled.items()}
-    roles = {p0: printed[known] for p0, known in near.items()}
+    nearest = {
+        p0: min(printed, key=lambda printed_level: abs(printed_level - level))
+        for p0, level in scaled.items()
+    }
+    roles = {p0: printed[printed_level] for p0, printed_level in nearest.items()}
     if {*roles.values()} == {*printed.values()}:
         return roles
-    others = test, validation
-    ordered = sorted(levels)
-    ranked: dict[float, Role] = {p0: others[k // 2 % 2] for k, p0 in enumerate(ordered)}
-    return ranked | dict.fromkeys((*ordered[::2], *ordered[-1:]), "train")
+    alternating = test, validation
+    ascending = sorted(levels)
+    alternate_roles: dict[float, Role] = {
+        p0: alternating[k // 2 % 2] for k, p0 in enumerate(ascending)
+    }
+    return alternate_roles | dict.fromkeys((*ascending[::2], *ascending[-1:]), "train")

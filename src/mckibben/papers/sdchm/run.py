@@ -48,7 +48,7 @@ def run(experiment: Experiment) -> None:
     for part in (_motions, _orders, _fits, _parts, _sets, _groups):
         part(experiment, runs)
     if experiment.rig is not None:
-        experiment.tell(0.7, "closed loops")
+        experiment.report(0.7, "closed loops")
         loops.run_loops(experiment, experiment.rig, runs)
 
 
@@ -67,22 +67,22 @@ def by_group(runs: Runs, names: Sequence[str]) -> Iterator[tuple[str, str, Array
 def _width(u: Array, y: Array) -> list[Cell]:
     """Return e_w over the last cycle of a pressure [%], and the range of the output over it [mm]."""
     *_, last = cycles(u) or [slice(0, len(u))]
-    moved = float(np.ptp(y[last]))
-    return [loop_width(u[last], y[last]) if moved and cycles(u) else None, moved]
+    span = float(np.ptp(y[last]))
+    return [loop_width(u[last], y[last]) if span and cycles(u) else None, span]
 
 
 def _motions(experiment: Experiment, runs: Runs) -> None:
     """Add the motion of the arm: by pattern, Figure 4, and by the extensor's pressure, Figure 5."""
-    whole = runs.names(stage="hysteresis") + runs.names(stage="network")
-    patterns, alone = (runs.names(stage=key) or whole for key in ("coupling", "stiffness"))
+    all_names = runs.names(stage="hysteresis") + runs.names(stage="network")
+    patterns, alone = (runs.names(stage=key) or all_names for key in ("coupling", "stiffness"))
     levels = sorted({float(runs.of(name, "p0")) for name in patterns})
     middle, first = levels[len(levels) // 2], min(runs.of(name, "driven") for name in alone)
-    chosen = {
+    names_by_table = {
         "coupling": [name for name in patterns if runs.of(name, "p0") == middle],
         "stiffness": [name for name in alone if runs.of(name, "driven") == first],
     }
     widths: list[float] = []
-    for key, names in chosen.items():
+    for key, names in names_by_table.items():
         rows: dict[str, list[Cell]] = {}
         panels: Panels = {}
         for name, group, u, recording, output in by_group(runs, names):
@@ -95,7 +95,7 @@ def _motions(experiment: Experiment, runs: Runs) -> None:
         experiment.table(key, ["e_w [%]", "range [mm]"], rows, p0=middle, driven=first[0])
         experiment.figure(key, panels)
     if widths:
-        experiment.says(narrowest=min(widths), widest=max(widths))
+        experiment.add_facts(narrowest=min(widths), widest=max(widths))
 
 
 def _orders(experiment: Experiment, runs: Runs) -> None:
@@ -106,8 +106,8 @@ def _orders(experiment: Experiment, runs: Runs) -> None:
     for n in (10,) if experiment.quick else SIZES:
         for settings in (PAPERS, {"threshold_rule": "envelope", "initial": "first_sample"}):
             y, name = f"displacement_{k}", f"GPI {n}, {settings['threshold_rule']}"
-            own = settings | {"input": f"pressure_{k}", "output": y, "n_operators": n}
-            fitted = experiment.fit(name, "gpi", recording, own)
+            gpi_settings = settings | {"input": f"pressure_{k}", "output": y, "n_operators": n}
+            fitted = experiment.fit(name, "gpi", recording, gpi_settings)
             error = err(recording[y], experiment.simulate(name, recording)[y])
             orders.setdefault(str(n), []).append(error)
         orders[str(n)].append(fitted.n_free)
@@ -135,29 +135,33 @@ def learners(short: bool) -> dict[str, tuple[str, dict[str, Any]]]:
 
 def _fits(experiment: Experiment, runs: Runs) -> None:
     """Fit all models; validation patterns stop the search for antecedents of ours."""
-    chosen, joint = learners(experiment.quick), runs.select("train", stage="joint")
-    chosen |= {name + TOO: chosen[name] for name in (OURS, BALANCE) if joint}
-    both = ("hysteresis", "network")
-    patterns = [one for stage in both for one in runs.select("train", stage=stage)]
+    models, joint = learners(experiment.quick), runs.select("train", stage="joint")
+    models |= {name + TOO: models[name] for name in (OURS, BALANCE) if joint}
+    stages = ("hysteresis", "network")
+    patterns = [run for stage in stages for run in runs.select("train", stage=stage)]
     sets = [runs.select(role, stage="network") for role in ("validation", "test")]
     rows: dict[str, list[Cell]] = {}
-    by_seed: list[list[Cell]] = []
-    for name, (model, changes) in experiment.steps(0.32, 0.7, [*chosen.items()]):
+    seed_rows: list[list[Cell]] = []
+    for name, (model, changes) in experiment.steps(0.32, 0.7, [*models.items()]):
         train = patterns + (joint if name.endswith(TOO) else [])
-        several = name in (RAW, PUBLISHED) and all(sets) and not experiment.quick
-        tried: dict[float, Fitted] = {}
-        for seed in range(experiment.seed, experiment.seed + (SEEDS if several else 1)):
+        searched = name in (RAW, PUBLISHED) and all(sets) and not experiment.quick
+        fits: dict[float, Fitted] = {}
+        for seed in range(experiment.seed, experiment.seed + (SEEDS if searched else 1)):
             label, settings = f"{name}, seed {seed}", changes | {"seed": seed}
             fitted = experiment.fit(label, model, train, settings)
-            errors = [rms(_off(experiment, label, some)) for some in sets] if several else [0.0]
-            tried[errors[0]] = fitted
-            by_seed += [[name, seed, *errors]] if several else []
-        best = tried[min(tried)]
+            errors = (
+                [rms(_output_errors(experiment, label, recordings)) for recordings in sets]
+                if searched
+                else [0.0]
+            )
+            fits[errors[0]] = fitted
+            seed_rows += [[name, seed, *errors]] if searched else []
+        best = fits[min(fits)]
         experiment.models[name] = best.block
         rows[name] = [best.seconds, best.n_free]
     experiment.table("identification", ["time [s]", "parameters"], rows)
-    if by_seed:
-        experiment.table("seeds", ["seed", "validation RMSE [mm]", "test RMSE [mm]"], by_seed)
+    if seed_rows:
+        experiment.table("seeds", ["seed", "validation RMSE [mm]", "test RMSE [mm]"], seed_rows)
 
 
 def _parts(experiment: Experiment, runs: Runs) -> None:
@@ -169,23 +173,24 @@ def _parts(experiment: Experiment, runs: Runs) -> None:
     for name in runs.names("train", stage="hysteresis"):
         recording, k = runs[name], runs.of(name, "driven")
         u, y = recording[f"pressure_{k}"], recording[f"displacement_{k}"]
-        found = np.asarray(hysteresis.parts[int(k) - 1].simulate(u))
-        panels[f"GPI {k}"] = Axes({recording.origin: (u, y), "GPI": (u, found)})
-        errors[f"GPI {k}: error"] = Axes({"error": (u, found - y)}, "error")
+        modelled = np.asarray(hysteresis.parts[int(k) - 1].simulate(u))
+        panels[f"GPI {k}"] = Axes({recording.origin: (u, y), "GPI": (u, modelled)})
+        errors[f"GPI {k}: error"] = Axes({"error": (u, modelled - y)}, "error")
     experiment.figure("hysteresis", panels | errors)
-    every = np.ndenumerate(coupling.matrix)
-    gains = {f"G{i + 1}{j + 1}": [float(gain)] for (i, j), gain in every if i != j}
+    entries = np.ndenumerate(coupling.matrix)
+    gains = {f"G{i + 1}{j + 1}": [float(gain)] for (i, j), gain in entries if i != j}
     radii = {"printed": experiment.paper.printed("sdchm-coupling").radius, "here": coupling.radius}
     experiment.table("gains", ["gain"], gains, **radii)
-    ends, converges = [f(*gains.values())[0] for f in (min, max)], Verdict(coupling.radius < 1)
-    experiment.says(gains=ends, radius=coupling.radius, converges=converges)
+    ends = [f(*gains.values())[0] for f in (min, max)]
+    converges = Verdict(coupling.radius < 1)
+    experiment.add_facts(gains=ends, radius=coupling.radius, converges=converges)
 
 
-def _off(experiment: Experiment, name: str, recordings: Sequence[Recording]) -> Array:
+def _output_errors(experiment: Experiment, name: str, runs: Sequence[Recording]) -> Array:
     """Return modelled minus measured outputs over all recordings, shape (n, outputs) [mm]."""
-    outputs = by_name(recordings)[1]
-    found = ((experiment.simulate(name, one), one) for one in recordings)
-    return np.concatenate([model.matrix(outputs) - one.matrix(outputs) for model, one in found])
+    outputs = by_name(runs)[1]
+    pairs = ((experiment.simulate(name, run), run) for run in runs)
+    return np.concatenate([model.matrix(outputs) - run.matrix(outputs) for model, run in pairs])
 
 
 def _sets(experiment: Experiment, runs: Runs) -> None:
@@ -193,41 +198,42 @@ def _sets(experiment: Experiment, runs: Runs) -> None:
     names = [name for name in PREDICTING if name in experiment.models]
     held = runs.select("validation", stage="joint") or runs.select("validation")
     best = min(
-        (OURS, BALANCE), key=lambda n: rms(_off(experiment, n, held or runs.select("train")))
+        (OURS, BALANCE),
+        key=lambda n: rms(_output_errors(experiment, n, held or runs.select("train"))),
     )
     for kind, labels in SETS.items():
         test, validation = (runs.select(role, **labels) for role in ("test", "validation"))
         if not test:
             continue
         outputs = by_name(test)[1]
-        y = np.concatenate([one.matrix(outputs) for one in test])
+        y = np.concatenate([first.matrix(outputs) for first in test])
         y = y - y.mean(axis=0)
         rows: dict[str, list[Cell]] = {}
         size: dict[str, float] = {}
         for name in names:
-            errors = _off(experiment, name, test)
-            each, size[name] = np.sqrt(np.mean(errors**2, axis=0)), rms(errors)
-            worst = float(100 * np.max(each / np.ptp(y, axis=0)))
+            errors = _output_errors(experiment, name, test)
+            rmses, size[name] = np.sqrt(np.mean(errors**2, axis=0)), rms(errors)
+            worst = float(100 * np.max(rmses / np.ptp(y, axis=0)))
             largest, share = float(np.abs(errors).max()), err(y.ravel(), (y + errors).ravel())
-            seen = rms(_off(experiment, name, validation)) if validation else None
-            rows[name] = [*each.tolist(), worst, largest, share, seen]
+            held_rmse = rms(_output_errors(experiment, name, validation)) if validation else None
+            rows[name] = [*rmses.tolist(), worst, largest, share, held_rmse]
         columns = [f"RMSE of y{output[-1]} [mm]" for output in outputs]
         columns += ["worst RMSE of range [%]", "largest error [mm]", "Err [%]"]
         levels = sorted({f"{runs.of(name, 'p0'):g}" for name in runs.names("test", **labels)})
         facts: dict[str, Any] = {"n": len(test), "samples": len(y), "levels": ", ".join(levels)}
         facts["covered"] = ", ".join(f"{span:.0f}" for span in np.ptp(y, axis=0))
         experiment.table(kind, [*columns, "validation runs, RMSE [mm]"], rows, **facts)
-        (one, *_), output = test, outputs[0]
-        curves = {n: experiment.simulate(n, one)[output] for n in (LINEAR, OURS, BALANCE)}
-        curves = {one.origin: one[output]} | curves
-        experiment.figure(kind, {str(one.name): {n: (one.time, z) for n, z in curves.items()}})
+        (first, *_), output = test, outputs[0]
+        curves = {n: experiment.simulate(n, first)[output] for n in (LINEAR, OURS, BALANCE)}
+        curves = {first.origin: first[output]} | curves
+        experiment.figure(kind, {str(first.name): {n: (first.time, z) for n, z in curves.items()}})
         failing = [f"{n} ({size[n]:.1f} mm)" for n in names if size[n] > size[LINEAR]]
         facts = {"best": size[best], "worst": rows[best][len(outputs)], "linear": size[LINEAR]}
         facts["other"] = size[BALANCE if best == OURS else OURS]
         facts["all"] = ", ".join(f"{name} {value:.2f} mm" for name, value in size.items())
         facts |= {"failing": ", ".join(failing)} if failing else {}
-        experiment.says(best=best, on="validation" if held else "training")
-        experiment.says(**{f"{kind}_{name}": value for name, value in facts.items()})
+        experiment.add_facts(best=best, on="validation" if held else "training")
+        experiment.add_facts(**{f"{kind}_{name}": value for name, value in facts.items()})
 
 
 def _groups(experiment: Experiment, runs: Runs) -> None:
@@ -238,27 +244,29 @@ def _groups(experiment: Experiment, runs: Runs) -> None:
     panels: Panels = {}
     for name, group, u, recording, output in by_group(runs, names):
         y, p0 = recording[output], runs.of(name, "p0")
-        found = {model: experiment.simulate(model, recording)[output] for model in GROUPS}
-        sizes = [rmse(y, z) for z in found.values()]
+        predictions = {model: experiment.simulate(model, recording)[output] for model in GROUPS}
+        sizes = [rmse(y, z) for z in predictions.values()]
         levels[f"{p0:g} bar, {group}"] = [*sizes]
         if p0 == min(runs.of(n, "p0") for n in names):
-            groups[group] = [*(err(y, z) for z in found.values()), *sizes]
-            panels[group] = {recording.origin: (u, y)} | {n: (u, found[n]) for n in GROUPS[:3]}
+            groups[group] = [*(err(y, z) for z in predictions.values()), *sizes]
+            panels[group] = {recording.origin: (u, y)} | {
+                n: (u, predictions[n]) for n in GROUPS[:3]
+            }
     if groups:
         columns = [f"{what}, {name}" for what in ("Err [%]", "RMSE [mm]") for name in GROUPS]
         experiment.table("groups", columns, groups, p0=min(runs.of(n, "p0") for n in names))
         experiment.figure("prediction", panels)
         experiment.table("levels", GROUPS, levels)
-        _predicted(experiment, groups)
+        _compare_with_table_4(experiment, groups)
 
 
-def _predicted(experiment: Experiment, groups: dict[str, list[Cell]]) -> None:
+def _compare_with_table_4(experiment: Experiment, groups: dict[str, list[Cell]]) -> None:
     """Set how the paper's models compare in Table 4, and how large the Err of SDCHM is."""
-    theirs, raw = (GROUPS.index(name) for name in (PUBLISHED, RAW))
-    errs: Any = [row[theirs] for row in groups.values()]
-    closer = sum(row[theirs] < row[raw] for row in groups.values())  # type: ignore[operator]
+    published_column, raw_column = (GROUPS.index(name) for name in (PUBLISHED, RAW))
+    errs: Any = [row[published_column] for row in groups.values()]
+    closer = sum(row[published_column] < row[raw_column] for row in groups.values())  # type: ignore[operator]
     printed = experiment.paper.tables["groups"].printed[f"Err [%], {PUBLISHED}"].values()
-    experiment.says(
+    experiment.add_facts(
         predicted=[min(errs), max(errs)],
         predicted_theirs=[min(printed), max(printed)],
         as_small=Verdict(max(errs) <= max(printed)),

@@ -96,7 +96,7 @@ class Result:
 def data_of(part: Part) -> Data:
     """Return recordings as peers are given them, scaled as they are on the training side."""
     train, channels = part.split.train, part.channels
-    names = [*channels.given([*train, *part.split.test])]
+    names = [*channels.inputs_in([*train, *part.split.test])]
     inputs = np.vstack([one.matrix(names) for one in train])
     outputs = np.vstack([one.matrix(channels.outputs) for one in train])
     middle, spread = inputs.mean(axis=0), inputs.std(axis=0)

@@ -267,10 +267,10 @@ def test_every_operation_finds_the_same_channels(
         for data in (fitted.pop(), kind(**kind.channel_settings(found)).data(runs)):
             given = [channel.name for channel in (*data.inputs, *data.scheduled)]
             assert tuple(channel.name for channel in data.outputs) == found.outputs
-            assert {*found.inputs, *found.scheduling} <= {*given} <= {*found.given(runs)}
+            assert {*found.inputs, *found.scheduling} <= {*given} <= {*found.inputs_in(runs)}
     known = excitation(runs)
     assert known.outputs == found.outputs
-    assert {*known.driven, *known.loads} == {*found.given(runs)}
+    assert {*known.driven, *known.loads} == {*found.inputs_in(runs)}
     if found.single and not found.offered:
         loop = characterize(runs)
         assert (loop.input, loop.output) == found.pair

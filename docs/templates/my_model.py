@@ -86,7 +86,7 @@ class ElasticPlasticEstimator(SeparableEstimator):
     cannot = "No curved branches, no rate, no creep."
     inverse_kind = "solved"
     makes = ("elastic-plastic",)
-    solves_offset = False
+    fits_offset = False
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:  # of theta, [threshold / range]
         return np.array([0.005]), np.array([0.45])
@@ -98,7 +98,7 @@ class ElasticPlasticEstimator(SeparableEstimator):
         play = self.build(theta, np.array([0.0, 1.0]), 0.0, data).simulate(run.u)
         return np.column_stack([run.u - play, play])
 
-    def least(self, matrix: Array, data: TrainingData) -> Array:  # bounds for the inverse
+    def lower_bounds(self, matrix: Array, data: TrainingData) -> Array:  # bounds for the inverse
         return LEAST_REVERSIBLE * np.ptp(data.output_range) / np.ptp(matrix, axis=0)
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:

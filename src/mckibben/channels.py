@@ -1,6 +1,7 @@
 """The channels of models: what drives, what is modelled, what schedules, and what is not used.
 
-They are resolved once, by `channels_of`, and handed down to what fits, compares, characterizes, draws.
+`channels_of` resolves them once, for a study, a fit or a figure, as a `Channels`, which everything that
+fits, compares, characterizes or draws is then given. Files call `by_unit` to name unnamed columns.
 """
 
 from __future__ import annotations
@@ -20,43 +21,43 @@ from mckibben.recording import COMMAND, REFERENCE, Recording, standard_unit
 Names = str | Sequence[str] | None
 """One channel, several, or None to choose by the recordings' names."""
 
-DRIVING = ("pressure", "voltage", "command", "input", "u", "p")
+INPUTS = ("pressure", "voltage", "command", "input", "u", "p")
 """Names of inputs, those nearest to the muscle first."""
 
-ALONG, TURNED = ("displacement", "length", "contraction", "position"), ("angle",)
+TRANSLATIONS, ROTATIONS = ("displacement", "length", "contraction", "position"), ("angle",)
 """Names of translations and of rotations."""
 
 COORDINATES = "[xyz]"
 """Coordinates of a position; each is a separate output."""
 
-MOVED = (*ALONG, *TURNED, "output", COORDINATES)
+OUTPUTS = (*TRANSLATIONS, *ROTATIONS, "output", COORDINATES)
 """Names of outputs."""
 
 QUANTITIES = {"mm": "displacement", "N": "force", "bar": "pressure", "V": "voltage", "rad": "angle"}
 """Unit -> the channel of what has no name of a channel."""
 
-UNITS_DRIVING, UNITS_MOVED = ("bar", "V"), ("mm", "rad")
+INPUT_UNITS, OUTPUT_UNITS = ("bar", "V"), ("mm", "rad")
 """Units of inputs and of outputs, for names that are not recognised."""
 
-PLACES = "[a-z]|left|right|top|bottom|upper|lower|front|back|rear|flexor|extensor"
+POSITIONS = "[a-z]|left|right|top|bottom|upper|lower|front|back|rear|flexor|extensor"
 """Suffixes other than numbers that distinguish channels of one quantity."""
 
-SCHEDULES = ("pressure_extensor", "force", "torque")
+SCHEDULING = ("pressure_extensor", "force", "torque")
 """Channels, also numbered, that schedule models unless others are named."""
 
-PULLS = ("force", "torque")
+LOAD_QUANTITIES = ("force", "torque")
 """Outputs of muscles that are held."""
 
-LOADS = ("N", "N*m")
+LOAD_UNITS = ("N", "N*m")
 """Units of loads on muscles or a joint, which are not scheduling inputs."""
 
-FORCE, PRESSURE, OF_FORCE = "force", "pressure", ("length", "displacement")
+FORCE, PRESSURE, LENGTHS = "force", "pressure", ("length", "displacement")
 """Channels of force laws: the first of these that is present, with the pressure."""
 
-HELD = 0.01
+SMALLEST_VARIATION = 0.01
 """Smallest variation of a channel, relative to its largest value, that is more than holding it."""
 
-STEADY = 0.05
+LARGEST_DRIFT = 0.05
 """Largest variation of a channel within a run, relative to that over all runs, for which it counts as
 constant in the run.
 """
@@ -120,7 +121,7 @@ class Channels:
         """Inputs, and outputs."""
         return (*self.inputs, *self.outputs)
 
-    def given(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
+    def inputs_in(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
         """Return the inputs of any model that all recordings have."""
         return tuple(n for n in (*self.inputs, *self.further) if _shared(recordings, n))
 
@@ -144,12 +145,16 @@ class Channels:
     def pairs(self) -> tuple[tuple[str, str], ...]:
         """Every output with the input of the same number, or of the same position."""
 
-        def own(place: int, output: str) -> str:
+        def input_of(i: int, output: str) -> str:
             number = _number(output)
-            alike = [name for name in self.inputs if number and _number(name) == number]
-            return alike[0] if len(alike) == 1 else self.inputs[min(place, len(self.inputs) - 1)]
+            same_number = [name for name in self.inputs if number and _number(name) == number]
+            return (
+                same_number[0]
+                if len(same_number) == 1
+                else self.inputs[min(i, len(self.inputs) - 1)]
+            )
 
-        return tuple((own(place, output), output) for place, output in enumerate(self.outputs))
+        return tuple((input_of(i, output), output) for i, output in enumerate(self.outputs))
 
 
 def channels_of(
@@ -187,36 +192,41 @@ def channels_of(
     DataError
         If a channel is named twice, or no recording has one that is named to schedule.
     """
-    asked = _listed(scheduling)
-    finds = scheduling is None
-    given = _named(recordings, inputs, by_name(recordings, asked)[0] or (PRESSURE,))
-    loads = _loads_among(recordings, given)
-    given = tuple(name for name in given if name not in loads)
-    moved = by_name(recordings, (*given, *loads, *asked))[1] or (OF_FORCE[-1],)
-    pull = _pulled(recordings, given, moved) if finds and not loads else ()
-    wanted = _named(recordings, outputs, pull or moved)
-    held = over = tuple[str, ...]()
-    if finds and len(wanted) == 1 and wanted[0] in PULLS:
-        held = _held_beside(recordings, given, wanted[0])
-        given = tuple(name for name in given if name not in held)
-        over = () if held else _driving_force(recordings, wanted[0])
-        if over and (inputs is None or {*over} <= {*given} <= {*over, PRESSURE}):
-            given = over
-    scheduled = (*asked, *loads, *held)
-    found = (*((PRESSURE,) if over and given == over else ()), *_schedules(recordings))
-    found = tuple(name for name in found if finds and name not in (*given, *wanted, *scheduled))
-    if len(given) > 1 or len(wanted) > 1:
-        scheduled, found = (*scheduled, *found), ()
-    _check(recordings, (*given, *wanted, *scheduled), asked)
-    used = {*given, *wanted, *scheduled, *found}
-    unused = [name for name in _names(recordings) if name not in used]
+    named = _listed(scheduling)
+    is_default = scheduling is None
+    driving = _named(recordings, inputs, by_name(recordings, named)[0] or (PRESSURE,))
+    loads = _loads_among(recordings, driving)
+    driving = tuple(name for name in driving if name not in loads)
+    motion = by_name(recordings, (*driving, *loads, *named))[1] or (LENGTHS[-1],)
+    pulling = _pull(recordings, driving, motion) if is_default and not loads else ()
+    modelled = _named(recordings, outputs, pulling or motion)
+    held = by_length = tuple[str, ...]()
+    if is_default and len(modelled) == 1 and modelled[0] in LOAD_QUANTITIES:
+        held = _held_lengths(recordings, driving, modelled[0])
+        driving = tuple(name for name in driving if name not in held)
+        by_length = () if held else _driving_force(recordings, modelled[0])
+        if by_length and (inputs is None or {*by_length} <= {*driving} <= {*by_length, PRESSURE}):
+            driving = by_length
+    scheduled = (*named, *loads, *held)
+    offered = (
+        *((PRESSURE,) if by_length and driving == by_length else ()),
+        *_default_scheduling(recordings),
+    )
+    offered = tuple(
+        name for name in offered if is_default and name not in (*driving, *modelled, *scheduled)
+    )
+    if len(driving) > 1 or len(modelled) > 1:
+        scheduled, offered = (*scheduled, *offered), ()
+    _check(recordings, (*driving, *modelled, *scheduled), named)
+    roles = {*driving, *modelled, *scheduled, *offered}
+    unused = [name for name in _names(recordings) if name not in roles]
     return Channels(
-        given,
-        wanted,
+        driving,
+        modelled,
         scheduled,
-        found,
+        offered,
         tuple(name for name in unused if _differs(recordings, name)),
-        tuple(n for n in (*given, *scheduled, *found) if held_at_levels(recordings, n)),
+        tuple(n for n in (*driving, *scheduled, *offered) if held_at_levels(recordings, n)),
     )
 
 
@@ -227,15 +237,17 @@ def by_name(recordings: Sequence[Recording], excepted: Sequence[str] = ()) -> Si
     not mixed: errors in mm and in rad have no mean.
     """
     names = [name for name in _names(recordings) if name not in excepted]
-    units = {name: next(one.units[name] for one in recordings if name in one) for name in names}
-    inputs = _called(names, DRIVING) or _in_units(names, units, UNITS_DRIVING)
-    rest = [name for name in names if name not in inputs]
-    outputs = _called(rest, MOVED) or _in_units(rest, units, UNITS_MOVED)
+    units = {name: next(run.units[name] for run in recordings if name in run) for name in names}
+    inputs = _called(names, INPUTS) or _in_units(names, units, INPUT_UNITS)
+    remaining = [name for name in names if name not in inputs]
+    outputs = _called(remaining, OUTPUTS) or _in_units(remaining, units, OUTPUT_UNITS)
     if len(outputs) < len(inputs):
-        along = _called(rest, (*ALONG, COORDINATES)) or _in_units(rest, units, ("mm",))
-        turned = _called(rest, TURNED) or _in_units(rest, units, ("rad",))
-        outputs = max(outputs, along, turned, key=len)
-    return inputs, outputs or tuple(name for name in PULLS if name in rest)[:1]
+        translations = _called(remaining, (*TRANSLATIONS, COORDINATES)) or _in_units(
+            remaining, units, ("mm",)
+        )
+        rotations = _called(remaining, ROTATIONS) or _in_units(remaining, units, ("rad",))
+        outputs = max(outputs, translations, rotations, key=len)
+    return inputs, outputs or tuple(name for name in LOAD_QUANTITIES if name in remaining)[:1]
 
 
 def quantity(name: str) -> str:
@@ -261,8 +273,8 @@ def held_at_levels(recordings: Sequence[Recording], name: str) -> bool:
     """Return whether a channel differs between recordings but is nearly constant in each."""
     if not _shared(recordings, name):
         return False
-    span = float(np.ptp(np.concatenate([one[name] for one in recordings])))
-    return span > 0 and all(float(np.ptp(one[name])) <= STEADY * span for one in recordings)
+    span = float(np.ptp(np.concatenate([run[name] for run in recordings])))
+    return span > 0 and all(float(np.ptp(run[name])) <= LARGEST_DRIFT * span for run in recordings)
 
 
 def any_moves(recordings: Sequence[Recording], channels: Sequence[str]) -> bool:
@@ -277,10 +289,12 @@ def any_moves(recordings: Sequence[Recording], channels: Sequence[str]) -> bool:
 
 def varies(samples: Sequence[Array]) -> bool:
     """Return whether a channel takes several values over all recordings, ignoring approaches."""
-    every = np.concatenate([*samples, np.zeros(0)])
-    if not every.size:
+    values = np.concatenate([*samples, np.zeros(0)])
+    if not values.size:
         return False
-    return bool(np.ptp(np.percentile(every, (1.0, 99.0))) > HELD * np.abs(every).max())
+    return bool(
+        np.ptp(np.percentile(values, (1.0, 99.0))) > SMALLEST_VARIATION * np.abs(values).max()
+    )
 
 
 def loop_of(
@@ -295,67 +309,69 @@ def loop_of(
     DataError
         If there are several inputs or outputs.
     """
-    given, wanted = channels_of(recordings, input, output).pair
-    return moved_by(recordings, given) if input is None else given, wanted
+    driving, modelled = channels_of(recordings, input, output).pair
+    return moved_by(recordings, driving) if input is None else driving, modelled
 
 
-def moved_by(recordings: Sequence[Recording], given: str) -> str:
+def moved_by(recordings: Sequence[Recording], channel: str) -> str:
     """Return the abscissa of an output's loop: its input, or what drives if that is constant."""
-    if any_moves(recordings, (given,)):
-        return given
+    if any_moves(recordings, (channel,)):
+        return channel
     driving = by_name(recordings)[0]
-    return driving[0] if driving and any_moves(recordings, driving[:1]) else given
+    return driving[0] if driving and any_moves(recordings, driving[:1]) else channel
 
 
-def _free(recordings: Sequence[Recording], name: str) -> bool:
+def _varies_freely(recordings: Sequence[Recording], name: str) -> bool:
     """Return whether a channel varies within recordings, instead of being held at levels."""
     return (
         _shared(recordings, name)
         and not held_at_levels(recordings, name)
-        and varies([one[name] for one in recordings])
+        and varies([run[name] for run in recordings])
         and any_moves(recordings, (name,))
     )
 
 
-def _pulled(
-    recordings: Sequence[Recording], given: Sequence[str], moved: Sequence[str]
+def _pull(
+    recordings: Sequence[Recording], inputs: Sequence[str], motion: Sequence[str]
 ) -> tuple[str, ...]:
     """Return the force or torque that is the output instead of what is moved; or none."""
-    pull = [name for name in PULLS if name not in given and _free(recordings, name)][:1]
-    there = all(_shared(recordings, name) for name in (*given, *moved))
-    held = not any(_free(recordings, name) for name in moved)
-    driven = any(_differs(recordings, name) for name in given)
-    otherwise = there and (driven if held else not driven)
-    return tuple(pull) if otherwise or _lacks_displacement(recordings) else ()
+    pulling = [
+        name for name in LOAD_QUANTITIES if name not in inputs and _varies_freely(recordings, name)
+    ][:1]
+    complete = all(_shared(recordings, name) for name in (*inputs, *motion))
+    is_held = not any(_varies_freely(recordings, name) for name in motion)
+    driven = any(_differs(recordings, name) for name in inputs)
+    otherwise = complete and (driven if is_held else not driven)
+    return tuple(pulling) if otherwise or _lacks_displacement(recordings) else ()
 
 
 def _lacks_displacement(recordings: Sequence[Recording]) -> bool:
     """Return whether the only model possible is force by length and pressure."""
-    others = (*ALONG, *TURNED)
+    positions = (*TRANSLATIONS, *ROTATIONS)
     return all(
-        {OF_FORCE[0], PRESSURE, FORCE} <= {*one.channels}
-        and not any(name.startswith(others) for name in one.channels if name != OF_FORCE[0])
-        for one in recordings
+        {LENGTHS[0], PRESSURE, FORCE} <= {*run.channels}
+        and not any(name.startswith(positions) for name in run.channels if name != LENGTHS[0])
+        for run in recordings
     ) and any_moves(recordings, (FORCE,))
 
 
-def _held_beside(
-    recordings: Sequence[Recording], given: Sequence[str], pull: str
+def _held_lengths(
+    recordings: Sequence[Recording], inputs: Sequence[str], pull: str
 ) -> tuple[str, ...]:
     """Return what is held at levels while inputs drive a force or torque."""
-    along = [name for name in OF_FORCE if pull == FORCE and _shared(recordings, name)][:1]
-    names = tuple(along) or by_name(recordings, (*given, pull))[1]
-    driven = any(_free(recordings, name) for name in given if name not in names)
-    return names if driven and all(held_at_levels(recordings, n) for n in names) else ()
+    lengths = [name for name in LENGTHS if pull == FORCE and _shared(recordings, name)][:1]
+    names = tuple(lengths) or by_name(recordings, (*inputs, pull))[1]
+    is_driven = any(_varies_freely(recordings, name) for name in inputs if name not in names)
+    return names if is_driven and all(held_at_levels(recordings, n) for n in names) else ()
 
 
 def _driving_force(recordings: Sequence[Recording], pull: str) -> tuple[str, ...]:
     """Return the length or displacement of a law of force with pressure, if it varies."""
-    there = pull == FORCE and _shared(recordings, PRESSURE) and _shared(recordings, FORCE)
+    is_law = pull == FORCE and _shared(recordings, PRESSURE) and _shared(recordings, FORCE)
     return tuple(
         name
-        for name in OF_FORCE
-        if there and _shared(recordings, name) and varies([one[name] for one in recordings])
+        for name in LENGTHS
+        if is_law and _shared(recordings, name) and varies([run[name] for run in recordings])
     )[:1]
 
 
@@ -363,10 +379,10 @@ def _check(
     recordings: Sequence[Recording], names: Sequence[str], scheduling: Sequence[str]
 ) -> None:
     """Raise an error for a channel that is named twice, or named to schedule that is nowhere."""
-    if twice := [name for name in names if names.count(name) > 1]:
+    if repeated := [name for name in names if names.count(name) > 1]:
         raise DataError(
             "the channel is named twice among inputs, outputs and load",
-            channel=twice[0],
+            channel=repeated[0],
             remedy="an output cannot also be an input: name each channel once",
         )
     if absent := [name for name in scheduling if name not in _names(recordings)]:
@@ -380,16 +396,16 @@ def _check(
 
 def _names(recordings: Sequence[Recording]) -> list[str]:
     """Return the channels that any recording has, in order."""
-    return list(dict.fromkeys(name for one in recordings for name in one.channels))
+    return list(dict.fromkeys(name for run in recordings for name in run.channels))
 
 
 def _shared(recordings: Sequence[Recording], name: str) -> bool:
-    return bool(recordings) and all(name in one for one in recordings)
+    return bool(recordings) and all(name in run for run in recordings)
 
 
 def _differs(recordings: Sequence[Recording], name: str) -> bool:
     """Return whether a channel varies within or between recordings by more than rounding."""
-    samples = np.concatenate([*(one[name] for one in recordings if name in one), np.zeros(0)])
+    samples = np.concatenate([*(run[name] for run in recordings if name in run), np.zeros(0)])
     return bool(samples.size and np.ptp(samples) > 1e-6 * (1.0 + np.abs(samples).max()))
 
 
@@ -402,18 +418,18 @@ def _called(channels: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
     for word in words:
         plain = [name for name in channels if re.fullmatch(word, name)]
         numbered = [name for name in channels if re.fullmatch(rf"{word}_?\d+", name)]
-        placed = [name for name in channels if re.fullmatch(rf"{word}_({PLACES})", name)]
+        positioned = [name for name in channels if re.fullmatch(rf"{word}_({POSITIONS})", name)]
         if word == COORDINATES or (
             numbered and all(re.search(r"[a-z_][2-9]$", n) for n in numbered)
         ):
             numbered = [name for name in channels if name in (*plain, *numbered)]
-        begun = [name for name in channels if len(word) > 1 and name.startswith(f"{word}_")]
-        several = numbered or (placed if len(placed) > 1 and not plain else [])
-        if begun and not (several or plain):  # command_pressure_1, command_pressure_2
-            stem = re.escape(re.sub(r"_\d+$", "", begun[0]))
-            several = [name for name in begun if re.fullmatch(rf"{stem}_\d+", name)]
-        if found := sorted(several, key=_number) or (plain or begun)[:1]:
-            return tuple(found)
+        prefixed = [name for name in channels if len(word) > 1 and name.startswith(f"{word}_")]
+        several = numbered or (positioned if len(positioned) > 1 and not plain else [])
+        if prefixed and not (several or plain):  # command_pressure_1, command_pressure_2
+            stem = re.escape(re.sub(r"_\d+$", "", prefixed[0]))
+            several = [name for name in prefixed if re.fullmatch(rf"{stem}_\d+", name)]
+        if result := sorted(several, key=_number) or (plain or prefixed)[:1]:
+            return tuple(result)
     return ()
 
 
@@ -424,23 +440,23 @@ def _number(name: str) -> int:
 
 
 def _in_units(
-    channels: Sequence[str], units: Mapping[str, str], wanted: Sequence[str]
+    channels: Sequence[str], units: Mapping[str, str], preferred: Sequence[str]
 ) -> tuple[str, ...]:
-    measured = [name for name in channels if not name.startswith((REFERENCE, COMMAND))]
-    for unit in wanted:
-        found = tuple(name for name in measured if units[name] == unit)
-        if found:
-            return found
+    signals = [name for name in channels if not name.startswith((REFERENCE, COMMAND))]
+    for unit in preferred:
+        result = tuple(name for name in signals if units[name] == unit)
+        if result:
+            return result
     return ()
 
 
 def _named(
-    recordings: Sequence[Recording], given: Names, by_default: tuple[str, ...]
+    recordings: Sequence[Recording], wanted_names: Names, by_default: tuple[str, ...]
 ) -> tuple[str, ...]:
-    if given is None:
+    if wanted_names is None:
         return by_default
-    names = _listed(given)
-    if len(names) == 1 and not any(names[0] in one for one in recordings):
+    names = _listed(wanted_names)
+    if len(names) == 1 and not any(names[0] in run for run in recordings):
         # of several muscles, all that are called so
         return tuple(name for name in by_default if name.startswith(f"{names[0]}_")) or names
     return names
@@ -454,26 +470,26 @@ def _listed(names: Names) -> tuple[str, ...]:
     return (cast(str, names),) if single else tuple(names)
 
 
-def _schedules(recordings: Sequence[Recording]) -> tuple[str, ...]:
+def _default_scheduling(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Return the default scheduling channels of any recording."""
     names = _names(recordings)
-    found = (
+    result = (
         name
-        for word in SCHEDULES
+        for word in SCHEDULING
         for name in sorted(names, key=_number)
         if re.fullmatch(rf"{word}(_\d+)?", name)
     )
-    return tuple(found)
+    return tuple(result)
 
 
 def _loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tuple[str, ...]:
     """Return forces that are loads: given, and not commanded."""
-    found = tuple(
+    result = tuple(
         name
         for name in inputs
-        if any(name in one and one.units[name] in LOADS for one in recordings)
+        if any(name in run and run.units[name] in LOAD_UNITS for run in recordings)
     )
-    return found if len(found) < len(inputs) else ()
+    return result if len(result) < len(inputs) else ()
 
 
 def by_unit(channels: Mapping[str, Array], units: Mapping[str, str]) -> dict[str, str]:
@@ -483,16 +499,16 @@ def by_unit(channels: Mapping[str, Array], units: Mapping[str, str]) -> dict[str
     half of its highest value in mm is a length, as no muscle shortens by more. Commands and references
     measure nothing.
     """
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for name, samples in channels.items():
-        unit, place = units[name], re.search(r"(\d+|extensor)$", name)
+        unit, suffix = units[name], re.search(r"(\d+|extensor)$", name)
         is_set = name.startswith((COMMAND, REFERENCE))
         if unit in QUANTITIES and standard_unit(name) is None and not is_set:
             is_length = unit == "mm" and samples.min() > 0.5 * samples.max()
             kind = "length" if is_length else QUANTITIES[unit]
-            found[name] = f"{kind}_{place[1]}" if place else kind
-    counts = Counter([*found.values(), *channels])
-    return {name: channel for name, channel in found.items() if counts[channel] == 1}
+            result[name] = f"{kind}_{suffix[1]}" if suffix else kind
+    counts = Counter([*result.values(), *channels])
+    return {name: channel for name, channel in result.items() if counts[channel] == 1}
 
 
 def renamed(one: Recording, names: Mapping[str, str]) -> Recording:

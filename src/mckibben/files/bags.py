@@ -59,11 +59,11 @@ class _Topic:
         message = self.decode(raw)
         stamp: Any = getattr(getattr(message, "header", None), "stamp", None)
         self.stamps.append(stamp.sec * 10**9 + stamp.nanosec if _is_instant(stamp) else 0)
-        for place, value in _numbers(f"/{self.name.strip('/')}", message):
+        for path, value in _numbers(f"/{self.name.strip('/')}", message):
             if isinstance(value, str):
-                self.unread[place] = value
+                self.unread[path] = value
             else:
-                at, values = self.columns.setdefault(place, ([], []))
+                at, values = self.columns.setdefault(path, ([], []))
                 at.append(len(self.recorded))
                 values.append(value)
         self.recorded.append(when)
@@ -74,15 +74,15 @@ class _Topic:
         instants = np.array(self.stamps if by_stamp else self.recorded, dtype=np.int64)
         times = (instants - began) / 1e9
         for header, (at, values) in self.columns.items():
-            place = header.removeprefix(f"/{self.name.strip('/')}/")
-            unit, word = _UNITS.get(self.kind, {}).get(place), place.rpartition("/")[2]
+            path = header.removeprefix(f"/{self.name.strip('/')}/")
+            unit, word = _UNITS.get(self.kind, {}).get(path), path.rpartition("/")[2]
             if word in ("data", "value") or unit == "Pa abs":
                 word = self.name.rpartition("/")[2]
             alias = "pressure" if unit == "Pa abs" else _indexed(header)
             if is_standard(word) and not is_time(word):
                 alias = word
-            samples, held = np.array(values, dtype=np.float64), not isinstance(values[0], float)
-            yield Column(header, samples, unit, alias=alias, times=times[at], held=held)
+            samples, is_held = np.array(values, dtype=np.float64), not isinstance(values[0], float)
+            yield Column(header, samples, unit, alias=alias, times=times[at], held=is_held)
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -132,9 +132,9 @@ def _reader(path: Path) -> Any:
 
     readers: dict[str, Any] = {**rosbag2.Reader.STORAGE_PLUGINS, ".bag": rosbag1.Reader}
     if path.is_dir():
-        found = readers["dir"](path)
-        found.STORAGE_PLUGINS = {**found.STORAGE_PLUGINS, "sqlite3": database}
-        return found
+        reader = readers["dir"](path)
+        reader.STORAGE_PLUGINS = {**reader.STORAGE_PLUGINS, "sqlite3": database}
+        return reader
     return (readers | {".db3": database})[path.suffix.casefold()](path)
 
 
@@ -148,7 +148,7 @@ def _topics(reader: Any) -> tuple[list[_Topic], dict[str, str]]:
             topics.setdefault(_key(connection), topic)
         except Exception as error:  # the library raises anything at what it cannot read
             unread[connection.topic] = reason(error)
-    readable = [each for each in reader.connections if _key(each) in topics]
+    readable = [known for known in reader.connections if _key(known) in topics]
     for connection, when, raw in reader.messages(readable) if readable else ():
         topic = topics[_key(connection)]
         if topic.name not in unread:
@@ -156,11 +156,11 @@ def _topics(reader: Any) -> tuple[list[_Topic], dict[str, str]]:
                 topic.take(when, raw)
             except Exception as error:
                 unread[topic.name] = f"message {len(topic.recorded) + 1}: {reason(error)}"
-    found = [topic for topic in topics.values() if topic.name not in unread]
-    for topic in found:
+    read_topics = [topic for topic in topics.values() if topic.name not in unread]
+    for topic in read_topics:
         none = "no numbers in it" if topic.recorded else "no messages that belong to it"
         unread |= topic.unread or ({} if topic.columns else {topic.name: none})
-    numbers = [topic for topic in found if topic.columns]
+    numbers = [topic for topic in read_topics if topic.columns]
     return sorted(numbers, key=lambda topic: topic.recorded[0]), unread
 
 
@@ -186,30 +186,28 @@ def _decoder(connection: Any) -> Callable[[bytes], Any]:
     return partial(decode, typename=kind)
 
 
-def _numbers(
-    place: str, value: Any, names: Sequence[str] = ()
-) -> Iterator[tuple[str, float | str]]:
+def _numbers(path: str, value: Any, names: Sequence[str] = ()) -> Iterator[tuple[str, float | str]]:
     """Yield the positions of the numbers in a message, with their values, or the reason for none.
 
     Elements of arrays are called by the names in the message, as those of joints, if they are as many.
     """
     if isinstance(value, (bool, int, float)):
-        yield place, value
+        yield path, value
     elif isinstance(value, (list, np.ndarray)):
         if len(value) > WIDEST and not isinstance(value[0], str):
-            yield place, f"an array of {len(value)}"
+            yield path, f"an array of {len(value)}"
             return
-        named = len(names) == len(value)
+        is_named = len(names) == len(value)
         for k, item in enumerate(value.tolist() if isinstance(value, np.ndarray) else value):
-            yield from _numbers(f"{place}/{names[k]}" if named else f"{place}[{k}]", item)
+            yield from _numbers(f"{path}/{names[k]}" if is_named else f"{path}[{k}]", item)
     elif _is_instant(value):
-        yield place, "a time"
+        yield path, "a time"
     elif not isinstance(value, str):
-        found = getattr(value, "name", None)
-        names = found if isinstance(found, list) and len(set(found)) == len(found) else []
+        name = getattr(value, "name", None)
+        names = name if isinstance(name, list) and len(set(name)) == len(name) else []
         for member in fields(value):  # constants, and the byte of an empty message, have defaults
             if member.default is MISSING and member.name != "header":
-                yield from _numbers(f"{place}/{member.name}", getattr(value, member.name), names)
+                yield from _numbers(f"{path}/{member.name}", getattr(value, member.name), names)
 
 
 def _is_instant(value: Any) -> bool:

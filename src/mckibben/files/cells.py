@@ -77,15 +77,15 @@ class Dialect:
         """Return the form of a cell: one of `_FORMS`, missing or text; and the match of a number."""
         return _form(cell, self.decimal)
 
-    def value(self, found: re.Match[str] | None) -> float:
+    def value(self, match: re.Match[str] | None) -> float:
         """Return the number of a cell of that form; NaN for a missing one, and what may be several."""
-        if found is None:
+        if match is None:
             return math.nan
-        if found["hexadecimal"]:
-            return int(found["hexadecimal"], 16)
-        if found["thousands"]:
-            return float(re.sub(rf"[^-\d{self.decimal}]", "", found[0]).replace(self.decimal, "."))
-        plain = (found["number"] or found["three_digits"] or "nan").replace(self.decimal, ".")
+        if match["hexadecimal"]:
+            return int(match["hexadecimal"], 16)
+        if match["thousands"]:
+            return float(re.sub(rf"[^-\d{self.decimal}]", "", match[0]).replace(self.decimal, "."))
+        plain = (match["number"] or match["three_digits"] or "nan").replace(self.decimal, ".")
         return float(re.sub("[dD]", "e", plain))
 
     def is_value(self, cell: str) -> bool:
@@ -100,9 +100,9 @@ class Dialect:
 
 @lru_cache(maxsize=2**14)  # a table is tried with several separators
 def _form(cell: str, decimal: str) -> tuple[str, re.Match[str] | None]:
-    found = _FORMS[decimal].fullmatch(cell.replace("−", "-"))
-    if found:
-        return (found.lastgroup or "").replace("_", " "), found
+    match = _FORMS[decimal].fullmatch(cell.replace("−", "-"))
+    if match:
+        return (match.lastgroup or "").replace("_", " "), match
     return "text" if cell and cell not in MISSING else "missing", None
 
 
@@ -114,8 +114,8 @@ def column(name: str, unit: str | None, cells: Any, dialect: Dialect) -> tuple[C
     """
     import pandas as pd
 
-    codes, found = pd.factorize(cells)  # -1 is for cells that are missing
-    words = [*(str(word).strip() for word in found), ""]
+    codes, unique = pd.factorize(cells)  # -1 is for cells that are missing
+    words = [*(str(word).strip() for word in unique), ""]
     forms, matches = zip(*map(dialect.form, words), strict=True)
     if may_be_instant(words[0]) and not matches[0]:
         return Column(name, None, unit, texts=[words[code] for code in codes]), ""
@@ -123,10 +123,10 @@ def column(name: str, unit: str | None, cells: Any, dialect: Dialect) -> tuple[C
         return column(name, unit, cells, marked)
     plain = [word for word, form in zip(words, forms, strict=True) if form == "number"]
     decimal = not plain or any(dialect.decimal in word for word in plain)
-    other = {"three digits": "number" if decimal else "grouped", "spaced": "grouped"}
-    other["thousands"] = "number"
-    each = zip(forms, matches, strict=True)
-    kinds = np.array([f"in {m['unit']}" if f == "unit" else other.get(f, f) for f, m in each])[
+    same_form = {"three digits": "number" if decimal else "grouped", "spaced": "grouped"}
+    same_form["thousands"] = "number"
+    pairs = zip(forms, matches, strict=True)
+    kinds = np.array([f"in {m['unit']}" if f == "unit" else same_form.get(f, f) for f, m in pairs])[
         codes
     ]
     filled = kinds != "missing"
@@ -168,7 +168,7 @@ def _with_other_mark(words: Sequence[str], dialect: Dialect) -> Dialect | None:
     As text of a spreadsheet, or in quotation marks, beside columns with the mark of the table.
     """
     other = replace(dialect, decimal="," if dialect.decimal == "." else ".")
-    found = [other.form(word) for word in words]
-    shown = any(match and other.decimal in (match["number"] or "") for _, match in found)
-    sound = {form for form, _ in found} <= {"number", "three digits", "unit", "missing"}
-    return other if shown and sound else None
+    matches = [other.form(word) for word in words]
+    is_plain = any(match and other.decimal in (match["number"] or "") for _, match in matches)
+    sound = {form for form, _ in matches} <= {"number", "three digits", "unit", "missing"}
+    return other if is_plain and sound else None

@@ -120,17 +120,19 @@ class Folder(Described):
     def merged(self, files: Iterable[Files]) -> Described:
         """Return the settings including matching entries of ``files``."""
         time, sheet = self.time.model_dump(exclude_none=True), self.sheet
-        channels = {name: one.model_dump(exclude_none=True) for name, one in self.channels.items()}
+        channels = {
+            name: channel.model_dump(exclude_none=True) for name, channel in self.channels.items()
+        }
         for some in files:
             time |= some.time
             sheet = some.sheet or sheet
-            for name, given in some.channels.items():
+            for name, changes in some.channels.items():
                 inherited = channels.get(name, {})
-                if "value" in given:
+                if "value" in changes:
                     inherited = {"unit": inherited.get("unit")}
-                elif "column" in given:
+                elif "column" in changes:
                     inherited.pop("value", None)
-                channels[name] = inherited | given
+                channels[name] = inherited | changes
         return Described.model_validate({"time": time, "channels": channels, "sheet": sheet})
 
     def parts(self, name: str) -> dict[str, str]:
@@ -139,9 +141,9 @@ class Folder(Described):
         A signal is named as its file, without the text that ``*`` matches; empty for a file alone.
         """
         for join in (some.join or [] for some in self.files):
-            if found := next(filter(None, (_matched(part, name) for part in join)), None):
+            if parts := next(filter(None, (_matched(part, name) for part in join)), None):
                 signals = {part: Path(part.replace("*", "")).stem.strip("_-. ") for part in join}
-                return {part.replace("*", found[1]): signal for part, signal in signals.items()}
+                return {part.replace("*", parts[1]): signal for part, signal in signals.items()}
         return {name: ""}
 
 
@@ -157,14 +159,14 @@ def described(folder: str | Path) -> Folder:
     path = Path(folder) / NAME
     if os.path.lexists(path):
         return description(path)
-    where, what = _ELSEWHERE.get()
-    return what if where == Path(folder).absolute() else Folder()
+    where, settings = _ELSEWHERE.get()
+    return settings if where == Path(folder).absolute() else Folder()
 
 
 @contextmanager
-def describing(folder: Path, what: Folder) -> Iterator[None]:
+def describing(folder: Path, settings: Folder) -> Iterator[None]:
     """Use these settings within the context for a folder without ``channels.toml``."""
-    token = _ELSEWHERE.set((folder.absolute(), what))
+    token = _ELSEWHERE.set((folder.absolute(), settings))
     try:
         yield
     finally:
@@ -186,9 +188,11 @@ def about(path: Path) -> Described:
     """Return the settings for a recording: from inside its folder, or from the folder it is in."""
     inside = path.is_dir() and os.path.lexists(path / NAME)
     folder = path if inside else path.parent
-    found = described(folder)
+    folder_settings = described(folder)
     with _refusing(folder / NAME):
-        return found.merged(some for some in found.files if some.include(path.name))
+        return folder_settings.merged(
+            some for some in folder_settings.files if some.include(path.name)
+        )
 
 
 def _matched(part: str, name: str) -> re.Match[str] | None:
@@ -198,10 +202,10 @@ def _matched(part: str, name: str) -> re.Match[str] | None:
 
 @lru_cache(maxsize=8)  # asked for every file in the folder
 def _parsed(text: str) -> Folder:
-    found = Folder.model_validate(tomllib.loads(text))
-    for some in found.files:
-        found.merged([some])
-    return found
+    folder = Folder.model_validate(tomllib.loads(text))
+    for some in folder.files:
+        folder.merged([some])
+    return folder
 
 
 @contextmanager

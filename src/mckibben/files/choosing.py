@@ -52,7 +52,7 @@ def seen(source: Source) -> list[Seen]:
     plain = replace(
         source.request, columns={}, units={}, channels=None, rate=None, sample_time=None
     )
-    asked, unasked = (named_in(one) for one in (source, replace(source, request=plain)))
+    channels, plain_channels = (named_in(each) for each in (source, replace(source, request=plain)))
     return [
         Seen(
             column.header,
@@ -60,8 +60,8 @@ def seen(source: Source) -> list[Seen]:
             tuple(str(text)[:40] for text in column.texts[:4])
             if column.values is None
             else tuple(f"{value:.6g}" for value in column.values[:4]),
-            asked.get(column.header, ""),
-            unasked.get(column.header, ""),
+            channels.get(column.header, ""),
+            plain_channels.get(column.header, ""),
             column.values,
         )
         for column in source.table.columns
@@ -77,9 +77,9 @@ def named_in(source: Source) -> dict[str, str]:
         for column in source.table.columns:
             if column.values is not None:
                 named.setdefault(channel_of(parse(column.label)), column)
-    asked = source.request.channels
+    wanted = source.request.channels
     return {
-        c.header: name for name, c in named.items() if asked is None or name in (*asked, "time")
+        c.header: name for name, c in named.items() if wanted is None or name in (*wanted, "time")
     }
 
 
@@ -101,14 +101,14 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
     named, left_out = _by_header(source, _described(source) | requested)
     left_out = of_other_length | left_out
 
-    places = {id(column): place for place, column in enumerate(source.table.columns)}
+    places = {id(column): i for i, column in enumerate(source.table.columns)}
     named = dict(sorted(named.items(), key=lambda item: places.get(id(item[1]), len(places))))
     if not table.own:
         time = None if "time" in named or table.has_clocks else _only_time(named, source)
         if time is not None:
             left_out.pop(time.header, None)
-            others = {name: column for name, column in named.items() if column is not time}
-            named = {"time": time} | others
+            rest = {name: column for name, column in named.items() if column is not time}
+            named = {"time": time} | rest
         named = _by_unit(source, named)
 
     _require(named, source)
@@ -118,10 +118,10 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
 def _requested(source: Source) -> dict[str, Column]:
     """Return the columns that the request names."""
     request, columns = source.request, dict[str, Column]()
-    for channel, wanted in request.columns.items():
+    for channel, header in request.columns.items():
         if not (channel == "time" and source.table.has_clocks):
             try:
-                columns[channel] = find_column(wanted, channel, source)
+                columns[channel] = find_column(header, channel, source)
             except DataError:
                 if not request.join:  # where another file may have it
                     raise
@@ -133,20 +133,20 @@ def _by_header(
 ) -> tuple[dict[str, Column], dict[str, str]]:
     """Return ``fixed`` columns and those that their headers name, and why others are left out."""
     named, left_out = dict(fixed), dict[str, str]()
-    taken = {id(column) for column in fixed.values()}
+    fixed_ids = {id(column) for column in fixed.values()}
     for column in sorted(source.table.columns, key=lambda column: column.values is None):
-        if id(column) in taken:
+        if id(column) in fixed_ids:
             continue
         channel = _channel(column, source, fixed, named)
-        wanted = channel == "time" or source.request.asks_for(channel)
-        if column.values is None and (channel in named or not wanted):
+        is_wanted = channel == "time" or source.request.asks_for(channel)
+        if column.values is None and (channel in named or not is_wanted):
             left_out[column.header] = "text"
         elif channel in fixed:
             left_out[column.header] = f"{channel} is read from another column"
         elif channel in named:
-            both = [named[channel].header, column.header]
-            problem = f"columns {both[0]!r} and {both[1]!r} both hold it"
-            options = [{"columns": {channel: header}} for header in both]
+            headers = [named[channel].header, column.header]
+            problem = f"columns {headers[0]!r} and {headers[1]!r} both hold it"
+            options = [{"columns": {channel: header}} for header in headers]
             raise source.error(problem, "give them different headers", channel, options=options)
         else:
             named[channel] = column
@@ -161,13 +161,13 @@ def _channel(
     That is for references and commands, of which the first is the loop's, and for channels that nobody
     asks for.
     """
-    request, own, header = source.request, source.table.own, parse(column.label)
-    channel = column.header if own else channel_of(header)
+    request, is_own, header = source.request, source.table.own, parse(column.label)
+    channel = column.header if is_own else channel_of(header)
     without_unit = channel_of(replace(header, unit=None))
-    if not own and without_unit in request.units:  # whatever the header says of its unit
+    if not is_own and without_unit in request.units:  # whatever the header says of its unit
         channel = without_unit
     of_loop = channel.startswith((REFERENCE, COMMAND))
-    if (channel in fixed and not own) or (channel in named and of_loop):
+    if (channel in fixed and not is_own) or (channel in named and of_loop):
         channel = snake_case(header.name)
     if channel in named and channel not in fixed and not request.needs(channel):
         channel = snake_case(column.header)
@@ -212,10 +212,10 @@ def find_column(wanted: str, channel: str, source: Source) -> Column:
             raise source.error(problem, "give them different headers", channel, options=options)
         if matches:
             return matches[0]
-    for place, why in table.unread.items():
-        if wanted in (place, place.rpartition(".")[2]):
+    for path, why in table.unread.items():
+        if wanted in (path, path.rpartition(".")[2]):
             remedy = "save it as one vector of numbers"
-            raise source.error(f"{place!r} cannot be read: {why}", remedy, channel)
+            raise source.error(f"{path!r} cannot be read: {why}", remedy, channel)
     problem = f"there is no column {wanted!r}; there are {_headers(table)}"
     near = get_close_matches(wanted, [column.header for column in table.columns], 1)
     options = [{"columns": {channel: header}} for header in near]
@@ -228,21 +228,21 @@ def _of_one_length(source: Source, fixed: Mapping[str, Column]) -> tuple[Source,
     columns = source.table.columns
     if source.table.has_clocks or source.table.lines is not None:
         return source, {}
-    asked = {channel: column.size for channel, column in fixed.items()}
-    if len(set(asked.values())) > 1:
-        sizes = ", ".join(f"{channel} {size}" for channel, size in asked.items())
+    sizes_asked = {channel: column.size for channel, column in fixed.items()}
+    if len(set(sizes_asked.values())) > 1:
+        sizes = ", ".join(f"{channel} {size}" for channel, size in sizes_asked.items())
         problem = f"the requested columns have different numbers of samples: {sizes}"
         remedy = "name columns of one length with `columns[CHANNEL]=COLUMN`"
-        raise source.error(problem, remedy, next(iter(asked)))
-    found = Counter(column.size for column in columns if column.size > 1)
-    if not found:
+        raise source.error(problem, remedy, next(iter(sizes_asked)))
+    counts = Counter(column.size for column in columns if column.size > 1)
+    if not counts:
         remedy = "save each channel as one vector, all of one length, or as a column of one matrix"
         raise source.error("there are no vectors of numbers in it", remedy)
-    shared = [size for size, several in found.items() if several > 1]
-    size = next(iter(asked.values()), max(shared or found))
+    shared = [size for size, several in counts.items() if several > 1]
+    size = next(iter(sizes_asked.values()), max(shared or counts))
     table = replace(source.table, columns=tuple(c for c in columns if c.size == size))
-    others = {c.header: f"{c.size} of {size} samples" for c in columns if c.size != size}
-    return replace(source, table=table), others
+    left_out = {c.header: f"{c.size} of {size} samples" for c in columns if c.size != size}
+    return replace(source, table=table), left_out
 
 
 def _described(source: Source) -> dict[str, Column]:
@@ -252,17 +252,17 @@ def _described(source: Source) -> dict[str, Column]:
     """
     table, request = source.table, source.request
     time, channels = request.described.time, request.described.channels
-    found: dict[str, Column] = {}
-    for name, given in channels.items():
-        if given.value is not None:
-            unit = weight(given.unit) if given.unit and unit_of(name) == "N" else given.unit
-            found[name] = Column(name, np.full(table.n_samples, given.value), unit)
-    headers = {"time": time.column, **{name: given.column for name, given in channels.items()}}
-    for channel, wanted in headers.items():
-        if wanted is None or channel in request.columns or (channel == "time" and table.has_clocks):
+    columns: dict[str, Column] = {}
+    for name, info in channels.items():
+        if info.value is not None:
+            unit = weight(info.unit) if info.unit and unit_of(name) == "N" else info.unit
+            columns[name] = Column(name, np.full(table.n_samples, info.value), unit)
+    headers = {"time": time.column, **{name: info.column for name, info in channels.items()}}
+    for channel, header in headers.items():
+        if header is None or channel in request.columns or (channel == "time" and table.has_clocks):
             continue
         try:
-            found[channel] = find_column(wanted, channel, source)
+            columns[channel] = find_column(header, channel, source)
         except DataError as error:
             if table.own:
                 continue
@@ -270,7 +270,7 @@ def _described(source: Source) -> dict[str, Column]:
                 remedy = f"correct its column in {NAME}, or use `columns[{channel}]=COLUMN`"
                 raise source.error(error.problem, remedy, channel, options=error.options) from None
             source.warn(f"channel {channel!r} is left out: {error.problem}")
-    return found
+    return columns
 
 
 def _only_time(named: Mapping[str, Column], source: Source) -> Column | None:
@@ -304,11 +304,11 @@ def _require(named: Mapping[str, Column], source: Source) -> None:
         if channel not in named and channel not in source.derived(named):
             problem = f"there is no such channel; the columns are {_headers(table)}"
             remedy = f"name its column with `columns[{channel}]=COLUMN`"
-            if others := [name for name in named if conversion(channel, name, 1.0)]:
-                remedy = f"state {REST_LENGTH}, which makes it of {others[0]}"
+            if convertible := [name for name in named if conversion(channel, name, 1.0)]:
+                remedy = f"state {REST_LENGTH}, which makes it of {convertible[0]}"
             raise source.error(problem, remedy, channel)
-    for option, given in (("calibration", request.calibration), ("units", request.units)):
-        for channel in given:
+    for option, stated in (("calibration", request.calibration), ("units", request.units)):
+        for channel in stated:
             if channel not in named and not request.join:
                 problem = f"it is not there; there are {', '.join(named)}"
                 raise source.error(problem, f"give `{option}` of one of them", channel)

@@ -61,24 +61,24 @@ def apart(named: Mapping[str, Column], time: Array) -> tuple[dict[str, Column], 
         for name, column in named.items()
         if column.values is not None and column.flaw is None
     }
-    there = {name: np.isfinite(values) for name, values in numbers.items()}
-    there = {name: mask for name, mask in there.items() if mask.any()}
+    present = {name: np.isfinite(values) for name, values in numbers.items()}
+    present = {name: mask for name, mask in present.items() if mask.any()}
     renewed: dict[str, float] = {}
-    if there and np.logical_and.reduce(list(there.values())).mean() < 0.5:
-        rows = {name: np.flatnonzero(mask) for name, mask in there.items()}
+    if present and np.logical_and.reduce(list(present.values())).mean() < 0.5:
+        rows = {name: np.flatnonzero(mask) for name, mask in present.items()}
     else:
         drives = [values for name, values in numbers.items() if base_name(name) in CAUSES]
         outputs = {name: x for name, x in numbers.items() if _is_output(name, named[name])}
-        found = {name: _renewals(x, drives) for name, x in outputs.items()}
-        rows = {name: at for name, at in found.items() if at is not None}
+        renewals = {name: _renewals(x, drives) for name, x in outputs.items()}
+        rows = {name: at for name, at in renewals.items() if at is not None}
         renewed = {name: time.size / at.size for name, at in rows.items()}
     if not rows:
         return dict(named), {}
     columns = dict(named)
     for name, values in numbers.items():
         at = rows.get(name, np.arange(time.size))
-        held = columns[name].held or base_name(name) in SET
-        columns[name] = replace(columns[name], values=values[at], times=time[at], held=held)
+        is_held = columns[name].held or base_name(name) in SET
+        columns[name] = replace(columns[name], values=values[at], times=time[at], held=is_held)
     return columns, renewed
 
 
@@ -117,12 +117,12 @@ def _renewals(values: Array, drives: Sequence[Array]) -> Rows | None:
 
 def _moves_between(values: Array, drive: Array, rows: Rows) -> bool:
     """Return whether a drive moves steadily between rows in which a signal is renewed, and with it."""
-    whole, within = np.diff(drive[rows]), drive[rows[1:] - 1] - drive[rows[:-1]]
+    steps, within = np.diff(drive[rows]), drive[rows[1:] - 1] - drive[rows[:-1]]
     share = 1.0 - 1.0 / np.mean(np.diff(rows))
-    moved = np.abs(whole) >= np.quantile(np.abs(whole), 0.5)
-    if not whole.any() or np.median(within[moved] / whole[moved]) < 0.5 * share:
+    is_large = np.abs(steps) >= np.quantile(np.abs(steps), 0.5)
+    if not steps.any() or np.median(within[is_large] / steps[is_large]) < 0.5 * share:
         return False
-    follows = np.corrcoef(np.diff(values[rows]), whole)[0, 1]
+    follows = np.corrcoef(np.diff(values[rows]), steps)[0, 1]
     return bool(abs(follows) > FOLLOWS)
 
 
@@ -192,12 +192,12 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
     columns: dict[str, Column] = {"time": Column("time", grid, "s")}
     left_out: list[str] = []
     for name, column in named.items():
-        own = clocks.get(name)
-        if own is None and column.values is not None:
+        own_times = clocks.get(name)
+        if own_times is None and column.values is not None:
             values = np.full(grid.size, column.values[0])  # a constant that the folder describes
             columns[name] = replace(column, values=values)
-        elif own is not None and (name in needed or _spans(own, grid)):
-            columns[name] = replace(column, values=_at(column, own, grid), times=None)
+        elif own_times is not None and (name in needed or _spans(own_times, grid)):
+            columns[name] = replace(column, values=_at(column, own_times, grid), times=None)
         else:
             left_out.append(column.header)
     return columns, left_out
@@ -221,10 +221,10 @@ def _at(column: Column, times: Array, grid: Array) -> Array:
     before = np.clip(np.searchsorted(times, grid, side="right") - 1, 0, times.size - 1)
     if column.held:
         return np.where((grid >= times[0]) & (grid <= times[-1]), column.values[before], np.nan)
-    found: Array = np.interp(grid, times, column.values)
+    samples: Array = np.interp(grid, times, column.values)
     steps = np.diff(times)
     step = float(np.median(steps))
-    found[(grid <= times[0] - step) | (grid >= times[-1] + step)] = np.nan
+    samples[(grid <= times[0] - step) | (grid >= times[-1] + step)] = np.nan
     widest = max(GAP * step, float(np.median(np.diff(grid))))
-    found[(np.append(steps, 0.0)[before] > widest) & (grid > times[before])] = np.nan
-    return found
+    samples[(np.append(steps, 0.0)[before] > widest) & (grid > times[before])] = np.nan
+    return samples

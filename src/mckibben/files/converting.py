@@ -79,23 +79,27 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         raise flawed or source.error(
             "there is no column of numbers", "give one with samples in columns"
         )
-    each = signals.items()
-    references = {name: one.read_in.reference for name, one in each if one.read_in.reference}
+    items = signals.items()
+    references = {
+        name: signal.read_in.reference for name, signal in items if signal.read_in.reference
+    }
     meta = {
         "ignored_columns": list(left_out),
         "converted_units": [
-            f"{name} from {one.read_in.name} to {one.unit}"
-            for name, one in each
-            if one.read_in.name != one.unit
+            f"{name} from {signal.read_in.name} to {signal.unit}"
+            for name, signal in items
+            if signal.read_in.name != signal.unit
         ],
         "pressure_reference": references,
-        "calibration": {name: one.calibration for name, one in each if one.calibration},
-        "assumed_units": [name for name, one in each if one.assumed and one.unit],
+        "calibration": {name: signal.calibration for name, signal in items if signal.calibration},
+        "assumed_units": [name for name, signal in items if signal.assumed and signal.unit],
         "sampled": sampled,
         "began": None if times is None else times.began,
     }
     assumed = ["time in s"] if times is not None and times.assumed else []
-    assumed += [f"{name} in {one.unit}" for name, one in each if one.assumed and one.unit]
+    assumed += [
+        f"{name} in {signal.unit}" for name, signal in items if signal.assumed and signal.unit
+    ]
     if assumed:
         text = f"{ASSUMED}{listed(assumed)}; use `units[CHANNEL]=UNIT` where that is wrong"
         source.warn(text, quiet=source.in_memory)  # names in a program are its author's
@@ -106,7 +110,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         reasons = [f"{header} ({why})" for header, why in left_out.items()]
         source.warn(f"not read: {listed(reasons)}")
     signals |= {name: _derived(name, of, signals[of], source) for name, of in derived.items()}
-    return signals, times, {name: found for name, found in meta.items() if found}
+    return signals, times, {name: value for name, value in meta.items() if value}
 
 
 def _derived(channel: str, of: str, signal: Signal, source: Source) -> Signal:
@@ -141,21 +145,21 @@ def _with_clocks(source: Source) -> Source:
         return source
     groups[:2] = [groups[0] + groups[1]]  # what is before the first clock has that one
     columns, times = [], [times_of(clock, source) for clock in clocks]
-    for one, late, group in zip(times, starts_of(times, source), groups, strict=True):
-        seconds = late + convert(one.values, one.unit, "s")
-        known = np.isfinite(seconds)
+    for one, start, group in zip(times, starts_of(times, source), groups, strict=True):
+        seconds = start + convert(one.values, one.unit, "s")
+        is_finite = np.isfinite(seconds)
         for column in group:
-            values = None if column.values is None else column.values[known]
-            columns.append(replace(column, values=values, times=seconds[known]))
+            values = None if column.values is None else column.values[is_finite]
+            columns.append(replace(column, values=values, times=seconds[is_finite]))
     return replace(source, table=replace(table, columns=tuple(columns), lines=None))
 
 
 def starts_of(times: Sequence[Times], source: Source) -> list[float]:
     """Return when clocks begin, from the first of them [s]; with a note where that is not known."""
-    found = timebase.begun([instants.moment(one.began) if one.began else None for one in times])
-    if found is None:
+    starts = timebase.begun([instants.moment(each.began) if each.began else None for each in times])
+    if starts is None:
         source.warn(timebase.AT_ONE_MOMENT)
-    return found or [0.0] * len(times)
+    return starts or [0.0] * len(times)
 
 
 def _clock(columns: dict[str, Column], left_out: dict[str, str], source: Source) -> Times | None:
@@ -182,13 +186,13 @@ def _apart(columns: dict[str, Column], times: Times | None, source: Source) -> d
     seconds = convert(times.values, times.unit, "s")
     if not np.all(np.diff(seconds) >= 0):
         return columns
-    found, renewed = clocks.apart(columns, seconds)
+    on_clocks, renewed = clocks.apart(columns, seconds)
     for name, rows in renewed.items():
         source.warn(
             f"channel {name!r} is renewed every {rows:.3g} rows, so it is read at these; "
             "use `raw` where that is wrong"
         )
-    return found
+    return on_clocks
 
 
 def times_of(column: Column, source: Source) -> Times:
@@ -199,13 +203,13 @@ def times_of(column: Column, source: Source) -> Times:
         since, began = instants.seconds(column.texts, source)
         return Times(gain * since + offset, began=began)
     values = gain * _numbers("time", column, source) + offset
-    found, assumed = _unit("time", column, values, source)
-    unit = found.name
+    unit, assumed = _unit("time", column, values, source)
+    name = unit.name
     stated = _is_stated("time", column, source)
     if not stated:
-        seconds = convert(values, unit, "s")
-        quality.question_size("time", column, seconds, unit, source, assumed=assumed)
-    times = Times(values, unit, stated or unit != "s", assumed)
+        seconds = convert(values, name, "s")
+        quality.question_size("time", column, seconds, name, source, assumed=assumed)
+    times = Times(values, name, stated or name != "s", assumed)
     return times if source.table.own else timebase.since_first(times)
 
 
@@ -213,8 +217,8 @@ def _signal(channel: str, column: Column, jumps: Rows, source: Source) -> Signal
     """Return a channel in the package's unit, NaN for missing samples; drives have ``jumps``."""
     raw = _numbers(channel, column, source)
     calibration = _calibration(channel, column, source)
-    own, standard = source.table.own, unit_of(channel)
-    cleaned = not own and not source.request.raw
+    is_own, standard = source.table.own, unit_of(channel)
+    cleaned = not is_own and not source.request.raw
     if cleaned and base_name(channel) not in DRIVES:  # a sawtooth can be commanded
         raw = wrapping.unwrapped(channel, raw, jumps, source)
     values = raw
@@ -222,12 +226,12 @@ def _signal(channel: str, column: Column, jumps: Rows, source: Source) -> Signal
         with np.errstate(over="ignore"):
             values = calibration["gain"] * raw + calibration["offset"]
     read_in, assumed = _unit(channel, column, values, source)
-    unit = standard if own or standard is not None else read_in.target
+    unit = standard if is_own or standard is not None else read_in.target
     unit = read_in.name if unit is None else unit
     samples = convert(values, read_in.name, unit)
     if cleaned:
         samples = quality.without_codes(channel, samples, raw, source)
-    if not own and not _is_stated(channel, column, source):
+    if not is_own and not _is_stated(channel, column, source):
         quality.question_size(channel, column, samples, read_in.name, source, assumed=assumed)
     return Signal(samples, unit, read_in, assumed, calibration)
 
@@ -235,8 +239,10 @@ def _signal(channel: str, column: Column, jumps: Rows, source: Source) -> Signal
 def _is_stated(channel: str, column: Column, source: Source) -> bool:
     """Return whether the user states a unit or a calibration of a channel, here or in the folder."""
     request = source.request
-    given = request.described.time if channel == "time" else request.described.channels.get(channel)
-    described = given is not None and given.unit is not None and _describes(given, column)
+    settings = (
+        request.described.time if channel == "time" else request.described.channels.get(channel)
+    )
+    described = settings is not None and settings.unit is not None and _describes(settings, column)
     calibrated = channel != "time" and bool(_calibration(channel, column, source))
     return channel in request.units or described or calibrated
 
@@ -260,38 +266,38 @@ def _numbers(channel: str, column: Column, source: Source) -> Array:
 
 def _calibration(channel: str, column: Column, source: Source) -> dict[str, Any]:
     """Return gain and offset, requested or described, or the described constant, or nothing."""
-    given = source.request.described.channels.get(channel)
-    if given is not None and given.value is not None and column.header == channel:
-        return {"value": given.value, "unit": given.unit}
+    settings = source.request.described.channels.get(channel)
+    if settings is not None and settings.value is not None and column.header == channel:
+        return {"value": settings.value, "unit": settings.unit}
     if channel in source.request.lines:
         gain, offset = source.request.lines[channel]
-    elif given is not None and given.is_calibrated and _describes(given, column):
-        gain, offset = 1.0 if given.gain is None else given.gain, given.offset or 0.0
+    elif settings is not None and settings.is_calibrated and _describes(settings, column):
+        gain, offset = 1.0 if settings.gain is None else settings.gain, settings.offset or 0.0
     else:
         return {}
     return {"column": column.header, "gain": gain, "offset": offset}
 
 
-def _describes(given: Channel | Time, column: Column) -> bool:
+def _describes(settings: Channel | Time, column: Column) -> bool:
     """Return whether a folder's settings of a channel refer to this column."""
-    named = snake_case(given.column or column.header)
-    return named in (snake_case(column.header), snake_case(parse(column.header).name))
+    name = snake_case(settings.column or column.header)
+    return name in (snake_case(column.header), snake_case(parse(column.header).name))
 
 
 def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[Unit, bool]:
     """Return the unit of a column, requested, stated or assumed, and whether it is assumed."""
     expected = unit_of(channel)
-    asked = source.request.units.get(channel)
-    text = _stated(channel, column, source) if asked is None else asked
+    requested = source.request.units.get(channel)
+    text = _stated(channel, column, source) if requested is None else requested
     if text is None:
         by_size = timebase.unit_by_size(values, source) if channel == "time" else None
         if by_size:
             return Unit(by_size, "s"), False
         return _assumed(channel, column, values, source), expected is not None
-    if source.table.own and asked is None and expected in (None, text):
+    if source.table.own and requested is None and expected in (None, text):
         return Unit(text, expected), False
     unit = find(text)
-    if unit is None and asked is None and expected is None:
+    if unit is None and requested is None and expected is None:
         return Unit(text, None), False
     if unit is None:
         raise _unknown(channel, f"the unit {text[:40]!r} is unknown", column, values, source)
@@ -337,24 +343,24 @@ def _to_calibrate(channel: str, column: Column, unit: str) -> str:
 def _stated(channel: str, column: Column, source: Source) -> str | None:
     """Return the unit of the file and the folder; raise a `DataError` if they differ."""
     described = source.request.described
-    given = described.time if channel == "time" else described.channels.get(channel)
+    settings = described.time if channel == "time" else described.channels.get(channel)
     in_header = None if source.table.own else parse(column.label).unit
     if channel == "time" and in_header is None:
         in_header = time_unit(column.label)
     stated = {"its header": in_header, "the file": column.unit}
-    if given is not None and given.unit is not None and _describes(given, column):
-        if isinstance(given, Channel) and given.value is not None:
+    if settings is not None and settings.unit is not None and _describes(settings, column):
+        if isinstance(settings, Channel) and settings.value is not None:
             stated = {NAME: column.unit}
-        elif isinstance(given, Channel) and given.is_calibrated:
-            stated = {NAME: given.unit}  # the unit that the calibration results in
+        elif isinstance(settings, Channel) and settings.is_calibrated:
+            stated = {NAME: settings.unit}  # the unit that the calibration results in
         else:
-            stated[NAME] = given.unit
-    texts = {place: text for place, text in stated.items() if text is not None}
-    units = {place: unit for place, text in texts.items() if (unit := find(text))}
+            stated[NAME] = settings.unit
+    texts = {source_name: text for source_name, text in stated.items() if text is not None}
+    units = {source_name: unit for source_name, text in texts.items() if (unit := find(text))}
     if units:
-        texts = {place: texts[place] for place in units}
+        texts = {source_name: texts[source_name] for source_name in units}
     if len({(unit.name, unit.reference) for unit in units.values()}) > 1:
-        differing = ", ".join(f"{text!r} in {place}" for place, text in texts.items())
+        differing = ", ".join(f"{text!r} in {source_name}" for source_name, text in texts.items())
         options = [{"units": {channel: text}} for text in dict.fromkeys(reversed(texts.values()))]
         problem = f"its unit is contradicted: {differing}"
         raise source.error(problem, "correct the file", channel, options=options)

@@ -27,7 +27,7 @@ _INSTANTS = re.compile(r"((?:datetime|timedelta)64)(?:\[(s|ms|us|ns)\b)?")
 _PICKLED = Unread("pandas pickled it; save the frame with `to_csv` or `to_parquet`")
 
 
-def columns(found: Mapping[str, Node], group: Any) -> dict[str, Node]:
+def columns(group_tree: Mapping[str, Node], group: Any) -> dict[str, Node]:
     """Return the columns of a frame or a series by their names, its index first where that is data.
 
     Parameters
@@ -37,46 +37,46 @@ def columns(found: Mapping[str, Node], group: Any) -> dict[str, Node]:
     group : h5py.Group
         With pandas' attributes.
     """
-    parts = _of_table if isinstance(found.get("table"), Mapping) else _of_blocks
+    parts = _of_table if isinstance(group_tree.get("table"), Mapping) else _of_blocks
     made: dict[str, Node] = {}
-    for name, node in parts(found, group):
+    for name, node in parts(group_tree, group):
         if name in made:
             raise ValueError(f"two columns are named {name!r}")
         made[name] = node
-    order = found.get("axis0")
+    order = group_tree.get("axis0")
     if isinstance(order, list):
         return {name: made[name] for name in (*(made.keys() - {*order}), *order) if name in made}
     return made
 
 
-def _of_blocks(found: Mapping[str, Node], group: Any) -> Iterator[tuple[str, Node]]:
+def _of_blocks(group_tree: Mapping[str, Node], group: Any) -> Iterator[tuple[str, Node]]:
     """Yield the columns of the format "fixed"."""
     index = "index" if "index" in group else "axis1"
     about = group[index].attrs if index in group else {}
-    yield from _index(found.get(index, _PICKLED), about.get("name"), about.get("kind"))
+    yield from _index(group_tree.get(index, _PICKLED), about.get("name"), about.get("kind"))
     if "values" in group:  # a series
-        yield _text(group.attrs.get("name")) or "values", found["values"]
+        yield _text(group.attrs.get("name")) or "values", group_tree["values"]
     for block in (name.removesuffix("_values") for name in group if name.endswith("_values")):
-        items, about = found.get(f"{block}_items"), group[f"{block}_values"].attrs
+        items, about = group_tree.get(f"{block}_items"), group[f"{block}_values"].attrs
         if isinstance(items, np.ndarray):
             items = [str(item) for item in items]
-        values = found.get(f"{block}_values", _PICKLED)
+        values = group_tree.get(f"{block}_values", _PICKLED)
         if isinstance(values, np.ndarray) and not about.get("transposed"):
             values = values.T
         names = items if isinstance(items, list) else None
         yield from _split(f"{block}_values", names, values, about.get("value_type"))
 
 
-def _of_table(found: Mapping[str, Node], group: Any) -> Iterator[tuple[str, Node]]:
+def _of_table(group_tree: Mapping[str, Node], group: Any) -> Iterator[tuple[str, Node]]:
     """Yield the columns of the format "table"."""
-    fields, about = found["table"], group["table"].attrs
+    fields, about = group_tree["table"], group["table"].attrs
     assert isinstance(fields, Mapping)
     for field, values in fields.items():
         if field == "index":
             opcodes = _opcodes(group.attrs.get("info"))
-            after = dropwhile(lambda one: one[1] != "index_name", opcodes)
-            named = [one for one in after if not _LIST.fullmatch(one[0])][1:2]
-            name = next((text for code, text in named if _TEXT.fullmatch(code)), None)
+            after = dropwhile(lambda opcode: opcode[1] != "index_name", opcodes)
+            index_name = [opcode for opcode in after if not _LIST.fullmatch(opcode[0])][1:2]
+            name = next((text for code, text in index_name if _TEXT.fullmatch(code)), None)
             yield from _index(values, name, about.get("index_kind"))
         else:
             names = _texts(about.get(f"{field}_kind"))
@@ -92,11 +92,11 @@ def _index(values: Node, name: Any, kind: Any) -> Iterator[tuple[str, Node]]:
 
 
 def _split(
-    place: str, names: list[str] | None, values: Node, kind: Any
+    path: str, names: list[str] | None, values: Node, kind: Any
 ) -> Iterator[tuple[str, Node]]:
     """Yield the columns of a block by their names."""
     if names is None:
-        yield place, _PICKLED
+        yield path, _PICKLED
     elif isinstance(values, np.ndarray):
         rows = _typed(values.reshape(len(values), -1), kind)
         yield from zip(names, rows.T, strict=True)
@@ -108,10 +108,10 @@ def _split(
 
 def _typed(values: Any, kind: Any) -> Any:
     """Return whole numbers as the instants or durations that they are."""
-    found = _INSTANTS.match(_text(kind) or "")
-    if found is None or not isinstance(values, np.ndarray) or values.dtype.kind != "i":
+    match = _INSTANTS.match(_text(kind) or "")
+    if match is None or not isinstance(values, np.ndarray) or values.dtype.kind != "i":
         return values
-    return values.astype("i8").view(f"{found[1]}[{found[2] or 'ns'}]")
+    return values.astype("i8").view(f"{match[1]}[{match[2] or 'ns'}]")
 
 
 def _text(value: Any) -> str | None:
@@ -124,9 +124,9 @@ def _text(value: Any) -> str | None:
 def _texts(pickled: Any) -> list[str] | None:
     """Return the texts of a pickled list of these, or None."""
     opcodes = list(_opcodes(pickled))
-    rest = [(code, text) for code, text in opcodes if not _LIST.fullmatch(code)]
-    known = opcodes and all(_TEXT.fullmatch(code) for code, _ in rest)
-    return [text for _, text in rest] if known else None
+    texts = [(code, text) for code, text in opcodes if not _LIST.fullmatch(code)]
+    is_text = opcodes and all(_TEXT.fullmatch(code) for code, _ in texts)
+    return [text for _, text in texts] if is_text else None
 
 
 def _opcodes(pickled: Any) -> Iterable[tuple[str, str]]:

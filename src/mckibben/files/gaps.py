@@ -66,8 +66,8 @@ def pieces(
     cuts = stretches[len(stretches) if split else 1 :, 0]
     if times is not None and cuts.size:
         _judge_gaps(cuts, times, source)
-    whole = stretches.reshape(1, -1)[:, [0, -1]] if stretches.size else stretches
-    spans = _long_enough(stretches if split else whole, source)
+    full = stretches.reshape(1, -1)[:, [0, -1]] if stretches.size else stretches
+    spans = _long_enough(stretches if split else full, source)
     size, jitter = 1.0, None
     if times is not None:
         size, jitter = timebase.common_step(time, spans if split else stretches)
@@ -75,7 +75,7 @@ def pieces(
         if cuts.size and (time[-1] - time[0]) / size > 100 * time.size:
             problem = "its gaps are too long to bridge"
             raise source.error(problem, "", "time", options=[{"gaps": "split"}])
-    found = []
+    result = []
     for first, after in spans:
         t, bridged = time[first:after], holes[first:after] & (not split)
         grid = t
@@ -94,8 +94,8 @@ def pieces(
         pitch = 1.0 if step is None else step  # without time, samples are numbered
         begin = start + pitch * first if times is None else times.seconds(t[0])
         marked = begin + pitch * (true_runs(bridged) - [0, 1])
-        found.append(Piece(samples, step, float(begin), marked.tolist()))
-    return found
+        result.append(Piece(samples, step, float(begin), marked.tolist()))
+    return result
 
 
 def _missing(channels: Channels, source: Source) -> dict[str, Mask]:

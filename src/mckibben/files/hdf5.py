@@ -68,23 +68,23 @@ class _Tree:
         import h5py
 
         self._seen.add(h5py.h5o.get_info(group.id).addr)
-        found: dict[str, Node] = {}
+        nodes: dict[str, Node] = {}
         for name in group:
             link = group.get(name, getlink=True)
             if isinstance(link, h5py.ExternalLink):
-                found[name] = Unread("it is in another file")
+                nodes[name] = Unread("it is in another file")
             if not isinstance(link, h5py.HardLink) or (self._matlab and name.startswith("#")):
                 continue  # a soft link leads to what is read under its own name, or out of the file
             item = group[name]
             at = h5py.h5o.get_info(item.id).addr
-            about = {key.casefold(): each for key, each in _attributes(item).items()}
+            about = {key.casefold(): value for key, value in _attributes(item).items()}
             if at not in self._seen and about.get("class") != "TINDEX":  # of PyTables, to search
                 self._seen.add(at)
-                found[name] = self._node(item)
+                nodes[name] = self._node(item)
                 unit = about.get("unit") or about.get("units")
                 if isinstance(unit, str) and name + INFO not in group:
-                    found[name + INFO] = {"unit": unit}
-        return frames.columns(found, group) if "pandas_type" in group.attrs else found
+                    nodes[name + INFO] = {"unit": unit}
+        return frames.columns(nodes, group) if "pandas_type" in group.attrs else nodes
 
     def _node(self, item: Any) -> Node:
         import h5py
@@ -95,19 +95,19 @@ class _Tree:
             return ""  # a type that has a name
         if self._matlab and "MATLAB_sparse" in item.attrs:
             return Unread("a sparse matrix")
-        found = self.group(item)
+        group = self.group(item)
         if not self._matlab:
-            return found
+            return group
         # a struct array has references in its fields, which unlike those of cells have no class
         arrays: dict[str, Any] = {
             name: node
-            for name, node in found.items()
+            for name, node in group.items()
             if isinstance(node, list) and "MATLAB_class" not in item[name].attrs
         }
         if not arrays:
-            return found
+            return group
         rows = zip(*arrays.values(), strict=True)
-        return [dict(zip(arrays, each, strict=True)) for each in rows]
+        return [dict(zip(arrays, row, strict=True)) for row in rows]
 
     def _values(self, data: Any) -> Node:
         """Return the samples of a data set, its text, or the targets of its references."""
@@ -159,8 +159,8 @@ def _fields(samples: NDArray[Any]) -> Node:
 
 def _attributes(item: Any) -> dict[str, Any]:
     """Return the JSON-compatible attributes."""
-    found: dict[str, Any] = {}
+    attributes: dict[str, Any] = {}
     for name in item.attrs:
         with suppress(TypeError):  # NumPy has no such type
-            found[name] = item.attrs[name]
-    return plain_meta(found)
+            attributes[name] = item.attrs[name]
+    return plain_meta(attributes)

@@ -86,8 +86,8 @@ def parse(text: str) -> Header:
             return Header(f"{inner.name} {unit}", inner.unit)
         return Header(name, _referred(unit, name))
     over = _OVER.fullmatch(text)
-    named = over and _names(_last(over["name"]), over["unit"])
-    for form in (_IN, _OVER if named else _COMPOSITE, _OVER, *_ENDINGS):
+    reading = over and _names(_last(over["name"]), over["unit"])
+    for form in (_IN, _OVER if reading else _COMPOSITE, _OVER, *_ENDINGS):
         match = form.fullmatch(text)
         if match is None:
             continue
@@ -116,8 +116,8 @@ def channel_of(header: Header) -> str:
     if word in AMBIGUOUS and unit is not None and unit.target in QUANTITIES:
         return QUANTITIES[unit.target] + (f"_{number}" if number else "")
     if standard is None:
-        rest, _, about = name.rpartition("_")
-        plain = f"{about}_of_{rest}" if unit_of(name) is not None and about in _ABOUT else name
+        stem, _, about = name.rpartition("_")
+        plain = f"{about}_of_{stem}" if unit_of(name) is not None and about in _ABOUT else name
         return _of_loop(name, header) or plain
     base = base_name(standard)
     if unit is None or unit.target == _expected(base):
@@ -163,19 +163,19 @@ def by_words(units: Mapping[str, str]) -> dict[str, str]:
     >>> by_words({"p_ist": "bar", "p_soll": "bar"})
     {'p_ist': 'pressure'}
     """
-    found: dict[str, list[str]] = {}
+    candidates: dict[str, list[str]] = {}
     for name, unit in units.items():
         words = name.split("_")
-        rest = "_".join(word for word in words if word not in _MEASURED)
-        plain = _standard(rest) if rest != name else None
+        words_left = "_".join(word for word in words if word not in _MEASURED)
+        plain = _standard(words_left) if words_left != name else None
         meant = {plain} if plain else {*filter(None, map(_in_word, words))}
-        other = {*_ABOUT, *_ROLES, *_REFERENCES} & {*words}
-        if unit_of(name) is None and len(meant) == 1 and not other:
+        has_role = {*_ABOUT, *_ROLES, *_REFERENCES} & {*words}
+        if unit_of(name) is None and len(meant) == 1 and not has_role:
             (channel,) = meant
             if unit == unit_of(channel) and channel not in units:
-                found.setdefault(channel, []).append(name)
+                candidates.setdefault(channel, []).append(name)
     renamed = {}
-    for channel, names in found.items():
+    for channel, names in candidates.items():
         numbers = [re.findall(r"\d+", name)[-1:] for name in names]
         several = ["_".join([channel, *number]) for number in numbers]
         if len(names) == 1:
@@ -202,14 +202,14 @@ def _in_word(word: str) -> str | None:
 
 def by_units(units: Mapping[str, str]) -> dict[str, str]:
     """Return channels by units for columns named u1, output or similar."""
-    found = {}
+    result = {}
     for name, unit in units.items():
         unnamed = re.fullmatch(r"(?:[a-z]|in|out|input|output|column)(?:_?(\d+))?", name)
         if unnamed and unit in QUANTITIES:
             alone = len(name) > 2 and [*units.values()].count(unit) == 1
-            found[name] = QUANTITIES[unit] + (f"_{unnamed[1]}" if unnamed[1] and not alone else "")
-    names = Counter(found.get(name, name) for name in units)
-    return {name: new for name, new in found.items() if names[new] == 1}
+            result[name] = QUANTITIES[unit] + (f"_{unnamed[1]}" if unnamed[1] and not alone else "")
+    names = Counter(result.get(name, name) for name in units)
+    return {name: new for name, new in result.items() if names[new] == 1}
 
 
 def unit_of(channel: str) -> str | None:
@@ -264,8 +264,8 @@ def foreign_words(text: str) -> int:
     (6, 0)
     """
     text = _plain(text).casefold()
-    known = (*_CHANNELS, *_ROLES, *_UNITS, "°", "μ")
-    words = {word for word in known if not word.isascii()}
+    vocabulary = (*_CHANNELS, *_ROLES, *_UNITS, "°", "μ")
+    words = {word for word in vocabulary if not word.isascii()}
     return sum(text.count(word) * len(word) for word in words)
 
 
@@ -275,10 +275,10 @@ def unknown_ending(text: str) -> str:
     >>> unknown_ending("pressure_qux"), unknown_ending("Inlet pressure 2"), unknown_ending("data")
     ('qux', '', '')
     """
-    known = {part for word in (*_CHANNELS, *_ROLES) for part in word.split("_")} | {*_MUSCLES}
+    vocabulary = {part for word in (*_CHANNELS, *_ROLES) for part in word.split("_")} | {*_MUSCLES}
     words = re.findall(r"[^\W\d_]+", snake_case(text.rpartition("/")[2]))  # not of a topic
-    named = next((k for k, word in enumerate(words) if word in known), len(words))
-    return next((word for word in words[named:] if word not in known), "")
+    n_known = next((k for k, word in enumerate(words) if word in vocabulary), len(words))
+    return next((word for word in words[n_known:] if word not in vocabulary), "")
 
 
 def _plain(text: str) -> str:
@@ -298,8 +298,8 @@ def _apart(name: str) -> list[str]:
 def _standard(name: str) -> str | None:
     words = _apart(name)
     places = {_MUSCLES[word] for word in words if word in _MUSCLES}
-    others = "_".join(word for word in words if word not in _MUSCLES)
-    pressure, number = _numbered(others)
+    stem = "_".join(word for word in words if word not in _MUSCLES)
+    pressure, number = _numbered(stem)
     if len(places) == 1 and _CHANNELS.get(pressure) == "pressure":
         return "_".join(["pressure", *places, *filter(None, [number.lstrip("0")])])
     alias, number = _numbered(name)
@@ -345,8 +345,8 @@ def _is_doubtful(text: str) -> bool:
 
 def _referred(unit: str, name: str) -> str:
     """Return a unit with the pressure reference of the name."""
-    found = [f"{unit} {word}" for word in _words(name) if word in _REFERENCES]
-    return found[0] if found and getattr(find(found[0]), "reference", None) else unit
+    references = [f"{unit} {word}" for word in _words(name) if word in _REFERENCES]
+    return references[0] if references and getattr(find(references[0]), "reference", None) else unit
 
 
 def _last(name: str) -> str:

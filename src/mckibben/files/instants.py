@@ -63,11 +63,11 @@ def seconds(texts: Sequence[str], source: Source) -> tuple[Array, str | None]:
     else:
         cells, patterns = _in_one_form(cells.str.extract(_FORM, flags=re.ASCII), form)
     zoned = form is None or form["zone"] is not None
-    found = []
+    parsings = []
     for pattern in patterns:
         read = pd.to_datetime(cells, format=pattern, errors="coerce", utc=zoned)
-        found.append((read.dt.tz_localize(None) if zoned else read).to_numpy("datetime64[ns]"))
-    instants, *others = sorted(found, key=lambda each: np.isnat(each).sum())
+        parsings.append((read.dt.tz_localize(None) if zoned else read).to_numpy("datetime64[ns]"))
+    instants, *alternatives = sorted(parsings, key=lambda each: np.isnat(each).sum())
     blank = np.array([not text for text in texts])
     bad = np.flatnonzero(np.isnat(instants) & ~blank)
     if bad.size:
@@ -77,8 +77,8 @@ def seconds(texts: Sequence[str], source: Source) -> tuple[Array, str | None]:
         raise source.error(problem, remedy, "time", int(bad[0]))
     at = int(np.argmin(blank))  # the first with a time
     elapsed = (instants - instants[at])[~blank]
-    for other in others:
-        found_else = (other - other[at])[~blank]
+    for alternative in alternatives:
+        found_else = (alternative - alternative[at])[~blank]
         if not np.isnat(found_else).any() and np.any(found_else != elapsed):
             problem = f"{first[:40]!r} may have the day first or the month"
             remedy = "write dates as 2026-01-31, or with the day first and dots, or give `rate`"
@@ -92,15 +92,15 @@ def seconds(texts: Sequence[str], source: Source) -> tuple[Array, str | None]:
 
 def _of_minutes(texts: Sequence[str], source: Source) -> Array:
     """Return minutes and seconds as seconds, NaN where blank."""
-    found = np.full(len(texts), np.nan)
+    minutes = np.full(len(texts), np.nan)
     for at, text in enumerate(texts):
         parts = _MINUTES.fullmatch(text)
         if parts is not None:
-            found[at] = 60.0 * float(parts[1]) + float(parts[2].replace(",", "."))
+            minutes[at] = 60.0 * float(parts[1]) + float(parts[2].replace(",", "."))
         elif text:
             problem = f"{text[:40]!r} is no time in minutes and seconds"
             raise source.error(problem, "correct that cell, or give `rate`", "time", at)
-    return found
+    return minutes
 
 
 def moment(began: str) -> float:

@@ -52,8 +52,8 @@ def joined(recordings: Sequence[Recording], request: Request) -> Recording:
         have no time in common.
     """
     joint = _joined(recordings, request)
-    asked = {*request.columns, *request.units, *request.calibration, *(request.channels or ())}
-    if missing := sorted(asked - {*joint, "time"}):
+    stated = {*request.columns, *request.units, *request.calibration, *(request.channels or ())}
+    if missing := sorted(stated - {*joint, "time"}):
         problem = f"it is in none of the files; there are {', '.join(joint)}"
         remedy = f"name its column with `columns[{missing[0]}]=COLUMN`"
         raise DataError(problem, file=joint.source, channel=missing[0], remedy=remedy)
@@ -63,19 +63,19 @@ def joined(recordings: Sequence[Recording], request: Request) -> Recording:
 def _joined(recordings: Sequence[Recording], request: Request) -> Recording:
     if len(recordings) < 2:
         return recordings[0]
-    names = [set(one.channels) for one in recordings]
+    names = [set(run.channels) for run in recordings]
     if all(some == names[0] for some in names):
         return _in_sequence(_in_order(_on_one_clock(recordings)), request)
-    twice = {some for k, one in enumerate(names) for other in names[:k] for some in one & other}
+    twice = {name for k, own in enumerate(names) for other in names[:k] for name in own & other}
     shared = sorted(name for name in twice if unit_of(name) is not None or name in request.columns)
     if shared:
         problem = "it is in several files, but not in all of them"
         remedy = "join pieces with the same channels, or loggers with different ones"
         raise DataError(problem, file=recordings[0].source, channel=shared[0], remedy=remedy)
-    own = [one.select([name for name in one if name not in twice]) for one in recordings]
-    if any(_moment(one) is None for one in own):
-        warn(_path(own), AT_ONE_MOMENT)
-    return _side_by_side(_on_one_clock(own), request)
+    unshared = [run.select([name for name in run if name not in twice]) for run in recordings]
+    if any(_moment(run) is None for run in unshared):
+        warn(_path(unshared), AT_ONE_MOMENT)
+    return _side_by_side(_on_one_clock(unshared), request)
 
 
 class _Extent(NamedTuple):
@@ -99,28 +99,28 @@ def _meet(
     before: Mapping[str, _Extent], after: Mapping[str, _Extent], drives: Sequence[str]
 ) -> bool:
     """Return whether channels begin where others end, away from where a drive of these began."""
-    whole = True
-    for name, one in before.items():
-        other = after[name]
-        width = max(one.high, other.high) - min(one.low, other.low)
-        if abs(other.first - one.last) > MEETS * width + STEPS_BETWEEN * one.step:
+    meets = True
+    for name, old in before.items():
+        new = after[name]
+        width = max(old.high, new.high) - min(old.low, new.low)
+        if abs(new.first - old.last) > MEETS * width + STEPS_BETWEEN * old.step:
             return False
-        whole &= name not in drives or abs(one.last - one.first) < AWAY * width
-    return not whole
+        meets &= name not in drives or abs(old.last - old.first) < AWAY * width
+    return not meets
 
 
 def continued(recordings: Sequence[Recording]) -> Iterator[tuple[Recording, str]]:
     """Yield recordings of several files that may be one run with another, and why."""
-    if len({one.source for one in recordings}) < 2:
+    if len({run.source for run in recordings}) < 2:
         return
-    each = [(one, _extents(one), by_name([one])[0]) for one in recordings]
-    pairs = permutations(each, 2) if len(each) <= MOST_PAIRED else pairwise(each)
+    extents = [(run, _extents(run), by_name([run])[0]) for run in recordings]
+    pairs = permutations(extents, 2) if len(extents) <= MOST_PAIRED else pairwise(extents)
     for (before, ends, drives), (after, starts, _) in pairs:
         if before.source == after.source or list(ends) != list(starts):
             continue
         if _same_step(before, after) and (_follows(before, after) or _meet(ends, starts, drives)):
             yield after, f"it begins where {before.name} ends; if both are one run, use `join`"
-    names = [{name for name in one if unit_of(name)} for one in recordings]
+    names = [{name for name in run if unit_of(name)} for run in recordings]
     if len(names) == 2 and all(names) and not names[0] & names[1]:
         yield recordings[1], "its channels are others; if it is of the same run, use `join`"
 
@@ -145,12 +145,12 @@ def _follows(before: Recording, after: Recording) -> bool:
 
 def _on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
     """Return recordings whose start times are from one moment, if all are known to be."""
-    found = begun([_moment(one) for one in recordings])
-    if found is None:
+    starts = begun([_moment(run) for run in recordings])
+    if starts is None:
         return list(recordings)
-    unknown = all(_moment(one) is None for one in recordings)
-    pairs = zip(recordings, found, strict=True)
-    return list(recordings) if unknown else [_starting(one, start) for one, start in pairs]
+    unknown = all(_moment(run) is None for run in recordings)
+    pairs = zip(recordings, starts, strict=True)
+    return list(recordings) if unknown else [_starting(run, start) for run, start in pairs]
 
 
 def _moment(recording: Recording) -> float | None:
@@ -168,23 +168,25 @@ def _starting(recording: Recording, start: float) -> Recording:
 
 def _in_order(recordings: Sequence[Recording]) -> list[Recording]:
     """Return pieces in the order of their times; as given where these overlap."""
-    by_time = sorted(recordings, key=lambda one: one.start_time)
-    apart = all(before.time[-1] < after.time[0] for before, after in pairwise(by_time))
-    return by_time if apart else list(recordings)
+    by_time = sorted(recordings, key=lambda run: run.start_time)
+    is_ordered = all(before.time[-1] < after.time[0] for before, after in pairwise(by_time))
+    return by_time if is_ordered else list(recordings)
 
 
 def _in_sequence(pieces: list[Recording], request: Request) -> Recording:
     first = pieces[0]
-    for one in pieces[1:]:
-        if not _same_step(first, one):
+    for piece in pieces[1:]:
+        if not _same_step(first, piece):
             problem = (
-                f"it has {one.step:g} s between samples, and {first.source} has {first.step:g} s"
+                f"it has {piece.step:g} s between samples, and {first.source} has {first.step:g} s"
             )
             remedy = "resample them first, with `resample`"
-            raise DataError(problem, file=one.source, remedy=remedy)
-    times = np.concatenate([one.time for one in pieces])
-    own = all(one.start_time <= first.start_time + STEPS_BETWEEN * first.step for one in pieces)
-    if not own and np.any(np.diff(times) <= 0):
+            raise DataError(problem, file=piece.source, remedy=remedy)
+    times = np.concatenate([piece.time for piece in pieces])
+    alike = all(
+        piece.start_time <= first.start_time + STEPS_BETWEEN * first.step for piece in pieces
+    )
+    if not alike and np.any(np.diff(times) <= 0):
         problem = "its pieces overlap in time"
         raise DataError(problem, file=first.source, remedy="leave out what is there twice")
     if first.sample_time is None or np.any(np.diff(times) <= 0):  # each counts from its own start
@@ -192,9 +194,11 @@ def _in_sequence(pieces: list[Recording], request: Request) -> Recording:
         warn(_path(pieces), text)
         return _together(first, pieces, {n: _end_to_end(pieces, n) for n in first.channels})
     steps = np.diff(times)
-    at = int(np.argmax(steps))
-    if steps[at] > STEPS_BETWEEN * first.step and request.gaps != "interpolate":
-        problem = f"there is a gap of {steps[at]:.6g} s between the pieces, at {times[at]:.6g} s"
+    gap_at = int(np.argmax(steps))
+    if steps[gap_at] > STEPS_BETWEEN * first.step and request.gaps != "interpolate":
+        problem = (
+            f"there is a gap of {steps[gap_at]:.6g} s between the pieces, at {times[gap_at]:.6g} s"
+        )
         remedy = "join fewer of them"
         raise DataError(problem, remedy=remedy, options=GAPS_BRIDGED[:1], file=first.source)
     grid = first.start_time + first.step * np.arange(round((times[-1] - times[0]) / first.step) + 1)
@@ -208,25 +212,29 @@ def _in_sequence(pieces: list[Recording], request: Request) -> Recording:
 
 
 def _end_to_end(pieces: Sequence[Recording], name: str) -> Array:
-    return np.concatenate([one[name] for one in pieces])
+    return np.concatenate([piece[name] for piece in pieces])
 
 
 def _side_by_side(loggers: list[Recording], request: Request) -> Recording:
     columns: dict[str, Column] = {}
-    for one in loggers:
-        if one.sample_time is None:
+    for logger in loggers:
+        if logger.sample_time is None:
             remedy = "state its rate, or save a column of times"
-            raise DataError("it has no time", file=one.source, remedy=remedy)
-        for name, values in one.channels.items():
-            columns[name] = Column(name, values, one.units[name], times=one.time)
+            raise DataError("it has no time", file=logger.source, remedy=remedy)
+        for name, values in logger.channels.items():
+            columns[name] = Column(name, values, logger.units[name], times=logger.time)
     request = replace(request, channels=list(columns))
     source = Source(Table(tuple(columns.values())), request, _path(loggers))
-    found, _ = on_one(columns, source)
-    samples = {name: one.values for name, one in found.items() if one.values is not None}
+    resampled, _ = on_one(columns, source)
+    samples = {
+        name: column.values for name, column in resampled.items() if column.values is not None
+    }
     start = float(samples.pop("time")[0])
-    slowest = max(loggers, key=lambda one: one.step)
+    slowest = max(loggers, key=lambda logger: logger.step)
     step = slowest.step if request.step is None else request.step
-    units = {name: unit for one in loggers for name, unit in one.units.items() if name in samples}
+    units = {
+        name: unit for logger in loggers for name, unit in logger.units.items() if name in samples
+    }
     joint = Recording(samples, step, units, start, slowest.meta)
     return _together(joint, loggers, samples).with_meta(sampled=rates(columns))
 
@@ -235,11 +243,11 @@ def _together(
     first: Recording, several: Sequence[Recording], samples: dict[str, Array]
 ) -> Recording:
     """Return a recording of joined samples, with the notes and the names of all files."""
-    meta = {**first.meta, "joined": [one.source or one.name for one in several]}
-    meta["notes"] = [*dict.fromkeys(note for one in several for note in one.notes)]
-    meta["name"] = listed([one.name for one in several], 3)
+    meta = {**first.meta, "joined": [part.source or part.name for part in several]}
+    meta["notes"] = [*dict.fromkeys(note for part in several for note in part.notes)]
+    meta["name"] = listed([part.name for part in several], 3)
     for key in ("converted_units", "assumed_units", "ignored_columns", "bridged"):
-        if every := [each for one in several for each in one.meta.get(key, ())]:
-            meta[key] = every if key == "bridged" else [*dict.fromkeys(every)]
+        if values := [value for part in several for value in part.meta.get(key, ())]:
+            meta[key] = values if key == "bridged" else [*dict.fromkeys(values)]
     units = {name: first.units[name] for name in samples}
     return Recording(samples, first.sample_time, units, first.start_time, meta)

@@ -77,10 +77,10 @@ def _parsed(text: str) -> Any:
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
+    unique = dict(pairs)
+    if len(unique) < len(pairs):
         raise ValueError("two fields of an object have one name")
-    return found
+    return unique
 
 
 def _node(value: Any) -> Node:
@@ -91,10 +91,10 @@ def _node(value: Any) -> Node:
         return np.array(value, np.float64) if isinstance(value, int | float) else value or ""
     rows = value.get("data")
     if isinstance(names := value.get("columns"), list) and isinstance(rows, list):
-        others = {
+        fields = {
             key: each for key, each in value.items() if key not in ("columns", "data", "index")
         }
-        return {**_node_of(others), **_index(value.get("index", [])), **_named(names, rows)}
+        return {**_node_of(fields), **_index(value.get("index", [])), **_named(names, rows)}
     parts = [*value.values()]
     if parts and all(isinstance(each, dict) and _is_flat(each) for each in parts):
         if _are_labels([*value]):

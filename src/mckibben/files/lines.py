@@ -105,8 +105,8 @@ def _end(lines: Sequence[bytes], numbers: Rows, sound: Mask, width: int, path: P
     so_far = np.cumsum(sound)
     for at in map(int, behind[behind < len(lines)]):
         if named(lines[at]) and so_far[-1] - so_far[at] <= MOST * so_far[at]:
-            rest = lines[at].decode("utf-8", "replace")
-            warn(path, f"from row {numbers[at]} on it is no table, left out: {rest[:60]!r}")
+            line = lines[at].decode("utf-8", "replace")
+            warn(path, f"from row {numbers[at]} on it is no table, left out: {line[:60]!r}")
             while separators(lines[at - 1]):
                 at -= 1
             return at
@@ -140,18 +140,18 @@ def _refuse_many(
     raise DataError(problem, file=path, row=numbers[at], remedy=remedy)
 
 
-def _note(some: Mask, what: str, lines: Sequence[bytes], numbers: Rows, path: Path) -> None:
+def _note(some: Mask, flaw: str, lines: Sequence[bytes], numbers: Rows, path: Path) -> None:
     if some.any():
         first = int(some.argmax())
         text = " ".join(lines[first].decode("utf-8", "replace").split())[:60]
-        warn(path, f"{some.sum()} line(s) are {what}, the first in row {numbers[first]}: {text!r}")
+        warn(path, f"{some.sum()} line(s) are {flaw}, the first in row {numbers[first]}: {text!r}")
 
 
 def _is_timed(rows: Sequence[bytes], layout: Layout) -> bool:
     """Return whether a column has times, by its name, its unit, or its cells."""
     units = zip(layout.headers, layout.units, strict=True)
-    found = [find(text) for h, u in units if (text := u or parse(h).unit)]
+    units_found = [find(text) for h, u in units if (text := u or parse(h).unit)]
     cells = layout.dialect.split(rows[layout.first].decode("utf-8", "replace"))
-    seconds = any(unit is not None and unit.target == "s" for unit in found)
+    seconds = any(unit is not None and unit.target == "s" for unit in units_found)
     instants = (may_be_instant(cell) and not layout.dialect.form(cell)[1] for cell in cells)
     return seconds or any(map(is_time, layout.headers)) or any(instants)

@@ -37,7 +37,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     if b"\x89HDF\r\n\x1a\n" in (start[:8], start[512:520]):
         return hdf5.read(file, path)
     data = file.read()
-    found: dict[str, Node] = {}
+    nodes: dict[str, Node] = {}
     decoded = None
     for name, value, at in _variables(data):
         order = "<" if data[126:128] == b"IM" else ">"
@@ -46,11 +46,11 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             list(_checked(inside[8:], "<" if inside[2:4] == b"IM" else ">"))
             decoded = objects.variables(path)
         elif not name.startswith("__"):
-            if name in found:
+            if name in nodes:
                 raise ValueError("two variables have one name")
             # a str is SciPy's reason why it cannot read a variable
-            found[name] = Unread(value) if isinstance(value, str) else objects.node(value, name)
-    return tree.runs(found if decoded is None else decoded, path)
+            nodes[name] = Unread(value) if isinstance(value, str) else objects.node(value, name)
+    return tree.runs(nodes if decoded is None else decoded, path)
 
 
 def _variables(data: bytes) -> Iterator[tuple[str, Any, int]]:

@@ -38,16 +38,16 @@ def items(data: Data) -> list[Path | InMemory]:
     return [each for one in listed for each in _items(one)]
 
 
-def _items(one: Any) -> list[Any]:
-    if isinstance(one, str | Path):
-        if Path(one).exists():
-            return [Path(one)]
-        if str(one) in {*names("estimators"), *names("blocks")}:
-            problem = f"{str(one)!r} is a model, and there is no file of that name"
+def _items(item: Any) -> list[Any]:
+    if isinstance(item, str | Path):
+        if Path(item).exists():
+            return [Path(item)]
+        if str(item) in {*names("estimators"), *names("blocks")}:
+            problem = f"{str(item)!r} is a model, and there is no file of that name"
             raise DataError(problem, remedy="name models with `models`, or give a file")
-        path = Path(one)
+        path = Path(item)
         return sorted(path.parent.glob(path.name)) or [path]
-    return [(restored(one) or one) if is_frame(one) else one]
+    return [(restored(item) or item) if is_frame(item) else item]
 
 
 def table_of(data: InMemory) -> tuple[Table, Path]:
@@ -67,8 +67,8 @@ def table_of(data: InMemory) -> tuple[Table, Path]:
         return table, Path(data.source or data.name)
     if isinstance(data, Mapping):
         times: tuple[Column, ...] = ()
-        known, meta, label = dict[str, str](), dict[str, Any](), Path("arrays")
-        named = {str(name): np.asarray(values) for name, values in data.items()}
+        units, meta, label = dict[str, str](), dict[str, Any](), Path("arrays")
+        columns_by_name = {str(name): np.asarray(values) for name, values in data.items()}
     elif is_frame(data):
         frame: Any = data
         index = frame.index
@@ -77,12 +77,12 @@ def table_of(data: InMemory) -> tuple[Table, Path]:
             problem, remedy = "its index may be times", "name the index `time`, or reset it"
             raise DataError(problem, file=Path("data frame"), remedy=remedy)
         before = frame.attrs.get(OWN, {})  # of a recording that was changed since
-        known = {
+        units = {
             name: unit for name, unit in before.get("units", {}).items() if not standard_unit(name)
         }
         meta = before.get("meta", {})
         times = (column(str(index.name or "time"), index.to_numpy()),) if timed else ()
-        named = {str(name): frame[name].to_numpy() for name in frame}
+        columns_by_name = {str(name): frame[name].to_numpy() for name in frame}
         label = Path("data frame")
     else:
         remedy = (
@@ -92,12 +92,12 @@ def table_of(data: InMemory) -> tuple[Table, Path]:
         if hasattr(data, "face"):
             remedy = "give recordings; to test a model on some, use `check()`"
         raise DataError(f"a recording cannot be made of {type(data).__name__}", remedy=remedy)
-    for name, values in named.items():
+    for name, values in columns_by_name.items():
         if values.ndim != 1:
             problem = f"its samples have shape {values.shape}"
             remedy = "give one value a sample, and several channels by name"
             raise DataError(problem, file=label, channel=name, remedy=remedy)
-    columns = [*times, *(column(name, x, known.get(name)) for name, x in named.items())]
+    columns = [*times, *(column(name, x, units.get(name)) for name, x in columns_by_name.items())]
     if not any(one.values is not None for one in columns):
         raise DataError("it has no numbers", file=label, remedy="give columns of numbers")
     return Table(tuple(columns), meta=meta), label

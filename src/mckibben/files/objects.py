@@ -49,8 +49,10 @@ def variables(path: Path) -> dict[str, Node] | None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             warnings.filterwarnings("error", "Failed")  # and numbers of its own are then returned
-            found: dict[str, Any] = load_from_mat(str(path), add_table_attrs=True)
-        return {name: node(each, name) for name, each in found.items() if not name.startswith("__")}
+            tree: dict[str, Any] = load_from_mat(str(path), add_table_attrs=True)
+        return {
+            name: node(value, name) for name, value in tree.items() if not name.startswith("__")
+        }
     except Exception as error:  # of many types, as it trusts what it reads
         warn(path, f"its objects cannot be decoded ({reason(error)})")
         return None
@@ -71,13 +73,15 @@ def node(value: Any, name: str = "x") -> Node:
     array = np.asarray(value)
     if array.dtype.names is not None:
         fields = array.dtype.names
-        each = array.ravel(order="F")
-        structs = [{field: node(one[field], f"{name}.{field}") for field in fields} for one in each]
+        items = array.ravel(order="F")
+        structs = [
+            {field: node(item[field], f"{name}.{field}") for field in fields} for item in items
+        ]
         return structs[0] if len(structs) == 1 else structs
     if array.dtype.kind == "O":
         if min(array.shape, default=0) > 1:
-            return [[node(one, name) for one in column.ravel(order="F")] for column in array.T]
-        return [node(one, f"{name}{{{at}}}") for at, one in enumerate(array.reshape(-1), start=1)]
+            return [[node(item, name) for item in column.ravel(order="F")] for column in array.T]
+        return [node(item, f"{name}{{{at}}}") for at, item in enumerate(array.reshape(-1), start=1)]
     if array.dtype.kind in "UST":
         lines = [str(line) for line in array.reshape(-1)]
         return lines if len(lines) > 1 else "".join(lines)

@@ -49,8 +49,8 @@ class Stored(BaseModel):
         """Return what ``sha256`` is to be, for these bytes of samples."""
         if self.version == 1:
             return digest(samples)
-        rest = json.dumps(self.model_dump(exclude={"sha256"}), allow_nan=False)
-        return digest(rest.encode() + b"\n" + samples)
+        contents = json.dumps(self.model_dump(exclude={"sha256"}), allow_nan=False)
+        return digest(contents.encode() + b"\n" + samples)
 
     @property
     def header(self) -> list[str]:
@@ -159,9 +159,9 @@ def described(path: Path) -> Stored | None:
     DataError
         If it is by this package, and was changed or is of a newer version.
     """
-    beside = sidecar(path)
+    sidecar_path = sidecar(path)
     try:
-        return Stored.model_validate(json.loads(read_bytes(beside, most=DESCRIPTION)))
+        return Stored.model_validate(json.loads(read_bytes(sidecar_path, most=DESCRIPTION)))
     except DataError as error:
         why = error.problem
     except ValidationError as error:
@@ -174,7 +174,7 @@ def described(path: Path) -> Stored | None:
             raise conflict(path) from None
     except (ValueError, RecursionError) as error:
         why = reason(error)
-    warn(path, f"{beside.name} is ignored, as it is not by mckibben ({why})")
+    warn(path, f"{sidecar_path.name} is ignored, as it is not by mckibben ({why})")
     return None
 
 
@@ -184,9 +184,9 @@ def conflict(
     remedy: str = "copy both again",
 ) -> DataError:
     """Return the error for a description that is not used."""
-    beside = sidecar(path).name
-    remedy = f"{remedy}; or, to read it by its header alone, remove {beside}"
-    return DataError(f"{beside} {problem}", file=path, remedy=remedy)
+    sidecar_name = sidecar(path).name
+    remedy = f"{remedy}; or, to read it by its header alone, remove {sidecar_name}"
+    return DataError(f"{sidecar_name} {problem}", file=path, remedy=remedy)
 
 
 def sidecar(path: Path) -> Path:
@@ -205,8 +205,8 @@ def description(path: Path) -> Path | None:
 
 def is_own(path: Path) -> bool:
     """Return whether a file is an unchanged recording written by this package."""
-    beside = description(path)
-    if path.is_symlink() or (beside is not None and not beside.is_file()):
+    description_path = description(path)
+    if path.is_symlink() or (description_path is not None and not description_path.is_file()):
         return False
     try:
         with warnings.catch_warnings():

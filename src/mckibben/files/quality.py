@@ -32,41 +32,41 @@ def without_codes(channel: str, values: Array, recorded: Array, source: Source) 
 
     Codes are whole numbers as ``recorded`` in the file, not in the package's unit.
     """
-    known = recorded[np.isfinite(recorded)]
-    whole, times = np.unique(known[known == np.rint(known)], return_counts=True)
-    recurring = whole[times >= 3]
-    asked = {*CODES, *recurring[:2], *recurring[-2:]}  # others are within the range of these
-    coded = np.isin(recorded, [code for code in asked if _is_code(code, known)])
+    finite = recorded[np.isfinite(recorded)]
+    integers, times = np.unique(finite[finite == np.rint(finite)], return_counts=True)
+    recurring = integers[times >= 3]
+    candidates = {*CODES, *recurring[:2], *recurring[-2:]}  # others are within the range of these
+    coded = np.isin(recorded, [code for code in candidates if _is_code(code, finite)])
     huge = (np.abs(recorded) > 1e30) & np.isfinite(recorded)
     if not huge.all():  # SCPI's for not a number, and for beyond the range
         coded |= huge
     if not coded.any():
         return values
-    found = listed([f"{value:g}" for value in np.unique(recorded[coded])], most=5)
+    codes = listed([f"{value:g}" for value in np.unique(recorded[coded])], most=5)
     source.warn(
-        f"channel {channel!r}: {coded.sum()} sample(s) are {found}, a code for missing ones "
+        f"channel {channel!r}: {coded.sum()} sample(s) are {codes}, a code for missing ones "
         f"(first in row {source.table.row(int(np.argmax(coded)))}); "
         "use `raw` where that was measured"
     )
     return np.where(coded, np.nan, values)
 
 
-def _is_code(code: float, known: Array) -> bool:
+def _is_code(code: float, finite: Array) -> bool:
     """Return whether a number is an isolated value far outside the range, as a dropout code."""
-    at = known == code
+    at = finite == code
     # a muscle rests at 0 before and after it moves, and as often as not
     if not at.any() or at.all() or (code == 0 and (at[0] or at[-1] or at.mean() > 0.25)):
         return False
     if code == 0 and np.median(np.diff(true_runs(at))) > LONGEST_DROPOUT:
         return False
-    others = known[~at]
-    low, high = others.min(), others.max()
-    steps = np.abs(np.diff(known))
+    rest = finite[~at]
+    low, high = rest.min(), rest.max()
+    steps = np.abs(np.diff(finite))
     inside = steps[~at[1:] & ~at[:-1]].max(initial=0.0)
     far = max(code - high, low - code) > high - low
     at_once = not low < code < high and steps[at[1:] != at[:-1]].min() > 5 * inside
     # one of few values is a level of the signal
-    return bool(far or at_once) and np.unique(others).size >= 10
+    return bool(far or at_once) and np.unique(rest).size >= 10
 
 
 def question_size(
@@ -77,16 +77,16 @@ def question_size(
     Sizes that are rare are questioned too where the unit is ``assumed``. What a user states never is.
     """
     target = unit_of(channel)
-    known = values[np.isfinite(values)]
-    if target not in PLAUSIBLE or not known.size:
+    finite = values[np.isfinite(values)]
+    if target not in PLAUSIBLE or not finite.size:
         return
     low, high, _, least, most = PLAUSIBLE[target]
     zero, small = (0.0, least) if assumed else TOO_SMALL.get(target, (0.0, 0.0))
-    sizes, excess = np.abs(known), np.maximum(known - high, low - known)
+    sizes, excess = np.abs(finite), np.maximum(finite - high, low - finite)
     rare = zero < sizes.max() < small or (assumed and sizes.max() > most)
     if excess.max() <= 0 and not rare:
         return
-    suspect = known[np.argmax(excess if excess.max() > 0 else sizes)]
+    suspect = finite[np.argmax(excess if excess.max() > 0 else sizes)]
     stated = read_in or "1"
     fitting = fitting_units(suspect, read_in, target)
     units = [*dict.fromkeys([*fitting, stated] if assumed else [stated, *fitting])]
@@ -95,8 +95,8 @@ def question_size(
         options.insert(len(fitting), in_mm(channel, column, source))
     size = f"it reaches {suspect:.6g} {target}".rstrip()
     problem = f"{size}{', without a unit' if assumed else ''}"
-    asked = fitting if assumed else units
-    problem += f": is it in {' or '.join(asked)}?" if fitting else ", which is not usual"
+    choices = fitting if assumed else units
+    problem += f": is it in {' or '.join(choices)}?" if fitting else ", which is not usual"
     at = int(np.argmax(values == suspect))
     remedy = f"name another unit with `units[{channel}]=UNIT`, or correct that cell"
     raise source.error(problem, remedy, channel, at, options)

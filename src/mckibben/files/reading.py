@@ -98,25 +98,27 @@ def read(
     >>> run.units["pressure"], float(run["pressure"][0]), run.sample_time
     ('bar', 1.0, 0.02)
     """
-    chosen = given_options(ReadOptions, options, keywords)
-    request = _request(chosen, channels=channels, informative=informative, most=most)
-    found: list[Recording] = []
-    part = replace(request, channels=None) if chosen.join else request
-    for one in items(data):
-        if isinstance(one, Path):
-            found += [each for inner in sources.inside(one) for each in _read(inner, part)[0]]
-        elif isinstance(one, Recording) and not request.interprets:
-            found.append(one)
+    stated = given_options(ReadOptions, options, keywords)
+    request = _request(stated, channels=channels, informative=informative, most=most)
+    recordings: list[Recording] = []
+    part = replace(request, channels=None) if stated.join else request
+    for item in items(data):
+        if isinstance(item, Path):
+            recordings += [
+                recording for inner in sources.inside(item) for recording in _read(inner, part)[0]
+            ]
+        elif isinstance(item, Recording) and not request.interprets:
+            recordings.append(item)
         else:
-            found += _read(one, part)[0]
-    found = _one_run(found, request)
-    for one, text in continued(found):
-        warn(Path(one.source or one.name), text)
-    return observe(_prepared(found, chosen))
+            recordings += _read(item, part)[0]
+    recordings = _one_run(recordings, request)
+    for item, text in continued(recordings):
+        warn(Path(item.source or item.name), text)
+    return observe(_prepared(recordings, stated))
 
 
 def _request(options: ReadOptions, **more: Any) -> Request:
-    stated = {each.name: getattr(options, each.name) for each in fields(ReadOptions)}
+    stated = {option.name: getattr(options, option.name) for option in fields(ReadOptions)}
     return Request(**stated, **more)
 
 
@@ -131,27 +133,27 @@ def _early(recording: Recording) -> list[str]:
     ]
 
 
-def _one_run(found: list[Recording], request: Request) -> list[Recording]:
+def _one_run(recordings: list[Recording], request: Request) -> list[Recording]:
     """Return recordings as one where that is an option, else as they are."""
-    if not request.join or not found:
-        return found
+    if not request.join or not recordings:
+        return recordings
     if request.resample is not None:
-        found = [resample(one, request.resample) for one in found]
+        recordings = [resample(run, request.resample) for run in recordings]
     with noted() as notes:
-        joint = joined(found, request)
+        joint = joined(recordings, request)
     return [_with_notes(joint, [*joint.notes, *notes, *_early(joint)])]
 
 
 def _prepared(recordings: list[Recording], options: ReadOptions) -> list[Recording]:
     """Return recordings cut, resampled and zeroed."""
     if options.between is not None:
-        recordings = [one.between(*options.between) for one in recordings]
+        recordings = [run.between(*options.between) for run in recordings]
     if options.resample is not None:
-        recordings = [resample(one, options.resample) for one in recordings]
+        recordings = [resample(run, options.resample) for run in recordings]
     if options.zero:
-        drives = [(*by_name([one])[0], "pressure")[0] for one in recordings]
+        drives = [(*by_name([run])[0], "pressure")[0] for run in recordings]
         pairs = zip(recordings, drives, strict=True)
-        recordings = [zeroed(one, list(options.zero), over) for one, over in pairs]
+        recordings = [zeroed(run, list(options.zero), over) for run, over in pairs]
     return recordings
 
 
@@ -218,16 +220,18 @@ def _read(data: Path | InMemory, request: Request) -> tuple[list[Recording], Sou
 
     def attempt(changed: Request) -> dict[str, str]:
         same = changed.layout == request.layout
-        recordings, used = _interpreted(loaded if same else _loaded(data, changed), changed)
-        named = named_in(used[0])
-        return {header: name for header, name in named.items() if name in (*recordings[0], "time")}
+        recordings, sources_used = _interpreted(loaded if same else _loaded(data, changed), changed)
+        channels = named_in(sources_used[0])
+        return {
+            header: name for header, name in channels.items() if name in (*recordings[0], "time")
+        }
 
     try:
-        recordings, used = _interpreted(loaded, request)
+        recordings, sources_used = _interpreted(loaded, request)
     except DataError as error:
         before = named_in(request.of(loaded.tables[0], loaded.path))
         raise offering(error, request, before, attempt) from None
-    return recordings, used[0]
+    return recordings, sources_used[0]
 
 
 def _loaded(data: Path | InMemory, request: Request) -> _Loaded:
@@ -245,10 +249,10 @@ def _interpreted(loaded: _Loaded, request: Request) -> tuple[list[Recording], li
     in_memory = "file" not in loaded.meta
     with noted() as notes:
         of_each = [request.of(table, loaded.path, in_memory=in_memory) for table in loaded.tables]
-        found = [each for source in of_each for each in _recordings(source, loaded.meta)]
+        result = [run for source in of_each for run in _recordings(source, loaded.meta)]
     stated = bool(request.columns or request.units)  # then units that were assumed before are not
     recordings = []
-    for recording in found:
+    for recording in result:
         earlier = [note for note in recording.notes if not (stated and note.startswith(ASSUMED))]
         early = [] if of_each[0].table.own else _early(recording)
         for text in early:
@@ -259,22 +263,22 @@ def _interpreted(loaded: _Loaded, request: Request) -> tuple[list[Recording], li
 
 def _with_notes(recording: Recording, notes: Sequence[str]) -> Recording:
     """Return a recording with these notes, once each; itself if it has them."""
-    each = [*dict.fromkeys(notes)]
-    return recording if each == list(recording.notes) else recording.with_meta(notes=each)
+    unique = [*dict.fromkeys(notes)]
+    return recording if unique == list(recording.notes) else recording.with_meta(notes=unique)
 
 
 def _recordings(source: Source, origin: Mapping[str, Any]) -> list[Recording]:
     table, request, path = source.table, source.request, source.path
-    found, clock, meta = in_package_units(source)
-    channels = {name: signal.samples for name, signal in found.items()}
+    in_units, clock, meta = in_package_units(source)
+    channels = {name: signal.samples for name, signal in in_units.items()}
     n = next(iter(channels.values())).size
     if n < request.fewest:
         problem = f"{n} sample(s) are too few, at least {request.fewest} are needed"
         raise source.error(problem, "give a longer recording")
     if clock is not None:
-        kept = timebase.usable(clock, channels, source)
-        channels = {name: samples[kept] for name, samples in channels.items()}
-        clock = replace(clock, values=clock.values[kept])
+        usable = timebase.usable(clock, channels, source)
+        channels = {name: samples[usable] for name, samples in channels.items()}
+        clock = replace(clock, values=clock.values[usable])
     step = _stated_step(clock, source)
     start = table.start_time if clock is None else clock.seconds(clock.values[0])
     times = clock if step is None else None
@@ -283,7 +287,7 @@ def _recordings(source: Source, origin: Mapping[str, Any]) -> list[Recording]:
     pieces = gaps_in.pieces(channels, times, step, start, source)
     if request.informative:
         _refuse_constant(pieces, source)
-    signals = {name: found[name] for name in pieces[0].samples}
+    signals = {name: in_units[name] for name in pieces[0].samples}
     units = {name: signal.unit for name, signal in signals.items()}
     now = meta.get("calibration", {})
     for key in ("calibration", "pressure_reference"):  # of channels that are not calibrated now
@@ -296,8 +300,8 @@ def _recordings(source: Source, origin: Mapping[str, Any]) -> list[Recording]:
         meta["name"] = f"{path.stem}[{table.name}]"
     recordings = []
     for piece in pieces:
-        known = meta | ({"bridged": piece.bridged} if piece.bridged else {})
-        recordings.append(Recording(piece.samples, piece.step, units, piece.start, known))
+        piece_meta = meta | ({"bridged": piece.bridged} if piece.bridged else {})
+        recordings.append(Recording(piece.samples, piece.step, units, piece.start, piece_meta))
     if len(recordings) == 1:
         return recordings
     return [each.with_meta(name=f"{each.name}[{i}]") for i, each in enumerate(recordings, start=1)]
@@ -320,17 +324,17 @@ def _stated_step(times: Times | None, source: Source) -> float | None:
     else:
         return step if table.sample_time is None else table.sample_time
     problem = f"{problem}, which is not the {1 / step:g} a second requested"
-    given = {name: None for name in ("rate", "sample_time") if getattr(request, name) is not None}
+    options = {name: None for name in ("rate", "sample_time") if getattr(request, name) is not None}
     raise source.error(
-        problem, "delete the column of times", "time", options=[given] if given else []
+        problem, "delete the column of times", "time", options=[options] if options else []
     )
 
 
 def _refuse_constant(pieces: Sequence[gaps_in.Piece], source: Source) -> None:
     for name in source.request.channels or ():
         samples = np.concatenate([piece.samples[name] for piece in pieces])
-        held = base_name(name) in MAY_BE_HELD or name in source.request.constants
-        if not held and np.ptp(samples) == 0:
+        may_be_held = base_name(name) in MAY_BE_HELD or name in source.request.constants
+        if not may_be_held and np.ptp(samples) == 0:
             remedy = (
                 f"give a recording in which it changes, or another column, `columns[{name}]=COLUMN`"
             )

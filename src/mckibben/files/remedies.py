@@ -44,14 +44,14 @@ def offering(error: DataError, request: Request, before: Named, attempt: Attempt
                 return False
         return True
 
-    found = list(_outcomes(error, request, works, STEPS))
-    successes = [options for options, end in found if end is None]
+    outcomes = list(_outcomes(error, request, works, STEPS))
+    successes = [options for options, end in outcomes if end is None]
     offered = copy.copy(error)
     led: list[Mapping[str, Any]] = []
-    for options in successes or [options for options, _ in found]:
+    for options in successes or [options for options, _ in outcomes]:
         led += [options] if options not in led else []
-    kept = [options for options in led if None not in options.values()]  # what was stated stays
-    offered.options = tuple(kept or led)
+    allowed = [options for options in led if None not in options.values()]  # what was stated stays
+    offered.options = tuple(allowed or led)
     return offered
 
 
@@ -92,8 +92,8 @@ def _answered(options: Mapping[str, Any], further: DataError) -> Mapping[str, An
     def base(channel: str | None) -> str:
         return re.sub(r"_?\d+$", "", channel or "")
 
-    given = options.get("units", {})
-    alike = {unit for name, unit in given.items() if base(name) == base(further.channel)}
-    answers = [one for one in further.options if {*one} == {"units"}]
-    known = (one for one in answers if {*one["units"].values()} == alike)
-    return {} if further.channel in given else next(known, {})
+    units = options.get("units", {})
+    alike = {unit for name, unit in units.items() if base(name) == base(further.channel)}
+    answers = [option for option in further.options if {*option} == {"units"}]
+    alike_answers = (option for option in answers if {*option["units"].values()} == alike)
+    return {} if further.channel in units else next(alike_answers, {})

@@ -71,8 +71,10 @@ class Request(ReadOptions):
         if table.own:
             self._check_units(table, path)
             done: Any = table.meta.get("calibration") or {}
-            time, every = Time(), channels.items()
-            channels = {c: one for c, one in every if one.is_calibrated and c not in done}
+            time, items = Time(), channels.items()
+            channels = {
+                c: channel for c, channel in items if channel.is_calibrated and c not in done
+            }
         for name, (value, unit) in self.constants.items():
             channels[name] = Channel(value=value, unit=unit.strip() or None)
         described = self.described.model_copy(update={"channels": channels, "time": time})
@@ -80,20 +82,20 @@ class Request(ReadOptions):
 
     def _check_units(self, table: Table, path: Path) -> None:
         """Raise an error for a unit in which a channel of a recording is not."""
-        for one in table.columns:
-            stated = self.units.get(one.header, one.unit)
-            if stated != one.unit and one.header not in self.calibration:
-                problem = f"it is in {one.unit or 'no unit'}, and not in {stated}"
+        for column in table.columns:
+            stated = self.units.get(column.header, column.unit)
+            if stated != column.unit and column.header not in self.calibration:
+                problem = f"it is in {column.unit or 'no unit'}, and not in {stated}"
                 remedy = "leave the unit out, or state a gain with `calibration`"
                 raise DataError(
-                    problem, file=path, parameter="units", channel=one.header, remedy=remedy
+                    problem, file=path, parameter="units", channel=column.header, remedy=remedy
                 )
 
     @property
     def interprets(self) -> bool:
         """Whether an option of reading, and not of what is done then, is given."""
         plain, done = ReadOptions(), ("join", "between", "resample", "zero")
-        names = [one.name for one in fields(plain) if one.name not in done]
+        names = [field_.name for field_ in fields(plain) if field_.name not in done]
         return any(getattr(self, name) != getattr(plain, name) for name in names)
 
     def check(self, path: Path, *, text: bool = True) -> None:
@@ -135,17 +137,17 @@ class Source:
     @property
     def rest_length(self) -> float | None:
         """Rest length as requested, or else of the file [mm]."""
-        given = self.request.rest_length or self.table.meta.get("rest_length")
-        return float(given) if isinstance(given, int | float) and given > 0 else None
+        length = self.request.rest_length or self.table.meta.get("rest_length")
+        return float(length) if isinstance(length, int | float) and length > 0 else None
 
     def derived(self, named: Iterable[str]) -> dict[str, str]:
         """Return requested channels that can be derived by the rest length, each with its source."""
-        found: dict[str, str] = {}
-        for wanted in self.request.channels or ():
-            others = [n for n in named if conversion(wanted, n, self.rest_length) is not None]
-            if others and wanted not in others:
-                found[wanted] = others[0]
-        return found
+        result: dict[str, str] = {}
+        for channel in self.request.channels or ():
+            sources = [n for n in named if conversion(channel, n, self.rest_length) is not None]
+            if sources and channel not in sources:
+                result[channel] = sources[0]
+        return result
 
     def error(
         self,

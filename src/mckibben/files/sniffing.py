@@ -135,15 +135,15 @@ def longer(head: Head) -> Names | None:
 
     Some are known, or have units below; others may be a title.
     """
-    found = _named([(at, row) for at, row in head.above if len(row) > head.used], head)
-    sure = found and (any(found.units) or _known(found.headers[: head.used]))
-    return found if sure and head.dialect.separator else None
+    rows_found = _named([(at, row) for at, row in head.above if len(row) > head.used], head)
+    sure = rows_found and (any(rows_found.units) or _known(rows_found.headers[: head.used]))
+    return rows_found if sure and head.dialect.separator else None
 
 
 def numbered(head: Head) -> Names:
     """Count the columns; with names of another number above the samples they are refused."""
-    others = [row for _, row in head.above if len(row) not in (1, head.width)]
-    headers = others[-1] if others else _numbered(head.width)
+    shorter = [row for _, row in head.above if len(row) not in (1, head.width)]
+    headers = shorter[-1] if shorter else _numbered(head.width)
     return Names(headers, [""] * len(headers))
 
 
@@ -268,16 +268,16 @@ def _merged(names: Names, head: Head) -> list[str]:
     return headers
 
 
-def _stated(found: re.Match[str]) -> tuple[str, float] | None:
+def _stated(match: re.Match[str]) -> tuple[str, float] | None:
     """Return a rate [Hz] or sample time [s] with its name; None if its unit is of another kind."""
-    value, text = float(found["value"].replace(",", ".")), found["unit"] or found["in"]
-    target = "Hz" if found["rate"] else "s"
+    value, text = float(match["value"].replace(",", ".")), match["unit"] or match["in"]
+    target = "Hz" if match["rate"] else "s"
     unit = find(text) if text else None
     if text and (unit is None or unit.target != target):
         return None
-    name = " ".join(found["name"].rpartition("\n")[2].split())
+    name = " ".join(match["name"].rpartition("\n")[2].split())
     size = convert(np.array([value]), unit.name, target) if unit else [value]
-    return f"{name}/{'sample_rate' if found['rate'] else 'dt'}", float(size[0])
+    return f"{name}/{'sample_rate' if match['rate'] else 'dt'}", float(size[0])
 
 
 def _fitness(dialect: Dialect, lines: Sequence[str]) -> tuple[float, bool, bool, int, Dialect]:

@@ -52,15 +52,15 @@ def inside(path: Path) -> list[Path]:
     """
     if not path.is_dir() or is_bag(path):
         return [path]
-    found = _files(path) + [each for each in _listed(path) if is_bag(each)]
-    if not found:
+    recordings = _files(path) + [file for file in _listed(path) if is_bag(file)]
+    if not recordings:
         raise DataError(
             "there is no recording in the folder", file=path, remedy="put recordings in it"
         )
     if os.path.lexists(path / PROTOCOL):
-        return found
+        return recordings
     settings = described(path)
-    return list(dict.fromkeys(path / next(iter(settings.parts(each.name))) for each in found))
+    return list(dict.fromkeys(path / next(iter(settings.parts(file.name))) for file in recordings))
 
 
 def roles(path: Path) -> dict[str, list[Path]]:
@@ -71,15 +71,15 @@ def roles(path: Path) -> dict[str, list[Path]]:
     DataError
         If there are none, or ``protocol.json`` cannot be read; else those of `inside`.
     """
-    found = inside(path)
+    recordings = inside(path)
     if not os.path.lexists(path / PROTOCOL):
-        return {"train": found}
+        return {"train": recordings}
     text = read_text(path / PROTOCOL, most=DESCRIPTION)
     by_role: dict[str, list[Path]] = {role: [] for role in ROLES}
     with formats.refusing(path / PROTOCOL):
-        given = {run["name"]: run["role"] for run in json.loads(text)["runs"]}
-        for each in found:
-            by_role[given.get(each.stem, "train")].append(each)
+        role_by_name = {run["name"]: run["role"] for run in json.loads(text)["runs"]}
+        for file in recordings:
+            by_role[role_by_name.get(file.stem, "train")].append(file)
     return by_role
 
 
@@ -92,7 +92,9 @@ def expanded(
     those of `roles`.
     """
     by_role = [roles(file) for file in files]
-    train, validation, tests = ([p for one in by_role for p in one.get(role, [])] for role in ROLES)
+    train, validation, tests = (
+        [p for roles_of in by_role for p in roles_of.get(role, [])] for role in ROLES
+    )
     return train, validation, tests + [path for file in test for path in inside(file)]
 
 
@@ -108,37 +110,37 @@ def tables(path: Path, request: Request) -> tuple[list[Table], str]:
     parts = _parts(path)
     if not parts:
         raise DataError("there is no recording in it", file=path, remedy="copy all of its files")
-    found: dict[Path, list[Table]] = {}
+    tables_by_file: dict[Path, list[Table]] = {}
     digests: list[str] = []
     with ExitStack() as stack:
-        files = {each: stack.enter_context(opened(each, most=int(request.most))) for each in parts}
+        files = {part: stack.enter_context(opened(part, most=int(request.most))) for part in parts}
         before = [_state(file) for file in files.values()]
         if is_bag(path):
-            found[path] = formats.bag(path)
+            tables_by_file[path] = formats.bag(path)
         else:
-            for each, file in files.items():
+            for part, file in files.items():
                 lines = request.header, request.skip, request.encoding
-                text = formats.laid_out(file, each, *lines)
-                several = formats.read(text, each, request.sheet)
-                found[each] = [unstacked(one, each) for one in several]
-        for (each, file), state in zip(files.items(), before, strict=True):
+                text = formats.laid_out(file, part, *lines)
+                several = formats.read(text, part, request.sheet)
+                tables_by_file[part] = [unstacked(table, part) for table in several]
+        for (part, file), state in zip(files.items(), before, strict=True):
             file.seek(0)
             digests.append(hashlib.file_digest(file, "sha256").hexdigest())
             if _state(file) != state:
                 problem = "it changed while it was read"
                 remedy = "wait until whatever writes it is done, then read it again"
-                raise DataError(problem, file=each, remedy=remedy)
+                raise DataError(problem, file=part, remedy=remedy)
     digest, *more = digests
     if more:
         digest = hashlib.sha256("".join(digests).encode()).hexdigest()
-    if len(found) == 1:
-        return next(iter(found.values())), digest
-    for each, several in found.items():
+    if len(tables_by_file) == 1:
+        return next(iter(tables_by_file.values())), digest
+    for part, several in tables_by_file.items():
         if len(several) > 1:
             problem = f"it holds {len(several)} recordings, where one signal is expected"
-            raise DataError(problem, file=each, remedy=f"leave it out of join in {NAME}")
-    one = _joined({each: several[0] for each, several in found.items()}, parts, request)
-    return [one], digest
+            raise DataError(problem, file=part, remedy=f"leave it out of join in {NAME}")
+    table = _joined({part: several[0] for part, several in tables_by_file.items()}, parts, request)
+    return [table], digest
 
 
 def read_with(path: Path) -> list[Path]:
@@ -147,11 +149,13 @@ def read_with(path: Path) -> list[Path]:
     They are the parts of recordings and what describes them.
     """
     if path.is_dir():
-        parts = [file for each in (path, *filter(is_bag, _listed(path))) for file in _files(each)]
-        beside = [path / NAME, path / PROTOCOL, path / BAG]
+        parts = [
+            file for folder in (path, *filter(is_bag, _listed(path))) for file in _files(folder)
+        ]
+        settings = [path / NAME, path / PROTOCOL, path / BAG]
     else:
-        parts, beside = [*_parts(path)], [path.with_name(NAME)]
-    return [*parts, *filter(None, map(description, parts)), *beside]
+        parts, settings = [*_parts(path)], [path.with_name(NAME)]
+    return [*parts, *filter(None, map(description, parts)), *settings]
 
 
 def _parts(path: Path) -> dict[Path, str]:
@@ -163,14 +167,14 @@ def _parts(path: Path) -> dict[Path, str]:
 
 
 def _state(file: BufferedReader) -> tuple[int, int]:
-    found = os.fstat(file.fileno())
-    return found.st_mtime_ns, found.st_size
+    status = os.fstat(file.fileno())
+    return status.st_mtime_ns, status.st_size
 
 
 def _files(folder: Path) -> list[Path]:
     endings = (*formats.SOUGHT, ".zstd") if is_bag(folder) else formats.SOUGHT  # packed parts
-    found = (each for each in _listed(folder) if each.suffix.casefold() in endings)
-    return [each for each in found if each.is_file()]
+    files = (file for file in _listed(folder) if file.suffix.casefold() in endings)
+    return [file for file in files if file.is_file()]
 
 
 def _listed(folder: Path) -> list[Path]:
@@ -185,10 +189,10 @@ def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Re
     clocks: list[Column] = []
     split = {path: _split(table, stamp) for path, table in tables.items()}
     timed = any(times for _, times in split.values())
-    for path, (found, times) in split.items():
+    for path, (numbers, times) in split.items():
         channel = problem = None
-        if len(found) != 1:
-            problem = f"it has {len(found)} columns of numbers, where one signal is expected"
+        if len(numbers) != 1:
+            problem = f"it has {len(numbers)} columns of numbers, where one signal is expected"
         elif len(times) != timed:
             channel = "time"
             problem = f"it has {len(times)} columns of times, where another file has one"
@@ -200,30 +204,34 @@ def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Re
                 f"use `rate`; or leave the file out of join in {NAME}"
             )
             raise DataError(problem, file=path, channel=channel, remedy=remedy)
-        signals.append(_named(found[0], names[path]))
+        signals.append(_named(numbers[0], names[path]))
         clocks += times
     grids = {(table.sample_time, table.start_time) for table in tables.values()}
-    apart = timed or (len(grids) > 1 and all(step is not None for step, _ in grids))
+    has_clocks = timed or (len(grids) > 1 and all(step is not None for step, _ in grids))
     lengths = {path.name: table.n_samples for path, table in tables.items()}
-    if not apart and len(set(lengths.values())) > 1:
+    if not has_clocks and len(set(lengths.values())) > 1:
         listing = ", ".join(f"{name} {n}" for name, n in lengths.items())
         problem = f"its files have no times and differ in length: {listing}"
         remedy = f"save times in each file, or leave one out of join in {NAME}"
         raise DataError(problem, file=next(iter(tables)).parent, remedy=remedy)
-    each = tables.items()
+    items = tables.items()
     step, start = grids.pop() if len(grids) == 1 else (None, 0.0)
     together = Table(
         (*clocks[:1], *signals),
         next(iter(tables.values())).lines,
         step,
         start,
-        rates={f"{path.name}/{n}": rate for path, table in each for n, rate in table.rates.items()},
-        unread={f"{path.name}/{n}": why for path, table in each for n, why in table.unread.items()},
+        rates={
+            f"{path.name}/{n}": rate for path, table in items for n, rate in table.rates.items()
+        },
+        unread={
+            f"{path.name}/{n}": why for path, table in items for n, why in table.unread.items()
+        },
     )
-    if not apart:
+    if not has_clocks:
         return together
     if timed:
-        sources = [Source(table, request, path) for path, table in each]
+        sources = [Source(table, request, path) for path, table in items]
         read = [times_of(clock, source) for clock, source in zip(clocks, sources, strict=True)]
         pairs = zip(read, starts_of(read, sources[0]), sources, strict=True)
         seconds = [late + _elapsed(clock, source) for clock, late, source in pairs]
@@ -234,7 +242,7 @@ def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Re
         ]
     if timed and all(np.array_equal(times, seconds[0]) for times in seconds):
         return together
-    columns = (replace(one, times=times) for one, times in zip(signals, seconds, strict=True))
+    columns = (replace(signal, times=times) for signal, times in zip(signals, seconds, strict=True))
     return replace(together, columns=tuple(columns), lines=None)
 
 

@@ -28,9 +28,9 @@ def unstacked(table: Table, path: Path) -> Table:
     names = {id(c): snake_case(parse(c.label).name) for c in table.columns}
     times = [c for c in table.columns if is_time(c.label)]
     units = [c for c in table.columns if names[id(c)] in UNITS.split() and c.values is None]
-    others = [c for c in table.columns if not any(c is one for one in (*times, *units))]
-    words = [c for c in others if c.values is None and _are_few(c.texts)]
-    values = [c for c in others if c.values is not None]
+    signals = [c for c in table.columns if not any(c is column for column in (*times, *units))]
+    words = [c for c in signals if c.values is None and _are_few(c.texts)]
+    values = [c for c in signals if c.values is not None]
     values = [c for c in values if names[id(c)] in VALUES.split()] or values
     if not len(times) == len(words) == len(values) == 1 or len(units) > 1 or table.own:
         return table
@@ -42,9 +42,12 @@ def unstacked(table: Table, path: Path) -> Table:
     of = dict(zip(signal.texts, units[0].texts, strict=True)) if units else {}
     columns: list[Column] = []
     for name in dict.fromkeys(filter(None, signal.texts)):
-        rows = np.flatnonzero([each == name for each in signal.texts])
-        for one in (clock, replace(value, header=name, alias=None, place=None, unit=of.get(name))):
-            columns.append(replace(one, values=np.asarray(one.values)[rows]))
+        rows = np.flatnonzero([text == name for text in signal.texts])
+        for column in (
+            clock,
+            replace(value, header=name, alias=None, place=None, unit=of.get(name)),
+        ):
+            columns.append(replace(column, values=np.asarray(column.values)[rows]))
     return distinct(replace(table, columns=tuple(columns), lines=None))
 
 

@@ -44,29 +44,33 @@ def _table(group: Any, meta: Mapping[str, Any], name: str | None) -> Table:
     clocks: dict[str, tuple[float, float, Any]] = {}
     unread: dict[str, str] = {}
     for channel in group.channels():
-        place, kind, about = channel.name, channel.dtype.kind, channel.properties
+        channel_name, kind, about = channel.name, channel.dtype.kind, channel.properties
         if not len(channel):
-            unread[place] = "no samples"
-        elif kind not in "biufmM" and not is_time(place):
-            unread[place] = "complex numbers" if kind == "c" else "text"
+            unread[channel_name] = "no samples"
+        elif kind not in "biufmM" and not is_time(channel_name):
+            unread[channel_name] = "complex numbers" if kind == "c" else "text"
         else:
-            columns[place] = column(place, channel[:], about.get("unit_string") or None)
+            columns[channel_name] = column(
+                channel_name, channel[:], about.get("unit_string") or None
+            )
             step, offset = about.get("wf_increment"), about.get("wf_start_offset", 0.0)
             if isinstance(step, (int, float)) and 0 < step < math.inf:
-                clocks[place] = (float(step), float(offset), about.get("wf_start_time"))
+                clocks[channel_name] = (float(step), float(offset), about.get("wf_start_time"))
     meta = {**meta, **plain_meta(group.properties)}
     if len(set(clocks.values())) <= 1:
         step, offset, _ = next(iter(clocks.values()), (None, 0.0, None))
-        found = tuple(columns.values())
-        return Table(found, None, step, offset, meta=meta, unread=unread, name=name)
+        all_columns = tuple(columns.values())
+        return Table(all_columns, None, step, offset, meta=meta, unread=unread, name=name)
     first = min((began for *_, began in clocks.values() if began is not None), default=None)
     clocked: list[Column] = []
-    for place, each in columns.items():
-        step, offset, began = clocks.get(place, (None, 0.0, None))
-        if is_time(place) or step is None or (first is not None and began is None):
-            unread[place] = "its start and increment are not stated, and others differ in them"
+    for channel_name, made in columns.items():
+        step, offset, began = clocks.get(channel_name, (None, 0.0, None))
+        if is_time(channel_name) or step is None or (first is not None and began is None):
+            unread[channel_name] = (
+                "its start and increment are not stated, and others differ in them"
+            )
         else:
             late = 0.0 if began is None else float((began - first) / np.timedelta64(1, "us")) / 1e6
-            times = offset + late + step * np.arange(each.size, dtype=np.float64)
-            clocked.append(replace(each, times=times))
+            times = offset + late + step * np.arange(made.size, dtype=np.float64)
+            clocked.append(replace(made, times=times))
     return Table(tuple(clocked), meta=meta, unread=unread, name=name)

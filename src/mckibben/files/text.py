@@ -37,11 +37,11 @@ _SNIFFED = 2**18  # bytes of a line by which the layout of a table is recognised
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the table of a text file."""
     data = file.read()
-    if os.path.lexists(own.sidecar(path)) and (found := _own(data, path)):
-        return [found]
+    if os.path.lexists(own.sidecar(path)) and (description := _own(data, path)):
+        return [description]
     data = decoded(data, path)
     if segments := labview_segments(data):
-        return [replace(_table(*each, path), name=name) for name, each in segments.items()]
+        return [replace(_table(*segment, path), name=name) for name, segment in segments.items()]
     return [parsed(data, path)]
 
 
@@ -100,10 +100,12 @@ def _frame(data: bytes, dialect: Dialect, names: Sequence[Any], **options: Any) 
 
 def parsed(data: bytes, path: Path, separators: Sequence[str | None] = SEPARATORS) -> Table:
     """Return the table of a text in UTF-8 with line feeds; None in separators is whitespace."""
-    named = re.match(rb"\"?sep=([\t;|,])\"?[ \t;|,]*\n", data, re.IGNORECASE)  # a line for Excel
-    if named:
-        separators = (named[1].decode(),)
-        data = b"\n" + data[named.end() :]  # so that lines have the same numbers
+    separator = re.match(
+        rb"\"?sep=([\t;|,])\"?[ \t;|,]*\n", data, re.IGNORECASE
+    )  # a line for Excel
+    if separator:
+        separators = (separator[1].decode(),)
+        data = b"\n" + data[separator.end() :]  # so that lines have the same numbers
     if _ARROW.search(data[:_SNIFFED]):
         data = _ARROW.sub(lambda found: found[1] + (found[2] or b" "), data)
     if (found := read_named_values(data)) is not None:
@@ -119,7 +121,7 @@ def _table(rows: Sequence[bytes], layout: Layout, path: Path) -> Table:
     numbers, lines = samples(rows, layout, path)
     missing = len(headers) - len(dialect.split(lines[0].decode("utf-8", "replace")))
     lines[0] += (dialect.separator or " nan").encode() * missing  # by which pandas counts columns
-    frame, texts, shown = _frames(b"\n".join(lines).replace("−".encode(), b"-"), layout)
+    frame, texts, read_headers = _frames(b"\n".join(lines).replace("−".encode(), b"-"), layout)
     if len(frame) != len(numbers):  # so that no sample has the number of another line
         raise DataError("its lines are not those of a table", file=path, remedy="export it again")
     decimals: dict[str, str] = {}  # column -> a number that has three digits after the mark, as all
@@ -128,14 +130,14 @@ def _table(rows: Sequence[bytes], layout: Layout, path: Path) -> Table:
         cells = frame[i]
         if i in texts or (cells.dtype.kind not in "iufb" and cells.notna().any()):
             cells = texts.get(i, cells)
-            found, cell = column(name, unit, cells, dialect)
+            made_column, cell = column(name, unit, cells, dialect)
             decimals.update({name: cell} if cell else {})
-            return found
+            return made_column
         values = cells.to_numpy(np.float64) if cells.notna().any() else None
         return Column(name, values, unit, texts=[""] * len(cells) if values is None else ())
 
     table = _in_columns(made, frame, layout, numbers)
-    if decimals and not shown:
+    if decimals and not read_headers:
         _note_decimals(decimals, dialect.decimal, path)
     return table
 
@@ -151,10 +153,10 @@ def _in_columns(
         if header or frame[i].notna().any()
     ]
     unread: dict[str, str] = {}
-    for each in columns:
-        first = next(filter(None, each.texts), "")
-        if each.values is None and not may_be_instant(first):
-            unread[each.header] = f"text, such as {first[:40]!r}" if first else "no number in it"
+    for signal in columns:
+        first = next(filter(None, signal.texts), "")
+        if signal.values is None and not may_be_instant(first):
+            unread[signal.header] = f"text, such as {first[:40]!r}" if first else "no number in it"
     start, rates = layout.start_time, layout.rates
     return Table(tuple(columns), np.array(numbers), None, start, rates=rates, unread=unread)
 

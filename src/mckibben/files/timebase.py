@@ -70,8 +70,8 @@ class Times:
 
 def since_first(times: Times) -> Times:
     """Return times since the first where they are counted since 1970, else as they are."""
-    known = times.values[np.isfinite(times.values)]
-    first = float(known[0]) if known.size else 0.0
+    finite = times.values[np.isfinite(times.values)]
+    first = float(finite[0]) if finite.size else 0.0
     low, high = YEARS_2001_TO_2049
     if not low < times.seconds(first) < high:
         return times
@@ -90,14 +90,16 @@ def begun(moments: Sequence[float | None]) -> list[float] | None:
     >>> begun([1_769_860_800.0, 43_200.5]), begun([5.0, 7.0]), begun([5.0, None]), begun([None])
     ([0.0, 0.5], [0.0, 2.0], None, [0.0])
     """
-    known = [moment for moment in moments if moment is not None]
-    if len(known) < len(moments):
-        return None if known else [0.0] * len(moments)
-    dated = next((one for one in known if one > YEARS_2001_TO_2049[0]), None)
+    dates = [moment for moment in moments if moment is not None]
+    if len(dates) < len(moments):
+        return None if dates else [0.0] * len(moments)
+    dated = next((date for date in dates if date > YEARS_2001_TO_2049[0]), None)
     if dated is not None:
-        late = [0.0 if one > YEARS_2001_TO_2049[0] else round((dated - one) / DAY) for one in known]
-        known = [one + DAY * days for one, days in zip(known, late, strict=True)]
-    return [one - min(known) for one in known]
+        late = [
+            0.0 if date > YEARS_2001_TO_2049[0] else round((dated - date) / DAY) for date in dates
+        ]
+        dates = [date + DAY * days for date, days in zip(dates, late, strict=True)]
+    return [date - min(dates) for date in dates]
 
 
 class Step(NamedTuple):
@@ -118,34 +120,34 @@ def usable(times: Times, channels: Mapping[str, Array], source: Source) -> Rows:
     counters do, or are rounded so that other rows have equal times.
     """
     time = times.values
-    every = np.flatnonzero(np.isfinite(time))
-    if every.size < time.size:
-        if every.size < (1 - MOST_WITHOUT_TIME) * time.size:
+    finite = np.flatnonzero(np.isfinite(time))
+    if finite.size < time.size:
+        if finite.size < (1 - MOST_WITHOUT_TIME) * time.size:
             return np.arange(time.size)
         row = source.table.row(int(np.argmin(np.isfinite(time))))
-        n = time.size - every.size
+        n = time.size - finite.size
         source.warn(f"{n} row(s) have no time and were left out, the first in row {row}")
-    time, channels = time[every], {name: x[every] for name, x in channels.items()}
-    return every[_without_repeats(time, channels, every, source)]
+    time, channels = time[finite], {name: x[finite] for name, x in channels.items()}
+    return finite[_without_repeats(time, channels, finite, source)]
 
 
 def _without_repeats(
     time: Array, channels: Mapping[str, Array], rows: Rows, source: Source
 ) -> Rows:
-    every = np.arange(time.size)
+    indices = np.arange(time.size)
     if np.all(np.diff(time) > 0) or wraps(time) is not None:
-        return every
+        return indices
     table = np.column_stack([time, *channels.values()])
     _, first = np.unique(table, axis=0, return_index=True, equal_nan=True)
-    repeats = np.setdiff1d(every, first)
-    kept = np.sort(first)
-    if not repeats.size or np.any(np.diff(time[kept]) <= 0):  # of a coarse clock at rest
-        return every
+    repeats = np.setdiff1d(indices, first)
+    first_rows = np.sort(first)
+    if not repeats.size or np.any(np.diff(time[first_rows]) <= 0):  # of a coarse clock at rest
+        return indices
     row = source.table.row(int(rows[repeats[0]]))
     source.warn(
         f"{repeats.size} row(s) are exact repeats and were left out, the first in row {row}"
     )
-    return kept
+    return first_rows
 
 
 def increasing(times: Times, source: Source) -> Times:
@@ -205,10 +207,10 @@ def stated_step(source: Source) -> float | None:
     rates = source.table.rates
     if not rates:
         return None
-    stated = listed([f"{place} = {value:g}" for place, value in rates.items()])
+    stated = listed([f"{path} = {value:g}" for path, value in rates.items()])
     with np.errstate(all="ignore"):
-        given = np.array(list(rates.values()), dtype=float)
-        steps = np.where([_last(place) in STEPS for place in rates], given, 1.0 / given)
+        values = np.array(list(rates.values()), dtype=float)
+        steps = np.where([_last(path) in STEPS for path in rates], values, 1.0 / values)
     if not (steps.min() >= 1e-12 and steps.max() < 1e11 and np.ptp(steps) <= 1e-3 * steps.min()):
         problem = f"{stated}: no rate or sample time, or not one alone"
         remedy = "give the samples per second with `rate`, or correct them in the file"
@@ -229,8 +231,8 @@ def is_rate(name: str) -> bool:
     return _last(name) in RATES + STEPS
 
 
-def _last(place: str) -> str:
-    name = place.replace("/", ".").rpartition(".")[2]
+def _last(path: str) -> str:
+    name = path.replace("/", ".").rpartition(".")[2]
     return name if len(name) == 2 else snake_case(name)
 
 

@@ -87,15 +87,15 @@ def table(
             unread[where] = f"an array of {' x '.join(map(str, leaf.shape))}"
         else:
             arrays[place] = values
-    columns, own = _vectors(_since_first(arrays), leaves, dot)
-    for place, stated in _units(columns, own, leaves).items():
+    columns, unit_places = _vectors(_since_first(arrays), leaves, dot)
+    for place, stated in _units(columns, unit_places, leaves).items():
         if len(stated) > 1:
             unread[dot.join(place)] = f"its units are {listed(sorted(stated))}"
             del columns[place]
         elif stated:
             columns[place] = replace(columns[place], unit=min(stated))
-    columns = _timed(columns, own, unread, dot)
-    lengths = {each.size for each in columns.values() if each.times is None}
+    columns = _timed(columns, unit_places, unread, dot)
+    lengths = {vector.size for vector in columns.values() if vector.times is None}
     texts: list[Column] = []
     for place, lines in leaves.items():
         if isinstance(lines, list) and lines:
@@ -105,15 +105,17 @@ def table(
                 unread[dot.join(place)] = "text"
     if not columns:
         raise without_numbers(unread, path)
-    labels = Counter(each.label for each in columns.values())
-    for place, each in columns.items():
+    labels = Counter(vector.label for vector in columns.values())
+    for place, vector in columns.items():
         full = dot.join(place)
-        columns[place] = replace(each, place=full)
-        if labels[each.label] > 1:
-            alias = each.label if is_standard(each.label) else re.sub(r"\W+", "_", full).strip("_")
-            columns[place] = replace(each, header=full, alias=alias, place=full)
-    found = (*columns.values(), *texts)
-    return Table(found, meta=meta or {}, rates=rates, unread=unread)
+        columns[place] = replace(vector, place=full)
+        if labels[vector.label] > 1:
+            alias = (
+                vector.label if is_standard(vector.label) else re.sub(r"\W+", "_", full).strip("_")
+            )
+            columns[place] = replace(vector, header=full, alias=alias, place=full)
+    all_columns = (*columns.values(), *texts)
+    return Table(all_columns, meta=meta or {}, rates=rates, unread=unread)
 
 
 def runs(tree: Mapping[str, Node], path: Path, **how: Any) -> list[Table]:
@@ -125,14 +127,14 @@ def runs(tree: Mapping[str, Node], path: Path, **how: Any) -> list[Table]:
     if len(lists) != 1:
         return [table(tree, path, **how)]
     ((variable, structs),) = lists.items()
-    others = {name: node for name, node in tree.items() if name != variable}
-    found: list[Table] = []
-    for number, one in enumerate(structs, start=1):
-        named = [node for key, node in one.items() if key in NAMES and isinstance(node, str)]
-        own = {key: node for key, node in one.items() if not isinstance(node, str)}
-        name = named[0] if named else f"{variable} {number}"
-        found.append(replace(table({**others, **own}, path, **how), name=name))
-    return found
+    shared = {name: node for name, node in tree.items() if name != variable}
+    tables: list[Table] = []
+    for number, struct in enumerate(structs, start=1):
+        names = [node for key, node in struct.items() if key in NAMES and isinstance(node, str)]
+        arrays = {key: node for key, node in struct.items() if not isinstance(node, str)}
+        name = names[0] if names else f"{variable} {number}"
+        tables.append(replace(table({**shared, **arrays}, path, **how), name=name))
+    return tables
 
 
 def _is_of_runs(node: Node) -> TypeGuard[Sequence[Mapping[str, Node]]]:
@@ -141,14 +143,14 @@ def _is_of_runs(node: Node) -> TypeGuard[Sequence[Mapping[str, Node]]]:
         return False
     vectors = [name for name, of in node[0].items() if isinstance(of, np.ndarray) and of.size > 1]
     timed = any(map(is_time, vectors)) and len(vectors) > 1
-    return timed and all(isinstance(one, dict) and {*one} == {*node[0]} for one in node)
+    return timed and all(isinstance(struct, dict) and {*struct} == {*node[0]} for struct in node)
 
 
 def _since_first(arrays: Mapping[Place, NDArray[Any]]) -> dict[Place, NDArray[Any]]:
     """Return instants as the time since the first of all, which clocks have in common."""
     instants = [values for values in arrays.values() if values.dtype.kind == "M"]
-    known = [values[~np.isnat(values)] for values in instants]
-    first = min((values.min() for values in known if values.size), default=np.datetime64(0, "ns"))
+    finite = [values[~np.isnat(values)] for values in instants]
+    first = min((values.min() for values in finite if values.size), default=np.datetime64(0, "ns"))
     return {at: x - first if x.dtype.kind == "M" else x for at, x in arrays.items()}
 
 
@@ -169,28 +171,28 @@ def _leaves(node: Any, place: Place) -> Iterator[tuple[Place, Node]]:
     if isinstance(node, list):
         node = node if (merged := _merged(node)) is None else merged
     if isinstance(node, Mapping):
-        for name, each in node.items():
-            yield from _leaves(each, (*place, name))
-    elif not isinstance(node, list) or all(isinstance(each, str) for each in node):
+        for name, child in node.items():
+            yield from _leaves(child, (*place, name))
+    elif not isinstance(node, list) or all(isinstance(child, str) for child in node):
         yield place, node
     else:
-        form = "{}({})" if all(isinstance(each, Mapping) for each in node) else "{}{{{}}}"
-        for i, each in enumerate(node, start=1):
-            yield from _leaves(each, (*place[:-1], form.format(place[-1], i)))
+        form = "{}({})" if all(isinstance(child, Mapping) for child in node) else "{}{{{}}}"
+        for i, child in enumerate(node, start=1):
+            yield from _leaves(child, (*place[:-1], form.format(place[-1], i)))
 
 
 def _merged(nodes: Sequence[Any]) -> Node | None:
     """Return the merged vector, texts, or struct of a struct array, or None."""
-    words = [isinstance(each, str) for each in nodes]
-    scalars = [isinstance(each, np.ndarray) and each.size == 1 for each in nodes]
+    words = [isinstance(item, str) for item in nodes]
+    scalars = [isinstance(item, np.ndarray) and item.size == 1 for item in nodes]
     if all(words):
         return list(nodes)
     if all(scalars):
-        return np.array([each.reshape(-1)[0] for each in nodes])
-    if all(isinstance(each, Mapping) and each.keys() == nodes[0].keys() for each in nodes):
-        fields = {name: _merged([each[name] for each in nodes]) for name in nodes[0]}
-        found = {name: node for name, node in fields.items() if node is not None}
-        return found if len(found) == len(fields) else None
+        return np.array([item.reshape(-1)[0] for item in nodes])
+    if all(isinstance(item, Mapping) and item.keys() == nodes[0].keys() for item in nodes):
+        fields = {name: _merged([item[name] for item in nodes]) for name in nodes[0]}
+        merged = {name: node for name, node in fields.items() if node is not None}
+        return merged if len(merged) == len(fields) else None
     mixed = all(word or scalar for word, scalar in zip(words, scalars, strict=True))
     return Unread("a cell of text and numbers") if mixed else None
 
@@ -208,15 +210,15 @@ def _vectors(
     )
     alike = Counter((at[:-1], max(a.shape)) for at, a in arrays.items() if not is_time(at[-1]))
     columns: dict[Place, Column] = {}
-    own: dict[Place, tuple[Place, ...]] = {}
+    unit_places: dict[Place, tuple[Place, ...]] = {}
     for place, values in arrays.items():
         home, field = place[:-1], place[-1]
         header = name = field
-        own[place] = (place,)
+        unit_places[place] = (place,)
         if alike[home, max(values.shape)] == 1 and not is_time(field):
-            own[place] = (place, home)
+            unit_places[place] = (place, home)
             if home and field.casefold() in DATA:
-                own[place] = (home, place)
+                unit_places[place] = (home, place)
                 title = names.get(home)
                 if isinstance(title, str) and title.strip():
                     header = name = title
@@ -233,10 +235,10 @@ def _vectors(
             named = titles[i] if titles else header + number
             name = f"{plain.name}_{i + 1}" + (f" [{plain.unit}]" if plain.unit else "")
             at = (*home, field + number)
-            each = _column(named, named if titles else name, row)
-            columns[at] = replace(each, unit=stated[i] if stated else None, matrix=True)
-            own[at] = ((*home, named), *(() if stated else own[place]))
-    return columns, own
+            column = _column(named, named if titles else name, row)
+            columns[at] = replace(column, unit=stated[i] if stated else None, matrix=True)
+            unit_places[at] = ((*home, named), *(() if stated else unit_places[place]))
+    return columns, unit_places
 
 
 def _of_columns(texts: Node | None, n: int) -> Sequence[str] | None:
@@ -250,20 +252,20 @@ def _of_columns(texts: Node | None, n: int) -> Sequence[str] | None:
 
 
 def _column(header: str, name: str, values: NDArray[Any]) -> Column:
-    found = column(header, np.ascontiguousarray(values))
-    return replace(found, alias=None if name == header else name)
+    made = column(header, np.ascontiguousarray(values))
+    return replace(made, alias=None if name == header else name)
 
 
 def _units(
     columns: Mapping[Place, Column],
-    own: Mapping[Place, tuple[Place, ...]],
+    unit_places: Mapping[Place, tuple[Place, ...]],
     leaves: Mapping[Place, Node],
 ) -> dict[Place, set[str]]:
     """Return the units stated for vectors, or for their names in a neighbouring group."""
     groups = {at[:-1] for at, leaf in leaves.items() if isinstance(leaf, str) and find(leaf)}
-    signals = {*own, *(places[0] for places in own.values())}
+    signals = {*unit_places, *(places[0] for places in unit_places.values())}
     units: dict[Place, set[str]] = {}
-    beside: dict[Place, set[str]] = {}
+    neighbours: dict[Place, set[str]] = {}
     for place, leaf in leaves.items():
         home = place[:-1]
         if place[-1].casefold() in UNITS and isinstance(leaf, (str, list) if home else str):
@@ -275,41 +277,41 @@ def _units(
         stated = {leaf} if isinstance(leaf, str) else set(leaf)
         units.setdefault(place, set()).update(stated - {""})
         if len(place) > 1 and place not in signals:
-            beside.setdefault((*place[:-2], place[-1]), set()).update(stated - {""})
-    found: dict[Place, set[str]] = {}
-    for place, each in columns.items():
-        above = [(*place[:i], each.label) for i in range(len(place) - 1, -1, -1)]
-        texts = [units.get(at) for at in own[place]] + [beside.get(at) for at in above]
-        found[place] = set() if each.unit else next(filter(None, texts), set())
-    return found
+            neighbours.setdefault((*place[:-2], place[-1]), set()).update(stated - {""})
+    result: dict[Place, set[str]] = {}
+    for place, vector in columns.items():
+        above = [(*place[:i], vector.label) for i in range(len(place) - 1, -1, -1)]
+        texts = [units.get(at) for at in unit_places[place]] + [neighbours.get(at) for at in above]
+        result[place] = set() if vector.unit else next(filter(None, texts), set())
+    return result
 
 
 def _timed(
     columns: Mapping[Place, Column],
-    own: Mapping[Place, tuple[Place, ...]],
+    unit_places: Mapping[Place, tuple[Place, ...]],
     unread: dict[str, str],
     dot: str,
 ) -> dict[Place, Column]:
     """Return the columns without repeated times, each with its times [s] if clocks differ."""
     seconds = {
-        place: times for place, each in columns.items() if (times := _seconds(each)) is not None
+        place: times for place, vector in columns.items() if (times := _seconds(vector)) is not None
     }
     clocks: dict[Place, Place] = {}
-    for place, each in columns.items():
+    for place, vector in columns.items():
         shared = [
-            (len(own[time][0]), time)
+            (len(unit_places[time][0]), time)
             for time in seconds
-            if columns[time].size == each.size
-            and place[: len(own[time][0]) - 1] == own[time][0][:-1]
+            if columns[time].size == vector.size
+            and place[: len(unit_places[time][0]) - 1] == unit_places[time][0][:-1]
         ]
         nearest = [time for depth, time in shared if depth == max(shared)[0]]
         if len(nearest) == 1 and place not in seconds:
             clocks[place] = nearest[0]
-    first, *others = dict.fromkeys(clocks.values()) or [()]
-    if all(np.array_equal(seconds[first], seconds[time], equal_nan=True) for time in others):
-        return {place: each for place, each in columns.items() if place not in others}
-    rest = [place for place in columns if place not in {first, *others, *clocks}]
-    unread |= {dot.join(at): "it has no times, but others have" for at in sorted(rest)}
+    first, *repeated = dict.fromkeys(clocks.values()) or [()]
+    if all(np.array_equal(seconds[first], seconds[time], equal_nan=True) for time in repeated):
+        return {place: vector for place, vector in columns.items() if place not in repeated}
+    untimed = [place for place in columns if place not in {first, *repeated, *clocks}]
+    unread |= {dot.join(at): "it has no times, but others have" for at in sorted(untimed)}
     return {place: replace(columns[place], times=seconds[time]) for place, time in clocks.items()}
 
 

@@ -173,9 +173,11 @@ def _ask_pint(text: str) -> Unit | None:
         if pure or (target == "Hz" and "hertz" not in str(unit)):
             continue
         if unit.dimensionality == registry.Unit(target).dimensionality:
-            one, base = (registry.Quantity(1.0, each).to_base_units().m for each in (unit, target))
+            quantity, base = (
+                registry.Quantity(1.0, each).to_base_units().m for each in (unit, target)
+            )
             # RN is a record number, not 1e27 newtons
-            return Unit(str(unit), target) if 1e-10 < one / base < 1e10 else None
+            return Unit(str(unit), target) if 1e-10 < quantity / base < 1e10 else None
     return Unit(text, None)
 
 
@@ -188,8 +190,8 @@ def _plain(text: str) -> str:
     text = unicodedata.normalize("NFKC", text.replace("º", "°")).translate(_LOOK_ALIKES)
     text = " ".join(text.split()).rstrip(".")
     words = _words()
-    whole = words.get(text.casefold().replace(" ", "_"))
-    text = whole or _LETTERS.sub(lambda word: words.get(word[0].casefold(), word[0]), text)
+    unit_word = words.get(text.casefold().replace(" ", "_"))
+    text = unit_word or _LETTERS.sub(lambda word: words.get(word[0].casefold(), word[0]), text)
     return re.sub(r" ?([/*·]) ?", r"\1", text)
 
 

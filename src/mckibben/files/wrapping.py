@@ -23,12 +23,12 @@ FEWEST, MOST = 2.0**8, 2.0**32
 
 def jumps_of(columns: Iterable[Array]) -> Rows:
     """Return the rows in which any column changes by more than half of its range."""
-    found = []
+    result = []
     with np.errstate(over="ignore", invalid="ignore"):
         for values in columns:
             steps, width = np.abs(np.diff(values)), np.ptp(values) if values.size else 0.0
-            found.append(np.flatnonzero(steps > 0.5 * width) + 1)
-    return np.unique(np.concatenate([np.zeros(0, np.intp), *found]))
+            result.append(np.flatnonzero(steps > 0.5 * width) + 1)
+    return np.unique(np.concatenate([np.zeros(0, np.intp), *result]))
 
 
 def unwrapped(channel: str, recorded: Array, jumps: Rows, source: Source) -> Array:
@@ -36,12 +36,12 @@ def unwrapped(channel: str, recorded: Array, jumps: Rows, source: Source) -> Arr
 
     None that jumps with what drives it, in the rows ``jumps``, is a counter.
     """
-    known = np.flatnonzero(np.isfinite(recorded))
-    found = wraps(recorded[known])
-    if found is None:
+    finite = np.flatnonzero(np.isfinite(recorded))
+    corrections = wraps(recorded[finite])
+    if corrections is None:
         return recorded
-    size, upwards = found
-    wrapped = known[np.flatnonzero(upwards) + 1]
+    size, upwards = corrections
+    wrapped = finite[np.flatnonzero(upwards) + 1]
     after = wrapped[:, np.newaxis] - jumps
     if np.mean(np.any((after >= 0) & (after <= SOON), axis=1)) > 0.5:
         return recorded
@@ -50,9 +50,9 @@ def unwrapped(channel: str, recorded: Array, jumps: Rows, source: Source) -> Arr
         f"channel {channel!r} jumps by almost {size:.6g}, first in row {row}, as a counter that wraps: "
         "it was made to go on; use `raw` where that was measured"
     )
-    whole = recorded.copy()
-    whole[known] += size * np.cumsum([0.0, *upwards])
-    return whole
+    result = recorded.copy()
+    result[finite] += size * np.cumsum([0.0, *upwards])
+    return result
 
 
 def wraps(values: Array) -> tuple[float, Array] | None:
@@ -85,19 +85,19 @@ def wraps(values: Array) -> tuple[float, Array] | None:
     return None
 
 
-def _goes_on(moved: Array, upwards: Array, unit: float) -> bool:
+def _goes_on(travel: Array, upwards: Array, unit: float) -> bool:
     """Return whether the steps of what was unwrapped are at its wraps as around them."""
-    if np.ptp(np.cumsum(moved)) < 4 * np.abs(moved).max():
+    if np.ptp(np.cumsum(travel)) < 4 * np.abs(travel).max():
         return False  # a square wave
     wrapped = upwards != 0
-    around = np.pad(moved, 1, mode="edge")
+    around = np.pad(travel, 1, mode="edge")
     before, after = around[:-2], around[2:]
-    bends = moved - (before + after) / 2
-    apart = np.convolve(wrapped, np.ones(3), "same") < 0.5
-    if not apart.any():
+    bends = travel - (before + after) / 2
+    is_isolated = np.convolve(wrapped, np.ones(3), "same") < 0.5
+    if not is_isolated.any():
         return False
     # small ones are noise even of what mostly moves, or stands and steps
-    small = [np.quantile(np.abs(each[apart]), 0.2) for each in (bends, 1.6 * moved)]
+    small = [np.quantile(np.abs(each[is_isolated]), 0.2) for each in (bends, 1.6 * travel)]
     rounding = 0.65 * unit
     noise = max(rounding, 4 * min(small))
     allowed = 1.5 * noise + 0.3 * np.abs(after - before) + 0.05 * np.abs(after + before)
@@ -139,11 +139,11 @@ def _divisor(distances: Array, floor: float) -> float | None:
         # from small multiples, of which there is no doubt, to large ones, which make the step exact
         some = distances[distances <= reach * max(unit, least)]
         counts = np.rint(some / unit)
-        others = some[np.abs(some - unit * counts) > 0.1 * unit][:8]
-        if others.size:  # as Euclid's algorithm
-            rests = np.abs(others - divisor * np.rint(others / divisor))
-            left = rests[rests > 0.1 * divisor]
-            unit = divisor = float(left.min() if left.size else rests.max())
+        misfits = some[np.abs(some - unit * counts) > 0.1 * unit][:8]
+        if misfits.size:  # as Euclid's algorithm
+            rests = np.abs(misfits - divisor * np.rint(misfits / divisor))
+            remainders = rests[rests > 0.1 * divisor]
+            unit = divisor = float(remainders.min() if remainders.size else rests.max())
             reach = 4.0
             continue
         unit = float(some @ counts / (counts @ counts))

@@ -34,13 +34,15 @@ def read(file: BufferedReader, path: Path, sheet: str | None = None) -> list[Tab
     DataError
         If it is not there, or has no numbers.
     """
-    wanted = sheet or about(path).sheet
+    wanted_sheet = sheet or about(path).sheet
     with _opened(file, path) as book:
         names = [one.title for one in book.worksheets]
-        if wanted is not None and wanted not in names:
-            problem, remedy = f"there is no sheet {wanted!r}", f"name one of {listed(names)}"
+        if wanted_sheet is not None and wanted_sheet not in names:
+            problem, remedy = f"there is no sheet {wanted_sheet!r}", f"name one of {listed(names)}"
             raise DataError(problem, file=path, parameter="sheet", remedy=remedy)
-        texts_of = {one.title: _text(one) for one in book.worksheets if wanted in (None, one.title)}
+        texts_of = {
+            one.title: _text(one) for one in book.worksheets if wanted_sheet in (None, one.title)
+        }
     name = max(texts_of, key=lambda name: texts_of[name][1:])
     text, _, n_numbers = texts_of[name]
     if not n_numbers:
@@ -49,21 +51,23 @@ def read(file: BufferedReader, path: Path, sheet: str | None = None) -> list[Tab
             file=path,
             remedy="save samples in columns under one line of names, or name a `sheet` with numbers",
         )
-    found = {name: texts.parsed(text, path, ("\t",))}
-    headers = _headers(found[name])
+    tables_by_sheet = {name: texts.parsed(text, path, ("\t",))}
+    headers = _headers(tables_by_sheet[name])
     for other, (text, _, n_numbers) in texts_of.items():
         with suppress(DataError):  # of a sheet that is no table
             one = texts.parsed(text, path, ("\t",)) if other != name and n_numbers else None
             if one is not None and _headers(one) == headers:
-                found[other] = one
+                tables_by_sheet[other] = one
     reason = f"one sheet is read, {name!r}: the one with most rows of numbers, or `sheet`"
-    unread = dict.fromkeys((other for other in names if other not in found), reason)
+    unread = dict.fromkeys((other for other in names if other not in tables_by_sheet), reason)
     return [
         replace(
-            found[one], unread={**found[one].unread, **unread}, name=one if len(found) > 1 else None
+            tables_by_sheet[one],
+            unread={**tables_by_sheet[one].unread, **unread},
+            name=one if len(tables_by_sheet) > 1 else None,
         )
         for one in names
-        if one in found
+        if one in tables_by_sheet
     ]
 
 
@@ -74,7 +78,7 @@ def _headers(table: Table) -> list[str]:
 def sheets(path: Path) -> list[str]:
     """Return the names of the sheets of a spreadsheet."""
     with path.open("rb") as file, _opened(file, path) as book:
-        return [one.title for one in book.worksheets]
+        return [worksheet.title for worksheet in book.worksheets]
 
 
 def _opened(file: BufferedReader, path: Path) -> Any:

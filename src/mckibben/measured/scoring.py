@@ -148,7 +148,7 @@ def _entry(file: Path, one: Set, parts: Sequence[Part], own: pd.DataFrame) -> En
             errors.append((run.matrix(channels.outputs) - outputs)[rows])
     missed = np.concatenate(errors)
     error = float(np.mean([rmse(column, np.zeros_like(column)) for column in missed.T]))
-    pairs = moving_pairs(runs, channels.pairs, channels.given(runs))
+    pairs = moving_pairs(runs, channels.pairs, channels.inputs_in(runs))
     gaps = paired_gaps(runs, predicted, pairs)
     wide = len(gaps) > 0 and np.sqrt(np.mean(gaps[:, 0] ** 2)) > LEAST_WIDTH * parts[0].span
     ratio = gap_ratio(gaps) if wide else None

@@ -1,7 +1,8 @@
 """Opening regular files for reading, with a size limit.
 
-A pipe or a device would wait or flow for ever, and a file may be larger than memory. What was opened is
-looked at, so that nothing can be put in its place in between.
+Readers of recordings, rigs, protocols and saved models open files here. A pipe or a device would
+block or never end, and a file may be larger than memory. The open file is checked, so that it
+cannot be replaced between the check and the reading.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pathlib import Path
 from mckibben.errors import DataError
 
 DESCRIPTION = 4 * 2**20
-"""Bytes that a description (a sidecar, a protocol, a job, a rig) may have."""
+"""Largest size of a description (a sidecar, a protocol, a job, a rig) [bytes]."""
 
 
 @contextmanager
@@ -31,7 +32,7 @@ def opened(path: str | Path, *, most: int) -> Iterator[BufferedReader]:
     try:
         # without waiting for whoever writes to a pipe
         flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-        number = os.open(path, flags)
+        descriptor = os.open(path, flags)
     except IsADirectoryError:
         raise DataError("this is a folder", file=path, remedy="give a file in it") from None
     except (OSError, ValueError) as error:
@@ -39,18 +40,18 @@ def opened(path: str | Path, *, most: int) -> Iterator[BufferedReader]:
         remedy = "check the path and its rights"
         raise DataError(f"it cannot be read ({reason.lower()})", file=path, remedy=remedy) from None
     try:
-        found = os.fstat(number)
-        if stat.S_ISDIR(found.st_mode):
+        status = os.fstat(descriptor)
+        if stat.S_ISDIR(status.st_mode):
             raise DataError("this is a folder", file=path, remedy="give a file in it")
-        if not stat.S_ISREG(found.st_mode):
+        if not stat.S_ISREG(status.st_mode):
             raise DataError("this is no ordinary file", file=path, remedy="give a file on disk")
-        if found.st_size > most:
-            problem = f"{found.st_size} bytes are more than the {most} that are read"
+        if status.st_size > most:
+            problem = f"{status.st_size} bytes are more than the {most} that are read"
             raise DataError(problem, file=path, remedy="cut it into smaller files")
-        with open(number, "rb", closefd=False) as file:
+        with open(descriptor, "rb", closefd=False) as file:
             yield file
     finally:
-        os.close(number)
+        os.close(descriptor)
 
 
 def read_bytes(path: str | Path, *, most: int) -> bytes:
@@ -68,7 +69,7 @@ def read_text(path: str | Path, *, most: int) -> str:
 
 
 def named_toml(name: str | Path, folder: Path, kind: str) -> Path:
-    """Return the path of a kind's TOML file: as given, or of the package's folder by its name.
+    """Return the path of a TOML file: ``name`` if it ends in .toml, else that of a folder.
 
     Raises
     ------
@@ -78,10 +79,10 @@ def named_toml(name: str | Path, folder: Path, kind: str) -> Path:
     path = Path(name)
     if path.suffix == ".toml":
         return path
-    known = sorted(one.stem for one in folder.glob("*.toml"))
-    if str(name) not in known:
+    names = sorted(file.stem for file in folder.glob("*.toml"))
+    if str(name) not in names:
         raise DataError(
             f"there is no {kind} {str(name)!r}",
-            remedy=f"use one of {', '.join(known)}, or a file that ends in .toml",
+            remedy=f"use one of {', '.join(names)}, or a file that ends in .toml",
         )
     return folder / f"{name}.toml"

@@ -34,7 +34,7 @@ SURE = 0.1
 
 @contextmanager
 def telling(
-    progress: bool | Tell | None, what: str, *, lines: bool = False
+    progress: bool | Tell | None, title: str, *, lines: bool = False
 ) -> Iterator[Tell | None]:
     """Return the callback of the progress of work; None without progress.
 
@@ -42,7 +42,7 @@ def telling(
     ----------
     progress : bool, callable or None
         Whether to show a bar, on standard error or in a notebook; or what is called.
-    what : str
+    title : str
         The work, in a word or two.
     lines : bool
         Whether each step is a line where standard error is no terminal; else nothing is shown there.
@@ -50,36 +50,36 @@ def telling(
     if progress is not True:
         yield progress or None
         return
-    started = time.monotonic()
+    begin = time.monotonic()
     shell = sys.modules.get("IPython")
     if shell is not None and hasattr(shell.get_ipython(), "kernel"):
-        place: AbstractContextManager[Show] = _in_notebook(what)
+        display: AbstractContextManager[Show] = _in_notebook(title)
     elif sys.stderr is not None and sys.stderr.isatty() and "JPY_PARENT_PID" not in os.environ:
-        place = _on_terminal(what)
+        display = _on_terminal(title)
     else:  # in a log, or in a notebook's shell, which cannot go back in a line
-        place = _in_lines(what) if lines else nullcontext(lambda *_: None)
-    with place as show:
+        display = _in_lines(title) if lines else nullcontext(lambda *_: None)
+    with display as show:
 
         def tell(first: Any, *rest: Any) -> None:
             share, words = getattr(first, "share", first), str(first)
             if share is first:
                 words = ", ".join(
-                    filter(None, [words_of(*rest), time_left(share, time.monotonic() - started)])
+                    filter(None, [words_of(*rest), time_left(share, time.monotonic() - begin)])
                 )
             show(share, words)
 
         yield tell
 
 
-def words_of(given: str | float = "", *_: object) -> str:
+def words_of(progress: str | float = "", *_: object) -> str:
     """Return a text, or the smallest error as text.
 
     >>> words_of(1.234), words_of("folds"), words_of(math.inf), words_of()
     ('best so far 1.23', 'folds', '', '')
     """
-    if isinstance(given, str):
-        return given
-    return f"best so far {given:.3g}" if math.isfinite(given) else ""
+    if isinstance(progress, str):
+        return progress
+    return f"best so far {progress:.3g}" if math.isfinite(progress) else ""
 
 
 def time_left(share: float, elapsed: float) -> str:
@@ -98,55 +98,55 @@ def time_left(share: float, elapsed: float) -> str:
 def one_by_one(items: Iterable[Item], tell: Tell | None) -> Iterator[Item]:
     """Yield items one after another, and report the share done."""
     listed = list(items)
-    for place in range(len(listed) + 1):
+    for k in range(len(listed) + 1):
         if tell is not None:
-            tell(place / len(listed) if listed else 1.0, f"{place} of {len(listed)}")
-        if place < len(listed):
-            yield listed[place]
+            tell(k / len(listed) if listed else 1.0, f"{k} of {len(listed)}")
+        if k < len(listed):
+            yield listed[k]
 
 
 @contextmanager
-def _on_terminal(what: str) -> Iterator[Show]:
+def _on_terminal(title: str) -> Iterator[Show]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
     columns = (TextColumn("{task.description}", markup=False), BarColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=1.0)
+        task = bar.add_task(title, total=1.0)
 
         def show(share: float, words: str) -> None:
-            bar.update(task, completed=share, description=_line(what, words))
+            bar.update(task, completed=share, description=_line(title, words))
 
         yield show
 
 
 @contextmanager
-def _in_lines(what: str) -> Iterator[Show]:
+def _in_lines(title: str) -> Iterator[Show]:
     last = -1.0
 
     def show(share: float, words: str) -> None:
         nonlocal last
         if share >= last + LINE or share == 1.0 > last:
             with suppress(OSError):
-                print(_line(what, words), file=sys.stderr, flush=True)
+                print(_line(title, words), file=sys.stderr, flush=True)
             last = share
 
     yield show
 
 
-def _line(what: str, words: str) -> str:
+def _line(title: str, words: str) -> str:
     """Return a progress line, with control characters of names escaped."""
     words = "".join(c if c.isprintable() else " " for c in words)
-    return f"{what}: {words}" if words else what
+    return f"{title}: {words}" if words else title
 
 
 @contextmanager
-def _in_notebook(what: str) -> Iterator[Show]:
-    shown: Any = import_module("IPython.display")
+def _in_notebook(title: str) -> Iterator[Show]:
+    display: Any = import_module("IPython.display")
 
     def html(share: float, words: str) -> Any:
         bar = f'<progress value="{share:.4f}" max="1" style="vertical-align:middle"></progress>'
-        return shown.HTML(f"<div>{escape(what)} {bar} {escape(words)}</div>")
+        return display.HTML(f"<div>{escape(title)} {bar} {escape(words)}</div>")
 
-    place = shown.display(html(0.0, ""), display_id=True)
-    yield lambda share, words: place.update(html(share, words))
+    handle = display.display(html(0.0, ""), display_id=True)
+    yield lambda share, words: handle.update(html(share, words))

@@ -17,8 +17,8 @@ from mckibben.system.atomic import Numbers
 @lru_cache
 def _absence(owner: Any, name: str) -> str:
     """Return what the error says, once for all that only look whether there is such an attribute."""
-    known = dict.fromkeys((*dir(owner), *owner.__dataclass_fields__))
-    return absent(owner.__name__, name, known, getattr(owner, "face", ""))
+    attributes = dict.fromkeys((*dir(owner), *owner.__dataclass_fields__))
+    return absent(owner.__name__, name, attributes, getattr(owner, "face", ""))
 
 
 class Hinted:
@@ -42,12 +42,12 @@ class DrawsItself:
         return self
 
     def __str__(self) -> str:
-        found: str = load("faces", "card")(self).text()
-        return found
+        text: str = load("faces", "card")(self).text()
+        return text
 
     def _repr_html_(self) -> str:
-        found: str = load("faces", "card")(self).html()
-        return found
+        html: str = load("faces", "card")(self).html()
+        return html
 
     def plot(self, kind: str | None = None, *, ax: Any = None, **choices: Any) -> Any:
         """Draw it with matplotlib.

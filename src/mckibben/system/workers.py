@@ -35,7 +35,7 @@ ONE_THREAD = dict.fromkeys(
 
 MOST_JOBS = 4096
 
-_starting = threading.Lock()
+_start_lock = threading.Lock()
 
 Tell = Callable[..., None]
 """Called by the work to report progress."""
@@ -134,7 +134,7 @@ class Workers:
         waiting = list(enumerate(items))[::-1]
         busy: dict[connection.Connection, int] = {}
 
-        def begin(link: connection.Connection) -> None:
+        def send_next(link: connection.Connection) -> None:
             busy[link], item = waiting.pop()
             if report is not None:
                 report(busy[link])
@@ -144,15 +144,15 @@ class Workers:
         while len(self._processes) < min(self.n, len(waiting)):
             self._start()
         for link in list(self._processes)[: len(waiting)]:
-            begin(link)
+            send_next(link)
         while busy:
             ready = set(connection.wait(list(busy)))
             for link in [link for link in busy if link in ready]:
                 index = busy[link]
                 try:
-                    kind, what = pickle.loads(link.recv_bytes())
+                    kind, content = pickle.loads(link.recv_bytes())
                 except (EOFError, OSError):
-                    kind, what = (
+                    kind, content = (
                         "error",
                         WorkerError(
                             f"its process ended (exit code {self._end(link)})",
@@ -163,23 +163,23 @@ class Workers:
                     link = self._start() if waiting else link
                 if kind == "progress":
                     if report is not None:
-                        report(index, *what)
+                        report(index, *content)
                     continue
                 if waiting:
-                    begin(link)
+                    send_next(link)
                 else:
                     busy.pop(link, None)
-                yield Outcome(index, **{kind: what})
+                yield Outcome(index, **{kind: content})
 
     def _start(self) -> connection.Connection:
-        ours, theirs = connection.Pipe()
-        arguments = (theirs, self._common, self._cores)
+        near_end, far_end = connection.Pipe()
+        arguments = (far_end, self._common, self._cores)
         process = context().Process(target=_serve, args=arguments, daemon=False)
         with _without_the_script():
             process.start()
-        theirs.close()
-        self._processes[ours] = process
-        return ours
+        far_end.close()
+        self._processes[near_end] = process
+        return near_end
 
     def _end(self, link: connection.Connection) -> int:
         process = self._processes.pop(link)
@@ -255,8 +255,8 @@ def _silent(*progress: Any) -> None:
 def all_of(work: Work, items: Sequence[Any], jobs: int | None = None) -> list[Any]:
     """Return the results of all items, from ``jobs`` processes, by default as many as cores."""
     n = checked(jobs) or threads.cores()
-    found = {outcome.index: outcome.result() for outcome in outcomes(work, None, items, n)}
-    return [found[index] for index in range(len(items))]
+    results = {outcome.index: outcome.result() for outcome in outcomes(work, None, items, n)}
+    return [results[index] for index in range(len(items))]
 
 
 def leave(code: int) -> NoReturn:
@@ -273,7 +273,7 @@ def prepare(*more: str) -> None:
     """
     if context(*more).get_start_method() != "forkserver":
         return
-    with _starting:
+    with _start_lock:
         resource_tracker.ensure_running()  # which else unblocks signals
         before = {name: os.environ.get(name) for name in ONE_THREAD}
         os.environ.update(ONE_THREAD)
@@ -306,9 +306,9 @@ def context(*more: str) -> Any:
     spawned = multiprocessing.get_start_method(allow_none=True) == "spawn"
     if spawned or "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
-    found = multiprocessing.get_context("forkserver")
-    found.set_forkserver_preload([*PRELOADED, *more])
-    return found
+    server = multiprocessing.get_context("forkserver")
+    server.set_forkserver_preload([*PRELOADED, *more])
+    return server
 
 
 def end_with_parent() -> None:
@@ -340,16 +340,16 @@ def _serve(link: connection.Connection, common: Any, cores: int) -> None:
             link.send_bytes(_answer(link.recv_bytes(), common, tell))
 
 
-def _answer(given: bytes, common: Any, tell: Tell) -> bytes:
+def _answer(message: bytes, common: Any, tell: Tell) -> bytes:
     """Do the work, and return its value or error for sending; unsendable values become errors."""
     try:
-        work, item = pickle.loads(given)
+        work, item = pickle.loads(message)
         return pickle.dumps(("value", work(common, item, tell)))
     except Exception as error:
         with suppress(Exception):
             answer = pickle.dumps(("error", error))
-            again = pickle.loads(answer)[1]
-            if type(again) is type(error) and str(again) == str(error):
+            reloaded = pickle.loads(answer)[1]
+            if type(reloaded) is type(error) and str(reloaded) == str(error):
                 return answer
         return pickle.dumps(("error", WorkerError(f"{type(error).__name__}: {error}")))
 
@@ -357,7 +357,7 @@ def _answer(given: bytes, common: Any, tell: Tell) -> bytes:
 @contextmanager
 def _without_the_script() -> Iterator[None]:
     """Hide the user's script from started processes, which would run it again."""
-    with _starting:
+    with _start_lock:
         script = sys.modules["__main__"]
         sys.modules["__main__"] = ModuleType("__main__")
         try:

@@ -1,4 +1,9 @@
-"""Base class of estimators: settings that identify a block from recordings."""
+"""Base class of estimators: settings that identify a block from recordings.
+
+A subclass declares its settings as fields and defines `Estimator.find`, which returns the block for
+`TrainingData`. `Estimator.fit` prepares the data, calls it, and adds `Diagnostics`; comparisons, studies
+and scikit-learn call `fit`, `predict` and `score`.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +68,7 @@ the first input for the rest (see `mckibben.blocks.starts`); or as if nothing ha
 
 STRICT_SETTINGS = ConfigDict(strict=True, allow_inf_nan=False)
 
-MOST_PASTS, MATTERS = 3, 0.1
+MOST_PASTS, LEAST_EFFECT = 3, 0.1
 """Maximum number of fits after pasts that the last fit shows; and the effect of these on outputs, or the
 reduction of the error, relative to the error, for another.
 """
@@ -211,11 +216,13 @@ class Estimator(ABC):
         super().__init_subclass__(**kwargs)
         if made_for := vars(cls).get("made_for"):
             cls.input, cls.output = made_for
-        own, base = get_annotations(cls), next(filter(is_dataclass, cls.__mro__[1:]))
-        known = {setting.name for setting in fields(base)}
-        if changed := known & vars(cls).keys() - own.keys():  # defaults, of the types of the base
+        annotations, base = get_annotations(cls), next(filter(is_dataclass, cls.__mro__[1:]))
+        inherited = {setting.name for setting in fields(base)}
+        if (
+            changed := inherited & vars(cls).keys() - annotations.keys()
+        ):  # defaults, of the types of the base
             hints = get_type_hints(base, include_extras=True)
-            cls.__annotations__ = own | {name: hints[name] for name in changed}
+            cls.__annotations__ = annotations | {name: hints[name] for name in changed}
         dataclass(kw_only=True, repr=False, eq=False)(cls)
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
@@ -240,10 +247,10 @@ class Estimator(ABC):
         return self
 
     def __repr__(self) -> str:
-        usual, given = (
+        defaults, texts = (
             {k: repr(v) for k, v in e.get_params().items()} for e in (type(self)(), self)
         )
-        changed = [f"{name}={text}" for name, text in given.items() if text != usual[name]]
+        changed = [f"{name}={text}" for name, text in texts.items() if text != defaults[name]]
         return f"{type(self).__name__}({', '.join(changed)})"
 
     def __sklearn_tags__(self) -> Any:
@@ -277,40 +284,40 @@ class Estimator(ABC):
         scheduling: Names = None,
     ) -> Channels:
         """Return the channels to fit: as named, as the model is made for, or found by `channels_of`."""
-        given = cls.input if inputs is None and cls.input != Estimator.input else inputs
-        wanted = cls.output if outputs is None and cls.output != Estimator.output else outputs
-        return channels_of(recordings, given, wanted, scheduling)
+        driving = cls.input if inputs is None and cls.input != Estimator.input else inputs
+        modelled = cls.output if outputs is None and cls.output != Estimator.output else outputs
+        return channels_of(recordings, driving, modelled, scheduling)
 
     @classmethod
     def objection(cls, recordings: Sequence[Recording], channels: Channels) -> str | None:
         """Return why the model does not apply to recordings, or None."""
         if len(channels.inputs) != 1 or len(channels.outputs) != 1:
             return "it is of one input and one output"
-        own = cls.own_roles(channels)
-        if own.scheduling:
+        roles = cls.own_roles(channels)
+        if roles.scheduling:
             return "the load is not one of its inputs"
-        (given,), (wanted,) = own.inputs, own.outputs
-        kinds = (base_name(given), base_name(wanted))
+        (input_,), (output,) = roles.inputs, roles.outputs
+        kinds = (base_name(input_), base_name(output))
         if cls.made_for is not None and kinds != cls.made_for:
-            nearly = kinds[1] == cls.made_for[1] and conversion(cls.made_for[0], kinds[0], 1.0)
-            made = (
+            convertible = kinds[1] == cls.made_for[1] and conversion(cls.made_for[0], kinds[0], 1.0)
+            remedy = (
                 f": name that as the input, and state {REST_LENGTH}, which makes it of {kinds[0]}"
             )
-            return f"it maps {cls.made_for[0]} to {cls.made_for[1]}{made if nearly else ''}"
-        needed = cls(**cls.channel_settings(channels))._further_inputs()
-        absent = [name for name in needed if any(name not in r for r in recordings)]
+            return f"it maps {cls.made_for[0]} to {cls.made_for[1]}{remedy if convertible else ''}"
+        further = cls(**cls.channel_settings(channels))._further_inputs()
+        absent = [name for name in further if any(name not in r for r in recordings)]
         if absent:
             return f"it needs the channel {absent[0]!r} too"
-        return None if cls.input_settings else resting(recordings, own.inputs)
+        return None if cls.input_settings else resting(recordings, roles.inputs)
 
     @classmethod
     def channel_settings(cls, channels: Channels) -> dict[str, Any]:
         """Return the settings that select channels."""
-        own = cls.own_roles(channels)
-        given, wanted = own.pair
-        kinds = {quantity(name): name for name in reversed(own.offered)}
+        roles = cls.own_roles(channels)
+        input_, output = roles.pair
+        kinds = {quantity(name): name for name in reversed(roles.offered)}
         further = {name: kinds[name] for name in cls.input_settings if name in kinds}
-        return {"input": given, "output": wanted, **further}
+        return {"input": input_, "output": output, **further}
 
     @classmethod
     def own_roles(cls, channels: Channels) -> Channels:
@@ -339,8 +346,8 @@ class Estimator(ABC):
 
     def common_fields(self, data: TrainingData) -> dict[str, Any]:
         """Return the common fields of blocks with memory: input range, start, channels."""
-        own = {"input_range": data.input_range, "initial": self.starting_rule}
-        return own | self.channels(data)
+        memory_fields = {"input_range": data.input_range, "initial": self.starting_rule}
+        return memory_fields | self.channels(data)
 
     def _further_inputs(self) -> tuple[str, ...]:
         return tuple(getattr(self, name) for name in self.input_settings)
@@ -357,8 +364,8 @@ class Estimator(ABC):
         """
         fields = self.fixed_fields
         return tuple(
-            place
-            for place, (part, field, _) in enumerate(block.numbers() if fields else ())
+            index
+            for index, (part, field, _) in enumerate(block.numbers() if fields else ())
             if f"{part.kind}.{field}" in fields
         )
 
@@ -373,11 +380,11 @@ class Estimator(ABC):
         """Return the training data from recordings, checked."""
         # models of several muscles begin anew after rows left out, and so are fitted to bridges too
         measured = [~one.bridged for one in listed(recordings)]
-        counted = measured if rows is None else map(np.logical_and, rows, measured)
+        scored = measured if rows is None else map(np.logical_and, rows, measured)
         assert self.input is not None
         assert self.output is not None
         return training_data(
-            recordings, self.input, self.output, list(counted), self._further_inputs()
+            recordings, self.input, self.output, list(scored), self._further_inputs()
         )
 
     @abstractmethod
@@ -434,10 +441,10 @@ class Estimator(ABC):
             inputs = (*inputs, *self._further_inputs(), *scheduling)
         if y is not None and outputs is None and not is_array(recordings):
             outputs = self._outputs(listed(recordings))
-        every = recorded(recordings, inputs, y, outputs, sample_time, owner)
+        runs = recorded(recordings, inputs, y, outputs, sample_time, owner)
         fitted = copy(self)  # a fit that fails or is interrupted leaves no traces
         with one_blas_thread(), telling(progress, "fitting") as tell:
-            data = fitted._fit(every, rows, tell)
+            data = fitted._fit(runs, rows, tell)
         vars(self).update(vars(fitted))
         self.sample_time_ = sample_time
         refuse_useless(self.diagnostics_, data)
@@ -449,7 +456,7 @@ class Estimator(ABC):
         rows: Sequence[Mask] | None,
         progress: Progress | None,
     ) -> TrainingData:
-        started = time.perf_counter()
+        begin = time.perf_counter()
         self.check_settings()
         tracker = Tracker(progress=progress)
         data = self.data(recordings, rows)
@@ -457,10 +464,10 @@ class Estimator(ABC):
             data.timed()
         self.model_ = self.find(data, tracker)
         runs = self.free_runs(self.model_, recordings, rows)
-        elsewhere = not self.begins_measured and any(map(len, runs.pasts))
-        if elsewhere and runs.apart(runs.from_rest) > MATTERS * runs.rmse:
+        may_begin_moved = not self.begins_measured and any(map(len, runs.pasts))
+        if may_begin_moved and runs.apart(runs.from_rest) > LEAST_EFFECT * runs.rmse:
             runs = self._after_pasts(runs, recordings, rows, tracker)
-        self.diagnostics_ = self._diagnose(runs, data, tracker, started)
+        self.diagnostics_ = self._diagnose(runs, data, tracker, begin)
         if progress is not None:
             progress(1.0, self.diagnostics_.rmse)
         return data
@@ -478,14 +485,14 @@ class Estimator(ABC):
             try:
                 data = again.data(*preceded(recordings, runs))
                 again.model_ = again.find_again(data, tracker)
-                found = again.free_runs(again.model_, recordings, rows)
+                runs_after = again.free_runs(again.model_, recordings, rows)
             except MckibbenError:  # the fit from rest remains
                 break
-            before, after = runs.rmse, found.rmse
+            before, after = runs.rmse, runs_after.rmse
             if after < before:
                 vars(self).update(vars(again))
-                runs = found
-            if not after < (1.0 - MATTERS) * before:
+                runs = runs_after
+            if not after < (1.0 - LEAST_EFFECT) * before:
                 break
         return runs
 
@@ -498,14 +505,14 @@ class Estimator(ABC):
             Naming the setting, what it is, and what it may be.
         """
         hints = get_type_hints(type(self), include_extras=True)
-        for name, given in self.get_params().items():
-            value = given.tolist() if isinstance(given, np.generic | np.ndarray) else given
+        for name, raw in self.get_params().items():
+            value = raw.tolist() if isinstance(raw, np.generic | np.ndarray) else raw
             try:
                 TypeAdapter(hints[name], config=STRICT_SETTINGS).validate_python(value)
             except ValidationError as error:
-                wanted = error.errors()[0]["msg"]
+                message = error.errors()[0]["msg"]
                 raise ModelError(
-                    f"it is {value!r}: {wanted[0].lower()}{wanted[1:]}",
+                    f"it is {value!r}: {message[0].lower()}{message[1:]}",
                     parameter=name,
                     remedy="give another, or leave it out",
                 ) from None
@@ -531,31 +538,33 @@ class Estimator(ABC):
         array, shape (n,), or (n, m) of a model of m outputs
             Of one recording; `Outputs`, a sequence of these, of several.
         """
-        every, outputs = self._of_model(recordings, None, sample_time)
-        modelled = (self.fitted.simulate(one).matrix(outputs) for one in every)
-        found = Outputs(tuple(map(squeezed, modelled)))
-        one = isinstance(recordings, Recording) or is_frame(recordings) or is_array(recordings)
-        return found[0] if one else found
+        runs, outputs = self._of_model(recordings, None, sample_time)
+        outputs_of_runs = (self.fitted.simulate(run).matrix(outputs) for run in runs)
+        predictions = Outputs(tuple(map(squeezed, outputs_of_runs)))
+        is_single = (
+            isinstance(recordings, Recording) or is_frame(recordings) or is_array(recordings)
+        )
+        return predictions[0] if is_single else predictions
 
     def _of_model(
-        self, given: Any, y: Any, sample_time: float | None
+        self, recordings: Any, y: Any, sample_time: float | None
     ) -> tuple[list[Recording], list[str]]:
         """Return recordings with the channels of the model, and its outputs."""
         block = self.fitted
         inputs, outputs = ([c.name for c in side] for side in (block.inputs, block.outputs))
-        every = recorded(given, inputs, y, outputs, sample_time, type(self).__name__)
-        usual = self.sample_time_
-        every = [timed(one, usual) if one.sample_time is None else one for one in every]
-        return every, outputs
+        runs = recorded(recordings, inputs, y, outputs, sample_time, type(self).__name__)
+        default_time = self.sample_time_
+        runs = [timed(run, default_time) if run.sample_time is None else run for run in runs]
+        return runs, outputs
 
     def measured(self, recordings: Recording | Sequence[Recording]) -> Outputs:
         """Return the measured outputs, as `predict` returns those of the model.
 
         They are the ``y`` for scorers of scikit-learn, as ``"neg_mean_absolute_error"``, on recordings.
         """
-        every = listed(recordings)
-        outputs = self._outputs(every)
-        return Outputs(tuple(squeezed(one.matrix(outputs)) for one in every))
+        runs = listed(recordings)
+        outputs = self._outputs(runs)
+        return Outputs(tuple(squeezed(run.matrix(outputs)) for run in runs))
 
     def _outputs(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
         """Return the channels of the outputs: as named, or found."""
@@ -573,9 +582,9 @@ class Estimator(ABC):
     ) -> float:
         """Return R² of `predict` over all recordings, or arrays as of `fit`, averaged over outputs."""
         require_outputs(recordings, y, type(self).__name__)
-        every, outputs = self._of_model(recordings, y, sample_time)
-        predicted = np.concatenate(self.predict(every))
-        measured = np.concatenate([recording.matrix(outputs) for recording in every])
+        runs, outputs = self._of_model(recordings, y, sample_time)
+        predicted = np.concatenate(self.predict(runs))
+        measured = np.concatenate([recording.matrix(outputs) for recording in runs])
         residual = measured - predicted.reshape(measured.shape)
         around = measured - measured.mean(axis=0)
         unexplained = (residual**2).sum(axis=0) / (around**2).sum(axis=0)
@@ -592,20 +601,22 @@ class Estimator(ABC):
         """
         if not hasattr(self, "model_"):
             # whoever expects the class of scikit-learn has imported it
-            known = sys.modules.get("sklearn.exceptions")
-            kind = AttributeError if known is None else known.NotFittedError
+            sklearn_errors = sys.modules.get("sklearn.exceptions")
+            kind = AttributeError if sklearn_errors is None else sklearn_errors.NotFittedError
             raise kind(f"{type(self).__name__} is not fitted yet: call fit first")
         block: Block = self.model_
         return block
 
     def _diagnose(
-        self, runs: FreeRuns, data: TrainingData, tracker: Tracker, started: float
+        self, runs: FreeRuns, data: TrainingData, tracker: Tracker, begin: float
     ) -> Diagnostics:
         block, at_bounds = runs.block, self.at_bounds(runs.block, data)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ModelWarning)
             by_output, from_rest = runs.errors, runs.from_rest.errors
-        notes = dict.fromkeys([*tracker.notes, *sorted({str(one.message) for one in caught})])
+        notes = dict.fromkeys(
+            [*tracker.notes, *sorted({str(warning.message) for warning in caught})]
+        )
         return Diagnostics(
             rmse=float(np.mean(by_output)),
             rmse_by_output=by_output,
@@ -613,7 +624,7 @@ class Estimator(ABC):
             n_samples=runs.residual.size // len(runs.names),
             n_free=block.n_parameters - len(self.fixed(block)) + self.n_further,
             n_evaluations=tracker.evaluations,
-            seconds=time.perf_counter() - started,
+            seconds=time.perf_counter() - begin,
             at_bounds=at_bounds,
             notes=tuple(notes),
             # of the estimator as it is now: it may be changed or fitted again
@@ -627,10 +638,10 @@ class Estimator(ABC):
         """
         if not self.errors_known:
             return ()
-        found = self.diagnostics_
-        unknown = np.flatnonzero(np.isnan(found.standard_errors)).tolist()
-        excluded = {*found.at_bounds, *self.fixed(self.fitted)}
-        return tuple(place for place in unknown if place not in excluded)
+        diagnostics = self.diagnostics_
+        unknown = np.flatnonzero(np.isnan(diagnostics.standard_errors)).tolist()
+        excluded = {*diagnostics.at_bounds, *self.fixed(self.fitted)}
+        return tuple(index for index in unknown if index not in excluded)
 
     def free_runs(
         self, block: Block, recordings: Sequence[Recording], rows: Sequence[Mask] | None = None
@@ -646,7 +657,7 @@ class Estimator(ABC):
         """
         block, ridge = runs.block, self.get_params().get("ridge", 0.0)
         fixed = {*self.diagnostics_.at_bounds, *self.fixed(block)}
-        free = [place for place in range(block.n_parameters) if place not in fixed]
+        free = [index for index in range(block.n_parameters) if index not in fixed]
         return outputs_without_parts(runs, free, ridge, parts)
 
     def held_out(
@@ -672,11 +683,11 @@ class Estimator(ABC):
         without = self.left_out(runs, [runs.scored(part).repeat(m) for part in parts])
         if without is None:
             return None
-        found = [table.copy() for table in runs.modelled]
+        result = [table.copy() for table in runs.modelled]
         for part, tables in zip(parts, without, strict=True):
-            for outputs, table, rows in zip(found, tables, part, strict=True):
+            for outputs, table, rows in zip(result, tables, part, strict=True):
                 outputs[rows] = table[rows]
-        return found
+        return result
 
     def uncertainty(self, runs: FreeRuns, at_bounds: Sequence[int]) -> tuple[float, Array]:
         """Return the condition of the free parameters, and the covariance of all; see `Diagnostics`."""
@@ -704,15 +715,18 @@ class SearchEstimator(Estimator):
     initial: Start = "first_sample"
 
 
-def refuse_useless(found: Diagnostics, data: TrainingData) -> None:
+def refuse_useless(diagnostics: Diagnostics, data: TrainingData) -> None:
     """Raise a `ModelError` if free runs on training data explain no more than the mean of the outputs.
 
     Of several outputs the mean of their unexplained shares counts, as in `Estimator.score`.
     """
-    errors, spread = np.array(found.rmse_by_output), data.spread
+    errors, spread = np.array(diagnostics.rmse_by_output), data.spread
     if not np.mean((errors / spread) ** 2) < 1.0:  # also where an error is not a number
-        each = zip(data.outputs, errors, spread, strict=True)
-        figures = (f"{c.name} {error:.4g} {c.unit}, of its mean {of:.4g}" for c, error, of in each)
+        outputs = zip(data.outputs, errors, spread, strict=True)
+        figures = (
+            f"{c.name} {error:.4g} {c.unit}, of its mean {spread_of:.4g}"
+            for c, error, spread_of in outputs
+        )
         raise ModelError(
             f"the model found explains no more than the mean: RMSE on its data {'; '.join(figures)}",
             remedy="change its settings, or fit another model: `compare()` ranks those that apply",
@@ -721,22 +735,22 @@ def refuse_useless(found: Diagnostics, data: TrainingData) -> None:
 
 def preceded(recordings: Sequence[Recording], runs: FreeRuns) -> tuple[list[Recording], list[Mask]]:
     """Return recordings with the pasts of their runs before them, and the samples that count."""
-    names, found, counted = [channel.name for channel in runs.block.inputs], [], []
+    names, result, scored = [channel.name for channel in runs.block.inputs], [], []
     for recording, past, rows in zip(recordings, runs.pasts, runs.rows, strict=True):
         columns = dict(zip(names, past.T, strict=True))
         channels = {
             name: np.concatenate([columns.get(name, np.full(len(past), samples[0])), samples])
             for name, samples in recording.with_derived(names).channels.items()
         }
-        begun = recording.start_time - len(past) * recording.step
-        found.append(replace(recording, channels=channels, start_time=begun))
-        counted.append(np.concatenate([np.zeros(len(past), dtype=bool), rows]))
-    return found, counted
+        begin = recording.start_time - len(past) * recording.step
+        result.append(replace(recording, channels=channels, start_time=begin))
+        scored.append(np.concatenate([np.zeros(len(past), dtype=bool), rows]))
+    return result, scored
 
 
 def resting(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:
     """Return why inputs cannot be identified, if all rest in every recording; else None."""
-    known = [r[name] for r in recordings for name in inputs if name in r]
-    if not known or any(np.ptp(values) > 0 for values in known):
+    samples = [r[name] for r in recordings for name in inputs if name in r]
+    if not samples or any(np.ptp(values) > 0 for values in samples):
         return None
     return f"{' and '.join(inputs)} rests in every recording"

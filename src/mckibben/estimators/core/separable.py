@@ -56,7 +56,7 @@ class SeparableEstimator(Estimator):
         Memory before the first sample of every recording: what its first output determines, else as if
         the input had only risen; or as if nothing had ever happened.
     nonnegative : bool
-        Whether each linear parameter is held at or above what `least` returns: by default 0, the first a
+        Whether each linear parameter is at or above its `lower_bounds`: by default 0, the first a
         little above it. Of most models that gives an inverse.
     n_starts : int
         Starting points tried for the non-linear parameters.
@@ -123,9 +123,9 @@ class SeparableEstimator(Estimator):
 
     def free_regressors(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
         """Return the regressors of linear parameters away from bounds, the offset's first."""
-        bounded = self.solves_nonnegative
-        free = linear > AT_BOUND * self.least(matrix, data) if bounded else linear != 0
-        offset = [np.ones(len(matrix))] if self.solves_offset else []
+        lower = AT_BOUND * self.lower_bounds(matrix, data) if self.bounds_linear else None
+        free = linear != 0 if lower is None else linear > lower
+        offset = [np.ones(len(matrix))] if self.fits_offset else []
         return np.column_stack([*offset, matrix[:, free]])
 
     def choices(self, data: TrainingData) -> list[Choice]:
@@ -196,21 +196,21 @@ class SeparableEstimator(Estimator):
 
     def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
         """Return the least-squares linear parameters and offset."""
-        least = self.least(matrix, data) if self.solves_nonnegative else None
-        return solve_bounded(matrix, data.target, least, with_offset=self.solves_offset)
+        lower = self.lower_bounds(matrix, data) if self.bounds_linear else None
+        return solve_bounded(matrix, data.target, lower, with_offset=self.fits_offset)
 
     @property
-    def solves_offset(self) -> bool:
+    def fits_offset(self) -> bool:
         """Whether an offset is fitted; otherwise it is 0."""
         return True
 
     @property
-    def solves_nonnegative(self) -> bool:
-        """Whether the linear parameters must be non-negative."""
+    def bounds_linear(self) -> bool:
+        """Whether the linear parameters have the lower bounds `lower_bounds`."""
         return self.nonnegative
 
-    def least(self, matrix: Array, data: TrainingData) -> Array:
-        """Return lower bounds of the linear parameters, if they must be non-negative.
+    def lower_bounds(self, matrix: Array, data: TrainingData) -> Array:
+        """Return the lower bounds of the linear parameters, where `bounds_linear`.
 
         The first is kept off zero: it belongs to the operator without dead zone, and without it there
         is no inverse.

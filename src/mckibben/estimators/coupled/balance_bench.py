@@ -11,7 +11,7 @@ import numpy as np
 from mckibben.arrays import Array, Mask
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Affine
-from mckibben.channels import LOADS
+from mckibben.channels import LOAD_UNITS
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_problem import held
@@ -63,7 +63,7 @@ def with_loads(
         counting = [mask & own for mask, own in zip(rows, counting, strict=True)]
     for name in scheduling:
         units = {one.units[name] for one in recordings if name in one}
-        if not units or not units <= {*LOADS}:
+        if not units or not units <= {*LOAD_UNITS}:
             continue
         pairs = zip(recordings, counting, strict=True)
         known = np.concatenate([one[name][own] for one, own in pairs if name in one])
@@ -82,7 +82,7 @@ def with_loads(
 
 def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:
     """Return data without runs that have neither motion nor measured force, and their names."""
-    loaded = any(channel.unit in LOADS for channel in data.scheduled)
+    loaded = any(channel.unit in LOAD_UNITS for channel in data.scheduled)
     useful = [(loaded and not run.unmeasured) or not held(data, run) for run in data.runs]
     if not any(useful):
         return data, []
@@ -101,7 +101,7 @@ def in_one_order(data: TrainingData) -> TrainingData:
 
 def only_forces(data: TrainingData) -> bool:
     """Return whether the one coordinate is held in every run, so that only the load is informative."""
-    loads = sum(channel.unit in LOADS for channel in data.scheduled)
+    loads = sum(channel.unit in LOAD_UNITS for channel in data.scheduled)
     return loads == len(data.outputs) == 1 and all(held(data, run) for run in data.runs)
 
 
@@ -120,7 +120,7 @@ def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
         whole = np.concatenate(columns)
         least = max(LEAST_VARIED * float(np.abs(whole).max()), NOISE * float(np.ptp(whole)))
         (kept if np.ptp(means) > least else constant).append(channel)
-    kept.sort(key=lambda channel: channel.unit in LOADS)
+    kept.sort(key=lambda channel: channel.unit in LOAD_UNITS)
     return scheduled_by(data, kept), [channel.name for channel in constant]
 
 
@@ -275,7 +275,7 @@ def set_up(
     of_force = of_force or only_forces(data)
     sensors, ways = sensors_of(data, np.eye(1) if of_force else directions(data))
     data = of_coordinates(data, sensors)
-    loads = [channel.unit in LOADS for channel in data.scheduled]
+    loads = [channel.unit in LOAD_UNITS for channel in data.scheduled]
     n_x = loads.index(True) if any(loads) else len(loads)
     x = data.stacked("scheduled")
     y, span = data.stacked("outputs"), data.travel

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import InstanceOf
 
 from mckibben.arrays import Array, Mask
-from mckibben.channels import LOADS
+from mckibben.channels import LOAD_UNITS
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_structure import Bench, Structure
@@ -98,7 +98,7 @@ def check_single_muscle(data: TrainingData) -> None:
     ModelError
         If there are several muscles, or scheduling inputs other than loads.
     """
-    if len(data.inputs) != 1 or any(channel.unit not in LOADS for channel in data.scheduled):
+    if len(data.inputs) != 1 or any(channel.unit not in LOAD_UNITS for channel in data.scheduled):
         raise ModelError(
             "it is for one muscle with no scheduling input but its load",
             parameter="prior",

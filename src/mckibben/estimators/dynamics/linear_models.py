@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from annotated_types import Interval, Len
 
-from mckibben.arrays import Mask
+from mckibben.arrays import Array, Mask
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Parallel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
@@ -35,6 +35,27 @@ from mckibben.recording import Recording, listed
 
 Order = Annotated[int, Interval(ge=0, le=20)]
 Lag = Annotated[int, Interval(ge=0, le=120)]
+
+
+class _Scale(NamedTuple):
+    """Means and spans of training data, by which inputs and output are relative."""
+
+    inputs: Array
+    output: float
+    input_spans: Array
+    output_span: float
+
+    @classmethod
+    def of(cls, data: TrainingData) -> Self:
+        """Return the scale of data of one output."""
+        driven = data.stacked("driven")
+        spans = np.ptp(driven, axis=0), float(np.ptp(data.target))
+        return cls(np.mean(driven, axis=0), float(np.mean(data.target)), *spans)
+
+    def relative(self, run: Run) -> Run:
+        """Return a run with inputs and output less their means, by their spans."""
+        driven = (run.driven - self.inputs) / self.input_spans
+        return replace(run, driven=driven, outputs=(run.outputs - self.output) / self.output_span)
 
 
 class PredictionErrorEstimator(Estimator):
@@ -126,7 +147,7 @@ class PredictionErrorEstimator(Estimator):
         if not channels.inputs or not channels.outputs:
             return "it needs an input and an output"
         for name in () if channels.single else channels.further:
-            if absent := [each.name for each in recordings if name not in each]:
+            if absent := [run.name for run in recordings if name not in run]:
                 return f"it needs the channel {name!r}, which {absent[0]} lacks"
         return resting(recordings, channels.inputs)
 
@@ -146,106 +167,113 @@ class PredictionErrorEstimator(Estimator):
         """Return the training data; with several inputs, of all driving channels."""
         if self.single:
             return super().data(recordings, rows)
-        every = listed(recordings)
-        found = self.resolved(every, self.input, self.output, self.scheduling)
-        driving, given, further = found.inputs, found.outputs, found.further
-        moving = [name for name in further if any(name in r and np.ptp(r[name]) > 0 for r in every)]
-        whole = replace(self, input=(*driving, *moving), output=tuple(given))
-        return super(PredictionErrorEstimator, whole).data(recordings, rows)
+        runs = listed(recordings)
+        channels = self.resolved(runs, self.input, self.output, self.scheduling)
+        driving, outputs, further = channels.inputs, channels.outputs, channels.further
+        moving = [name for name in further if any(name in r and np.ptp(r[name]) > 0 for r in runs)]
+        estimator = replace(self, input=(*driving, *moving), output=tuple(outputs))
+        return super(PredictionErrorEstimator, estimator).data(recordings, rows)
 
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the identified block: for several channels, the sum over inputs, per output."""
         parts: list[Block] = []
         share = 1.0 / len(data.outputs)
-        for place, output in enumerate(data.outputs):
-            runs = tuple(replace(run, outputs=run.outputs[:, [place]]) for run in data.runs)
-            own = tracker.part(place * share, (place + 1) * share)
-            parts += self._of_output(replace(data, runs=runs, outputs=(output,)), own)
+        for k, output in enumerate(data.outputs):
+            runs = tuple(replace(run, outputs=run.outputs[:, [k]]) for run in data.runs)
+            own_tracker = tracker.part(k * share, (k + 1) * share)
+            parts += self._identify_output(replace(data, runs=runs, outputs=(output,)), own_tracker)
         return parts[0] if self.single else Parallel(tuple(parts))
 
-    def _of_output(self, data: TrainingData, tracker: Tracker) -> tuple[TransferFunction, ...]:
-        """Return the transfer functions from every input to the output."""
-        step = data.timed()
+    def _identify_output(
+        self, data: TrainingData, tracker: Tracker
+    ) -> tuple[TransferFunction, ...]:
+        """Return the transfer functions from every input to the one output of the data."""
         orders = replace(self.orders, inputs=len(data.inputs))
-        start: Beginning = "estimated" if orders.a or orders.c or orders.d else self.initial
         if data.target.size <= orders.size + orders.poles * len(data.runs):
             raise DataError(
                 f"{data.target.size} samples are too few for {orders.size} parameters",
                 remedy="give longer recordings, or lower orders",
             )
-        centre = np.mean(data.stacked("driven"), axis=0)
-        middle = float(np.mean(data.target))
-        given, wanted = np.ptp(data.stacked("driven"), axis=0), float(np.ptp(data.target))
-
-        def relative(run: Run) -> Run:
-            driven, outputs = (run.driven - centre) / given, (run.outputs - middle) / wanted
-            return replace(run, driven=driven, outputs=outputs)
-
-        runs = list(map(relative, data.runs))
-        known = list(map(relative, data.stretches(orders.size).runs))
-        if orders.a or orders.c or orders.d:
-            if not known:
-                raise DataError(
-                    f"no {orders.size + 1} samples in a row count, which {orders.size} parameters take",
-                    remedy="give longer recordings, or lower orders",
-                )
-            runs = known  # a free run needs no outputs, so it alone goes on where they do not count
-        plant = replace(orders, c=0, d=0)
-        if plant.f:
-            starts = starting_points(runs, known, plant, self.n_starts, self.seed)
-            theta = minimise(runs, plant, starts, tracker, start)
-        else:
-            theta = arx(runs, plant)
-        if plant != orders:
-            own = tracker.part(0.5, 1.0)
-            theta = minimise(runs, orders, [with_noise(theta, orders, runs)], own, start)
-            tracker.best, tracker.best_cost = own.best, own.best_cost
-        elif not plant.f:
-            tracker.update(theta, evaluate(theta, orders, runs, start)[2])
-        deviation = wanted * evaluate(theta, orders, runs, start)[2]
-        theta[: orders.zeros] *= np.repeat(wanted / given, orders.b)
-        theta[-1] *= wanted
-        p = Polynomials.of(theta, orders)
-        noise = (vector(p.c), vector(p.poles[0] if orders.a else p.d), deviation)
-        constant = p.constant / (1.0 + float(p.poles.sum())) if orders.a else p.constant
-        found = []
-        for place, (channel, b) in enumerate(zip(data.inputs, p.b, strict=True)):
-            poles = p.poles[min(place, len(p.poles) - 1)]
-            numerator = np.zeros(1 + max(orders.input_lags))
-            numerator[[*orders.input_lags]] = b
-            block = TransferFunction(
-                vector(numerator),
-                vector(poles),
-                step,
-                float(centre[place]),
-                0.0 if place else middle + constant,
-                *(() if place else noise),
-                initial=self.initial,
-                input=channel,
-                output=data.outputs[0],
-            )
-            ends = float(data.lowest[place]), float(data.highest[place])
-            block = replace(block, input_range=ends)
+        scale = _Scale.of(data)
+        theta, deviation = self._minimise(data, orders, scale, tracker)
+        blocks = self._transfer_functions(theta, orders, scale, deviation, data)
+        for block in blocks:
             if not block.is_stable:
                 radius = float(np.abs(block.poles).max())
                 raise ModelError(
                     f"the model found is unstable (a pole at |z| = {radius:.4g})",
                     remedy="use other orders, or output-error (oe), which is constrained to be stable",
                 )
-            found.append(block)
-        return tuple(found)
+        return blocks
+
+    def _minimise(
+        self, data: TrainingData, orders: Orders, scale: _Scale, tracker: Tracker
+    ) -> tuple[Array, float]:
+        """Return the parameters theta of relative data, and the deviation of their errors."""
+        start: Beginning = "estimated" if orders.a or orders.c or orders.d else self.initial
+        runs = list(map(scale.relative, data.runs))
+        stretches = list(map(scale.relative, data.stretches(orders.size).runs))
+        if orders.a or orders.c or orders.d:
+            if not stretches:
+                raise DataError(
+                    f"no {orders.size + 1} samples in a row count, which {orders.size} parameters take",
+                    remedy="give longer recordings, or lower orders",
+                )
+            runs = stretches  # only a free run goes on where outputs do not count
+        plant = replace(orders, c=0, d=0)
+        if plant.f:
+            starts = starting_points(runs, stretches, plant, self.n_starts, self.seed)
+            theta = minimise(runs, plant, starts, tracker, start)
+        else:
+            theta = arx(runs, plant)
+        if plant != orders:
+            noise_tracker = tracker.part(0.5, 1.0)
+            theta = minimise(runs, orders, [with_noise(theta, orders, runs)], noise_tracker, start)
+            tracker.best, tracker.best_cost = noise_tracker.best, noise_tracker.best_cost
+        elif not plant.f:
+            tracker.update(theta, evaluate(theta, orders, runs, start)[2])
+        return theta, evaluate(theta, orders, runs, start)[2]
+
+    def _transfer_functions(
+        self, theta: Array, orders: Orders, scale: _Scale, deviation: float, data: TrainingData
+    ) -> tuple[TransferFunction, ...]:
+        """Return the blocks of relative parameters; the first has the offset and the noise."""
+        theta[: orders.zeros] *= np.repeat(scale.output_span / scale.input_spans, orders.b)
+        theta[-1] *= scale.output_span
+        p = Polynomials.of(theta, orders)
+        noise_poles = vector(p.poles[0] if orders.a else p.d)
+        noise = (vector(p.c), noise_poles, scale.output_span * deviation)
+        constant = p.constant / (1.0 + float(p.poles.sum())) if orders.a else p.constant
+        blocks = []
+        for k, (channel, b) in enumerate(zip(data.inputs, p.b, strict=True)):
+            numerator = np.zeros(1 + max(orders.input_lags))
+            numerator[[*orders.input_lags]] = b
+            block = TransferFunction(
+                vector(numerator),
+                vector(p.poles[min(k, len(p.poles) - 1)]),
+                data.timed(),
+                float(scale.inputs[k]),
+                0.0 if k else scale.output + constant,
+                *(() if k else noise),
+                initial=self.initial,
+                input=channel,
+                output=data.outputs[0],
+            )
+            ends = float(data.lowest[k]), float(data.highest[k])
+            blocks.append(replace(block, input_range=ends))
+        return tuple(blocks)
 
     def fixed(self, block: Block) -> tuple[int, ...]:
         """Return the indices of input offsets, skipped lags, and parameters shared by inputs."""
-        first: dict[str, Parametrised] = {}
+        first_of_output: dict[str, Parametrised] = {}
         fixed = []
-        for place, (part, name, index) in enumerate(block.numbers()):
+        for k, (part, name, at) in enumerate(block.numbers()):
             assert isinstance(part, TransferFunction)
-            again = first.setdefault(part.output.name, part) is not part
-            common = name == "output_offset" or (self.shared_poles and name == "denominator")
-            left_out = name == "numerator" and index[0] not in self.orders.input_lags
-            if name == "input_offset" or left_out or (again and common):
-                fixed.append(place)
+            is_repeated = first_of_output.setdefault(part.output.name, part) is not part
+            is_shared = name == "output_offset" or (self.shared_poles and name == "denominator")
+            is_skipped = name == "numerator" and at[0] not in self.orders.input_lags
+            if name == "input_offset" or is_skipped or (is_repeated and is_shared):
+                fixed.append(k)
         return tuple(fixed)
 
 

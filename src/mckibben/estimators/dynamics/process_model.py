@@ -44,7 +44,7 @@ class ProcessModelEstimator(SeparableEstimator):
     effort = 0.3
     rises = False
     searches_condensed = False
-    solves_offset = False  # it is one of the responses
+    fits_offset = False  # it is one of the responses
     fixed_fields = ("process-model.input_offset",)  # redundant with the output's
 
     structure: Structure = "P1"

@@ -114,7 +114,7 @@ class ChouHannafordEstimator(SeparableEstimator):
         shortest = data.input_range[0]
         return np.column_stack([pressure * (length**2 - shortest**2), pressure * length**2])
 
-    def least(self, matrix: Array, data: TrainingData) -> Array:
+    def lower_bounds(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of the first: without it there would be no braid."""
         reach = float(np.ptp(matrix[:, 0])) or 1.0
         return np.array([1e-3 * data.output_span / reach, 0.0])

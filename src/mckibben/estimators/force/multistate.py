@@ -104,7 +104,7 @@ class MultistateEstimator(SeparableEstimator):
     input_settings = ("pressure",)
     rises = False
     searches_condensed = False
-    solves_nonnegative = True  # stiffnesses have lower bounds
+    bounds_linear = True  # stiffnesses have lower bounds
     # where elements begin to slip makes corners in the cost, which take many short steps
     search_evaluations = 20
     polish_evaluations = 20
@@ -220,11 +220,11 @@ class MultistateEstimator(SeparableEstimator):
         return np.column_stack([forces, force_columns(self.static, run, data)])
 
     @property
-    def solves_offset(self) -> bool:
+    def fits_offset(self) -> bool:
         """Whether there is a constant: that of the static law."""
         return self.static is not None
 
-    def least(self, matrix: Array, data: TrainingData) -> Array:
+    def lower_bounds(self, matrix: Array, data: TrainingData) -> Array:
         """Return the smallest stiffnesses, for which every element has some force."""
         largest = np.maximum(np.abs(matrix).max(axis=0), 1e-300)
         floor = np.asarray(LEAST_SHARE * np.ptp(data.target) / largest)

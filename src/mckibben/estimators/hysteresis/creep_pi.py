@@ -163,7 +163,7 @@ class CreepPIEstimator(SeparableEstimator):
 
         return data.scored(of)
 
-    def least(self, matrix: Array, data: TrainingData) -> Array:
+    def lower_bounds(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every piece, so that the map increases."""
         return np.full(matrix.shape[1], LEAST_PIECE * data.output_span)
 

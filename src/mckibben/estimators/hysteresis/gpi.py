@@ -100,7 +100,7 @@ class GPIEstimator(SeparableEstimator):
     threshold_rule: Literal["envelope", "paper"] = "envelope"
 
     @property
-    def solves_offset(self) -> bool:
+    def fits_offset(self) -> bool:
         """Whether the envelopes' common height is fitted.
 
         Virgin operators are nearest to 0, wherever the envelopes are, so their height is searched.
@@ -112,7 +112,7 @@ class GPIEstimator(SeparableEstimator):
         lower, upper, guesses, envelopes = SHAPES[self.envelope](*data.input_range, self.n_knots)
         largest = float(np.abs(data.target).max())
         most = 1.0 + 2.0 * largest / max(data.output_span, 1e-12)
-        heights = np.empty((1, 0)) if self.solves_offset else most * HEIGHTS
+        heights = np.empty((1, 0)) if self.fits_offset else most * HEIGHTS
         end = 2.0 * most * np.ones(heights.shape[1])
         tried = product(heights, guesses, (0.0, 0.1))
         starts = [np.hstack([shape, gap, height]) for height, shape, gap in tried]
@@ -128,9 +128,9 @@ class GPIEstimator(SeparableEstimator):
         """Return both envelopes, ordered over the whole input range."""
 
         def made() -> tuple[Envelope, Envelope]:
-            gap = theta.size - 2 + self.solves_offset
+            gap = theta.size - 2 + self.fits_offset
             rising, falling = self.shape(data)[3](theta[:gap])
-            height = 0.0 if self.solves_offset else float(theta[-1])
+            height = 0.0 if self.fits_offset else float(theta[-1])
             least, _ = smallest_gap(rising, falling, data.input_range)
             above = height + float(theta[gap]) - least + 1e-9
             return rising.shifted(height), falling.shifted(above)

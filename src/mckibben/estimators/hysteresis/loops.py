@@ -68,7 +68,7 @@ class Loops:
             return np.column_stack([pieces, z])
         return np.column_stack([pieces, slopes * x[:, np.newaxis] - z, z])
 
-    def least(self, size: int, data: TrainingData) -> Array:
+    def lower_bounds(self, size: int, data: TrainingData) -> Array:
         """Return a small lower bound of every piece of the polynomial, and 0 for the loops."""
         floor = np.zeros(size)
         floor[: self.degree] = LEAST_SLOPE * data.output_span
@@ -143,8 +143,8 @@ class BoucWenEstimator(SeparableEstimator):
         """The linear parameters."""
         return Loops(self.degree, self.nonnegative)
 
-    def least(self, matrix: Array, data: TrainingData) -> Array:
-        return self.linear.least(matrix.shape[1], data)
+    def lower_bounds(self, matrix: Array, data: TrainingData) -> Array:
+        return self.linear.lower_bounds(matrix.shape[1], data)
 
     def steepest(self, theta: Array, unit: BoucWen | GeneralizedBoucWen) -> Array:
         """Return the bound of the slope of z by the relative input, shape (1,)."""
@@ -225,8 +225,8 @@ class MaxwellSlipEstimator(SeparableEstimator):
         """The linear parameters."""
         return Loops(self.degree, self.nonnegative)
 
-    def least(self, matrix: Array, data: TrainingData) -> Array:
-        return self.linear.least(matrix.shape[1], data)
+    def lower_bounds(self, matrix: Array, data: TrainingData) -> Array:
+        return self.linear.lower_bounds(matrix.shape[1], data)
 
     def springs(self, theta: Array, data: TrainingData) -> MaxwellSlip:
         """Return the springs, without weights or polynomial."""

@@ -260,12 +260,12 @@ class MPIEstimator(SeparableEstimator):
         moved = (columns - lowest - np.outer(x, highest - lowest)) / (high - low)
         return np.asarray((self.map.slopes(x) @ linear)[:, np.newaxis] * moved)
 
-    def least(self, matrix: Array, data: TrainingData) -> Array:
+    def lower_bounds(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every piece, so that the map increases."""
         return np.full(matrix.shape[1], LEAST_PIECE * data.output_span)
 
     @property
-    def solves_nonnegative(self) -> bool:
+    def bounds_linear(self) -> bool:
         """Whether linear parameters must be non-negative: for an increasing map only."""
         return self.nonnegative and self.output_map == "polynomial"
 

@@ -205,7 +205,7 @@ class EUPIEstimator(SeparableEstimator):
         eupi_matrix(x, theta[0], theta[1], radii, state, operators)
         return np.column_stack([CUBIC.pieces(x / data.input_span), operators])
 
-    def least(self, matrix: Array, data: TrainingData) -> Array:
+    def lower_bounds(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every piece of the cubic, so that it increases."""
         return np.where(np.arange(matrix.shape[1]) < CUBIC.size, 1e-3 * data.output_span, 0.0)
 

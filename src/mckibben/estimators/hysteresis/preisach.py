@@ -61,7 +61,7 @@ class PreisachEstimator(SeparableEstimator):
         alone = np.column_stack([np.eye(n), np.zeros(n)])
         return grid.simulate_many(alone, run.u, initial=self.starting_rule).T
 
-    def least(self, matrix: Array, data: TrainingData) -> Array:
+    def lower_bounds(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every diagonal cell, which the inverse needs."""
         floor = np.zeros(matrix.shape[1])
         diagonal = np.cumsum(np.arange(1, self.n_levels + 1)) - 1

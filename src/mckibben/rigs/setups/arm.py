@@ -35,7 +35,7 @@ class Spread(Section):
     friction: tuple[EachPositive, ...] = parameter("factor on the friction of each")
 
 
-EACH = 3
+N_COORDINATES = 3
 """Coordinates of a section: shortening of its middle, and tilts of its lower disc about two axes."""
 
 
@@ -75,12 +75,12 @@ class Bundle(Section):
     def contractile(self) -> Records:
         """Return its contractile muscles, with levers on its own coordinates, shape (muscles,)."""
         angles, radius = np.radians(self.angle), np.array(self.radius)
-        made = np.concatenate([self._spread(k).record() for k, _ in enumerate(self.radius)])
-        made["levers"][:, 0] = 1.0
-        made["levers"][:, 1] = radius * np.cos(angles)
-        made["levers"][:, 2] = radius * np.sin(angles)
-        made["neighbour"] = self.contact
-        return made
+        muscles = np.concatenate([self._spread(k).record() for k, _ in enumerate(self.radius)])
+        muscles["levers"][:, 0] = 1.0
+        muscles["levers"][:, 1] = radius * np.cos(angles)
+        muscles["levers"][:, 2] = radius * np.sin(angles)
+        muscles["neighbour"] = self.contact
+        return muscles
 
     def _spread(self, k: int) -> Muscle:
         """Return a muscle as it was made by hand."""
@@ -118,30 +118,30 @@ def in_series(bundles: Sequence[Bundle], payload: float) -> tuple[Records, Recor
         Contractile muscles, bundle by bundle, then the extensors.
     """
     n = len(bundles)
-    every = [bundle.contractile() for bundle in bundles]
+    contractile = [bundle.contractile() for bundle in bundles]
     extensors = np.concatenate([bundle.extensor.record() for bundle in bundles])
     extensors["levers"][:, 0] = 1.0
-    first = sum(muscles.size for muscles in every)
-    for i, muscles in enumerate(every):
+    first = sum(muscles.size for muscles in contractile)
+    for i, muscles in enumerate(contractile):
         muscles["beside"] = first + i
-        for some in (muscles, extensors[i : i + 1]):
-            some["levers"] = np.roll(some["levers"], EACH * i, axis=1)
-    made = np.zeros(1, MECHANISM)
-    made["n"] = EACH * n
-    made["tolerance"] = TOLERANCE
+        for records in (muscles, extensors[i : i + 1]):
+            records["levers"] = np.roll(records["levers"], N_COORDINATES * i, axis=1)
+    mechanism = np.zeros(1, MECHANISM)
+    mechanism["n"] = N_COORDINATES * n
+    mechanism["tolerance"] = TOLERANCE
     masses = [bundle.disc_mass for bundle in bundles]
     masses[-1] += payload
-    _weigh(made, masses, [bundle.muscle.length for bundle in bundles])
+    _weigh(mechanism, masses, [bundle.muscle.length for bundle in bundles])
     for i, bundle in enumerate(bundles):
-        tilts = np.arange(EACH * i + 1, EACH * (i + 1))
-        made["stiffness"][0, tilts, tilts] += bundle.bending_stiffness
-        made["stiffening"][0, tilts] = bundle.bending_stiffening
-        made["stiffened_by"][0, tilts] = first + i
-        made["damping"][0, tilts] = bundle.bending_damping
-        made["guide_stiffness"][0, EACH * i] = 1.0
-        made["guide_stiffness"][0, tilts] = bundle.bending_presliding
-        made["guide_limit"][0, tilts] = bundle.bending_friction
-    return np.concatenate([*every, extensors]), made
+        tilts = np.arange(N_COORDINATES * i + 1, N_COORDINATES * (i + 1))
+        mechanism["stiffness"][0, tilts, tilts] += bundle.bending_stiffness
+        mechanism["stiffening"][0, tilts] = bundle.bending_stiffening
+        mechanism["stiffened_by"][0, tilts] = first + i
+        mechanism["damping"][0, tilts] = bundle.bending_damping
+        mechanism["guide_stiffness"][0, N_COORDINATES * i] = 1.0
+        mechanism["guide_stiffness"][0, tilts] = bundle.bending_presliding
+        mechanism["guide_limit"][0, tilts] = bundle.bending_friction
+    return np.concatenate([*contractile, extensors]), mechanism
 
 
 def _weigh(mechanism: Records, masses: Sequence[float], lengths: Sequence[float]) -> None:
@@ -152,21 +152,23 @@ def _weigh(mechanism: Records, masses: Sequence[float], lengths: Sequence[float]
     turns gravity for all that hangs below, and what hangs aside bends what is above.
     """
     n = len(masses)
-    lifting, moving, rising = np.zeros((3, n, n))
+    tilt_stiffness, tilt_inertia, axial_inertia = np.zeros((3, n, n))
     for i, length in enumerate(lengths):
-        carried = sum(masses[i:]) * GRAVITY
-        mechanism["weight"][0, EACH * i] = carried
-        lifting[:i, :i] += carried * length
-        lifting[:i, i] = lifting[i, :i] = carried * length / 2
-        lifting[i, i] = carried * length / 3
-        aside = np.zeros(n)
-        aside[: i + 1] = [lengths[k] / 2 + sum(lengths[k + 1 : i + 1]) for k in range(i + 1)]
-        moving += 1e-3 * masses[i] * np.outer(aside, aside)
-        rising[: i + 1, : i + 1] += 1e-3 * masses[i]
-    along, about = np.diag([1.0, 0.0, 0.0]), np.diag([0.0, 1.0, 1.0])
-    size = EACH * n
-    mechanism["mass"][0, :size, :size] = np.kron(rising, along) + np.kron(moving, about)
-    mechanism["stiffness"][0, :size, :size] = np.kron(lifting, about)
+        weight = sum(masses[i:]) * GRAVITY
+        mechanism["weight"][0, N_COORDINATES * i] = weight
+        tilt_stiffness[:i, :i] += weight * length
+        tilt_stiffness[:i, i] = tilt_stiffness[i, :i] = weight * length / 2
+        tilt_stiffness[i, i] = weight * length / 3
+        levers = np.zeros(n)
+        levers[: i + 1] = [lengths[k] / 2 + sum(lengths[k + 1 : i + 1]) for k in range(i + 1)]
+        tilt_inertia += 1e-3 * masses[i] * np.outer(levers, levers)
+        axial_inertia[: i + 1, : i + 1] += 1e-3 * masses[i]
+    axial, tilts = np.diag([1.0, 0.0, 0.0]), np.diag([0.0, 1.0, 1.0])
+    size = N_COORDINATES * n
+    mechanism["mass"][0, :size, :size] = np.kron(axial_inertia, axial) + np.kron(
+        tilt_inertia, tilts
+    )
+    mechanism["stiffness"][0, :size, :size] = np.kron(tilt_stiffness, tilts)
 
 
 class Hanging(Rig):
@@ -204,16 +206,16 @@ class Hanging(Rig):
         return System(muscles, self.air.record(), mechanism)
 
     def demands(self, inputs: Array) -> Demands:
-        loads = np.zeros((len(inputs), EACH * len(self.sections)))
+        loads = np.zeros((len(inputs), N_COORDINATES * len(self.sections)))
         return Demands(inputs, loads, np.zeros(len(inputs)))
 
     def readings(self, traces: Traces, inputs: Array, zero: Array) -> Mapping[str, Array]:
         """Return pressures, and the shortening along each contractile muscle."""
         del inputs
-        place = traces.place - zero[: traces.place.shape[1]]
+        pose = traces.place - zero[: traces.place.shape[1]]
         channels = dict(zip(self.inputs, traces.pressure.T, strict=True))
-        moved = self.shortened(place).T
-        return channels | dict(zip(self._numbered("displacement"), moved, strict=True))
+        shortening = self.shortened(pose).T
+        return channels | dict(zip(self._numbered("displacement"), shortening, strict=True))
 
     def shortened(self, pose: Array) -> Array:
         """Return the shortening of every contractile muscle at poses.
@@ -234,8 +236,8 @@ class Hanging(Rig):
 
     def known(self) -> Mapping[str, Any]:
         lengths = {section.muscle.length for section in self.sections}
-        one = {"rest_length": lengths.pop()} if len(lengths) == 1 else {}
-        return {**one, "payload_kg": self.payload}
+        rest_length = {"rest_length": lengths.pop()} if len(lengths) == 1 else {}
+        return {**rest_length, "payload_kg": self.payload}
 
     def _numbered(self, name: str) -> tuple[str, ...]:
         """Return the channels of a quantity, one for every contractile muscle."""

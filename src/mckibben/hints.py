@@ -346,7 +346,7 @@ KEYWORDS = {
 }
 """Keyword that might be asked for -> ours."""
 
-INNER = ("face", "drawn")
+INNER = ("face", "drawn", "annotations")
 """Attributes for the package alone."""
 
 ALIKE = 0.78
@@ -392,11 +392,7 @@ def lead_on(package: str) -> None:
     names = vars(sys.modules[package])
 
     def refuse(name: str) -> NoReturn:
-        own = [
-            each
-            for each, what in names.items()
-            if not isinstance(what, ModuleType) and getattr(what, "__module__", "") != __name__
-        ]
+        own = [each for each, what in names.items() if not isinstance(what, ModuleType)]
         raise AttributeError(absent(package, name, own, package), name=name)
 
     names["__getattr__"] = refuse

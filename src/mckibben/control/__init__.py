@@ -1,5 +1,6 @@
 """Controllers, and closed loops on rigs and models."""
 
+from mckibben import hints
 from mckibben.control.controller import BlockController as BlockController
 from mckibben.control.controller import Controller as Controller
 from mckibben.control.controller import DisturbanceObserver as DisturbanceObserver
@@ -19,6 +20,5 @@ from mckibben.control.uncompensated import Before as Before
 from mckibben.control.uncompensated import before as before
 from mckibben.control.uncompensated import slow_cycle as slow_cycle
 from mckibben.control.uncompensated import uncompensated as uncompensated
-from mckibben.hints import lead_on
 
-lead_on(__name__)
+hints.lead_on(__name__)

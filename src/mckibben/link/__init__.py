@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mckibben.hints import lead_on
+from mckibben import hints
 from mckibben.link.client import Device as Device
 from mckibben.link.client import Link as Link
 from mckibben.link.client import LinkError as LinkError
@@ -11,4 +11,4 @@ from mckibben.link.client import Port as Port
 from mckibben.link.client import State as State
 from mckibben.link.client import Statistics as Statistics
 
-lead_on(__name__)
+hints.lead_on(__name__)

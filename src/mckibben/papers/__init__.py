@@ -1,5 +1,5 @@
 """The papers, one folder each: protocol, printed results, and re-run."""
 
-from mckibben.hints import lead_on
+from mckibben import hints
 
-lead_on(__name__)
+hints.lead_on(__name__)

@@ -4,10 +4,10 @@ Every figure is described once, free of any drawing library (`subjects`, `model_
 twice: for the page (`interactive`) and for print (`printed`).
 """
 
-from mckibben.hints import lead_on
+from mckibben import hints
 from mckibben.report.page import write_report
 from mckibben.report.results_folder import StudyFolder, write_leaderboard
 
 __all__ = ["StudyFolder", "write_leaderboard", "write_report"]
 
-lead_on(__name__)
+hints.lead_on(__name__)

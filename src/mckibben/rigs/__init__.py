@@ -1,6 +1,6 @@
 """Virtual rigs: physics, independent of the models fitted to it."""
 
-from mckibben.hints import lead_on
+from mckibben import hints
 from mckibben.rigs.files import describe as describe
 from mckibben.rigs.files import rig_names as rig_names
 from mckibben.rigs.recording import record as record
@@ -9,4 +9,4 @@ from mckibben.rigs.rig import Rig as Rig
 from mckibben.rigs.rig import load_rig as load_rig
 from mckibben.rigs.rig import save_rig as save_rig
 
-lead_on(__name__)
+hints.lead_on(__name__)

@@ -1,6 +1,6 @@
 """Signals: turning points, branches, cycles; cutting, filtering, resampling, thinning; excitations."""
 
-from mckibben.hints import lead_on
+from mckibben import hints
 from mckibben.signals.broadband import chirp as chirp
 from mckibben.signals.broadband import multisine as multisine
 from mckibben.signals.broadband import random_wave as random_wave
@@ -32,4 +32,4 @@ from mckibben.signals.steps import staircase as staircase
 from mckibben.signals.thinning import decimate_minmax as decimate_minmax
 from mckibben.signals.zeroing import zeroed as zeroed
 
-lead_on(__name__)
+hints.lead_on(__name__)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from mckibben.hints import lead_on
+from mckibben import hints
 from mckibben.stream.fixed_rate import Deadlines as Deadlines
 from mckibben.stream.fixed_rate import FixedRate as FixedRate
 from mckibben.stream.stepping import Step as Step
 from mckibben.stream.stepping import run as run
 
-lead_on(__name__)
+hints.lead_on(__name__)

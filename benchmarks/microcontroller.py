@@ -138,7 +138,8 @@ def row(name: str, found: Emulation) -> str:
     counts = [np.median(steps), steps.max(), found.instructions[0]]
     sizes = [found.ram, found.stack, found.flash]
     numbers = " | ".join(
-        f"{round(float(number)):,}".replace(",", " ") for number in [*counts, *sizes]
+        f"{round(float(number)):,}".replace(",", "\N{NO-BREAK SPACE}")
+        for number in [*counts, *sizes]
     )
     return f"| {name} | {numbers} | {found.difference:.1e} |"
 

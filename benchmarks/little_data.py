@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from mckibben.measured.scoring import START, Part, parts_of
+from mckibben.measured.scoring import START_SAMPLES, Part, parts_of
 from mckibben.measured.sets import chosen_in
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
@@ -78,7 +78,7 @@ def part_of(runs: Sequence[Recording], share: float) -> Iterator[Recording]:
         yield from (runs[round((place + 0.5) * len(runs) / some - 0.5)] for place in range(some))
         return
     for run in runs:
-        yield run.slice(0, max(round(share * len(run)), 3 * START))
+        yield run.slice(0, max(round(share * len(run)), 3 * START_SAMPLES))
 
 
 def little(part: Part, share: float) -> Part:

@@ -34,7 +34,7 @@ import pandas as pd
 
 from mckibben import compare
 from mckibben.errors import MckibbenError
-from mckibben.measured.scoring import START, Part, entries, parts_of
+from mckibben.measured.scoring import START_SAMPLES, Part, entries, parts_of
 from mckibben.measured.sets import Set, chosen_in
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
@@ -108,7 +108,7 @@ def data_of(part: Part) -> Data:
         return (u - middle) / spread, (y - offset) / scale
 
     def trial(one: Recording) -> Trial:
-        return Trial(*scaled(one), START)
+        return Trial(*scaled(one), START_SAMPLES)
 
     runs = [scaled(one) for one in train]
     fitted, held = held_back(runs)
@@ -123,7 +123,7 @@ def held_back(runs: Sequence[Run]) -> tuple[list[Run], list[Trial]]:
     if len(runs) >= HELD_BACK:
         last = HELD_BACK - 1
         rest = [run for place, run in enumerate(runs) if place % HELD_BACK != last]
-        return rest, [Trial(u, y, START) for u, y in runs[last::HELD_BACK]]
+        return rest, [Trial(u, y, START_SAMPLES) for u, y in runs[last::HELD_BACK]]
     cuts = [len(u) - len(u) // HELD_BACK for u, _ in runs]
     fitted = [(u[:cut], y[:cut]) for (u, y), cut in zip(runs, cuts, strict=True)]
     return fitted, [Trial(u, y, cut) for (u, y), cut in zip(runs, cuts, strict=True)]

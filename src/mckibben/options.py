@@ -81,7 +81,7 @@ TEST = Option("Recording to test on; repeatable.", "FILE")
 def given_options(
     kind: type[Options],
     options: Options | None,
-    given: Mapping[str, Any],
+    keywords: Mapping[str, Any],
     others: Sequence[str] = (),
 ) -> Options:
     """Return options with some fields given by name; ``others`` are further names for the remedy.
@@ -102,20 +102,22 @@ def given_options(
             "give data first and options by name; arrays are {'pressure': u, 'displacement': y}"
         )
         raise ModelError(problem, parameter="options", remedy=remedy)
-    known = (*base.__dataclass_fields__, *others)
-    given = {name if name in known else RENAMED.get(name, name): one for name, one in given.items()}
-    if strange := [name for name in given if name not in base.__dataclass_fields__]:
-        name = strange[0]
-        hint = nearest(name, known, {k: v for k, v in KEYWORDS.items() if v in known})
-        remedy = f"use `{hint}`" if hint else f"use one of {', '.join(known)}"
-        if "settings" in known and not hint:
-            remedy = f"if a model has it, give `settings[{name}]=VALUE`; or {remedy}"
-        place = kind.__name__.removesuffix("Options").casefold()
-        instead = former([place], f"--{name.replace('_', '-')}")
-        raise ModelError(f"there is no option {name!r}", remedy=instead or remedy)
+    names = (*base.__dataclass_fields__, *others)
+    keywords = {
+        name if name in names else RENAMED.get(name, name): value
+        for name, value in keywords.items()
+    }
+    if unknown := [name for name in keywords if name not in base.__dataclass_fields__]:
+        hint = nearest(unknown[0], names, {k: v for k, v in KEYWORDS.items() if v in names})
+        remedy = f"use `{hint}`" if hint else f"use one of {', '.join(names)}"
+        if "settings" in names and not hint:
+            remedy = f"if a model has it, give `settings[{unknown[0]}]=VALUE`; or {remedy}"
+        operation = kind.__name__.removesuffix("Options").casefold()
+        instead = former([operation], f"--{unknown[0].replace('_', '-')}")
+        raise ModelError(f"there is no option {unknown[0]!r}", remedy=instead or remedy)
     values: dict[str, Any] = {}
     for name, hint in get_type_hints(kind, include_extras=True).items():
-        values[name] = _as_declared(hint, name, given.get(name, getattr(base, name)))
+        values[name] = _as_declared(hint, name, keywords.get(name, getattr(base, name)))
     generator(values.get("seed", 0))  # refuses what is no seed
     return replace(base, **values)
 
@@ -134,17 +136,23 @@ def _as_declared(hint: Any, name: str, value: Any) -> Any:
         value = dict([value]) if is_mapping(kind) else value
     if is_mapping(kind) and isinstance(value, Mapping) and option.parse is not None:
         value = dict(
-            parsed(option, f"{key}={one}", name)
-            if isinstance(one, str) and not _fits(get_args(kind)[1], one)
-            else (key, one)
-            for key, one in value.items()
+            parsed(option, f"{key}={entry}", name)
+            if isinstance(entry, str) and not _fits(get_args(kind)[1], entry)
+            else (key, entry)
+            for key, entry in value.items()
         )
     if isinstance(value, str) and kind in (Names, Sequence[str]) and option.parse is None:
         value = (value,)
     if not _fits(kind, value):
-        known = [one for part in (kind, *get_args(kind)) for one in choices(part)]
-        wanted = str(kind).replace("collections.abc.", "").replace("typing.", "")
-        remedy = f"use one of {', '.join(map(str, known))}" if known else f"give {wanted}"
+        values_allowed = [
+            entry for kind_part in (kind, *get_args(kind)) for entry in choices(kind_part)
+        ]
+        type_name = str(kind).replace("collections.abc.", "").replace("typing.", "")
+        remedy = (
+            f"use one of {', '.join(map(str, values_allowed))}"
+            if values_allowed
+            else f"give {type_name}"
+        )
         raise ModelError(f"it cannot be {value!r:.60}", parameter=name, remedy=remedy)
     return value
 
@@ -161,17 +169,17 @@ def _fits(kind: Any, value: Any) -> bool:
     if kind is Any:
         return True
     if origin in (Union, UnionType):
-        return any(_fits(one, value) for one in inner)
+        return any(_fits(item, value) for item in inner)
     if origin is Literal:
         return value in inner
     if is_mapping(kind):
-        return isinstance(value, Mapping) and all(_fits(inner[1], one) for one in value.values())
+        return isinstance(value, Mapping) and all(_fits(inner[1], item) for item in value.values())
     if origin is tuple and inner[-1] is not Ellipsis:
-        alike = isinstance(value, Sequence) and not isinstance(value, str)
-        return alike and len(value) == len(inner) and all(map(_fits, inner, value))
+        is_sequence = isinstance(value, Sequence) and not isinstance(value, str)
+        return is_sequence and len(value) == len(inner) and all(map(_fits, inner, value))
     if origin in (Sequence, tuple):
-        alike = isinstance(value, Sequence) and not isinstance(value, str)
-        return alike and all(_fits(inner[0], one) for one in value)
+        is_sequence = isinstance(value, Sequence) and not isinstance(value, str)
+        return is_sequence and all(_fits(inner[0], item) for item in value)
     if isinstance(value, bool) and kind is not bool:
         return False
     return isinstance(value, {float: float | int, Path: str | Path}.get(kind, kind))

@@ -34,7 +34,7 @@ MAKER = "drawn by mckibben"
 
 FIGURES = (".png", ".svg", ".pdf")
 
-LARGEST = 2**28
+LARGEST_INSPECTED = 2**28
 """Largest file that is inspected [bytes]; a larger one counts as the user's."""
 
 
@@ -64,8 +64,8 @@ def claim(path: str | Path, *, inputs: Iterable[str | Path] = (), force: bool = 
     from mckibben.files.own import description
 
     path, inputs = Path(path), list(inputs)
-    for one in filter(None, (path, description(path))):
-        _claim(one, inputs, force, is_ours(one))
+    for output in filter(None, (path, description(path))):
+        _claim(output, inputs, force, is_ours(output))
 
 
 def _claim(path: Path, inputs: Iterable[str | Path], force: bool, ours: bool) -> None:
@@ -87,10 +87,13 @@ def is_ours(path: Path) -> bool:
     """Return whether a file was written by this package and is unchanged; models may be edited."""
     from mckibben.files.own import is_own
 
-    listed = _listed(path.parent)
+    listed = _listed_digests(path.parent)
     if path.name in listed:
-        return _holds(path, listed[path.name])
-    with suppress(DataError, zipfile.BadZipFile), ordinary.opened(path, most=LARGEST) as file:
+        return _has_digest(path, listed[path.name])
+    with (
+        suppress(DataError, zipfile.BadZipFile),
+        ordinary.opened(path, most=LARGEST_INSPECTED) as file,
+    ):
         if path.suffix == ".fmu":
             return "sources/unit_model.h" in zipfile.ZipFile(file).namelist()
         if path.suffix == ".xml":
@@ -129,18 +132,20 @@ def refuse_inputs(path: str | Path, inputs: Iterable[str | Path]) -> None:
     """
     from mckibben.files.sources import read_with
 
-    for given in inputs:
-        for read in read_with(Path(given)):
-            if _same(Path(path), read):
-                problem = f"it is read from {read}, so it is not written to"
+    for path_of_input in inputs:
+        for source in read_with(Path(path_of_input)):
+            if _same(Path(path), source):
+                problem = f"it is read from {source}, so it is not written to"
                 raise DataError(problem, file=path, remedy="give another name")
 
 
-def _same(one: Path, other: Path) -> bool:
+def _same(first: Path, second: Path) -> bool:
     try:
-        return one.samefile(other)
+        return first.samefile(second)
     except (OSError, ValueError):
-        return os.path.normcase(os.path.realpath(one)) == os.path.normcase(os.path.realpath(other))
+        return os.path.normcase(os.path.realpath(first)) == os.path.normcase(
+            os.path.realpath(second)
+        )
 
 
 class Results:
@@ -169,7 +174,7 @@ class Results:
         self.folder, self.new = folder, unfinished(folder)
         self._inputs, self._force, self._kind = list(inputs), force, kind
         self._digests: dict[str, str] = {}
-        _inside(folder, f"{UNFINISHED}/new/{RUN}")
+        _path_inside(folder, f"{UNFINISHED}/new/{RUN}")
         with written(self.new):
             if self.new.exists():  # of a run that was stopped
                 shutil.rmtree(self.new)
@@ -179,13 +184,13 @@ class Results:
 
         Only what is listed in ``run.json``, and was not changed since, is replaced without ``force``.
         """
-        listed, earlier = _listed(self.folder), _noted(self.folder).get("kind", self._kind)
+        listed, earlier = _listed_digests(self.folder), _record(self.folder).get("kind", self._kind)
         if earlier != self._kind and not self._force:  # whose files this run would remove
             problem = f"it has results of {earlier}"
             remedy = "give another folder, or replace all of them with `force`"
             raise DataError(problem, file=self.folder, remedy=remedy)
         for name in (RUN, *names):
-            path = _inside(self.folder, name)
+            path = _path_inside(self.folder, name)
             nearest = next(each for each in path.parents if os.path.lexists(each))
             if not nearest.is_dir():
                 problem = "the output folder has the name of a file"
@@ -193,12 +198,14 @@ class Results:
                     problem, file=nearest, remedy="move it away, or give another folder"
                 )
             if nearest == path.parent:
-                own = bool(listed) if name == RUN else _holds(path, listed.get(name))
-                _claim(path, self._inputs, self._force, own)
+                is_package_file = (
+                    bool(listed) if name == RUN else _has_digest(path, listed.get(name))
+                )
+                _claim(path, self._inputs, self._force, is_package_file)
 
     def write_text(self, name: str, text: str) -> None:
         """Write a file in UTF-8 for the run, by its path in the folder."""
-        path = _inside(self.new, name)
+        path = _path_inside(self.new, name)
         with written(path):
             path.parent.mkdir(parents=True, exist_ok=True)
         write_text(path, text)
@@ -213,8 +220,8 @@ class Results:
             If a file in their places was changed while the run went.
         """
         self.claim(self._digests)
-        for name, old in _listed(self.folder).items():
-            if name not in self._digests and self._removable(name, old):
+        for name, digest_before in _listed_digests(self.folder).items():
+            if name not in self._digests and self._removable(name, digest_before):
                 path = self.folder / name
                 with written(path):
                     path.unlink()
@@ -233,9 +240,9 @@ class Results:
     def _removable(self, name: str, old: str) -> bool:
         """Return whether a listed file is in the folder and unchanged, and is not an input."""
         with suppress(DataError):
-            path = _inside(self.folder, name)
+            path = _path_inside(self.folder, name)
             refuse_inputs(path, self._inputs)
-            return _holds(path, old)
+            return _has_digest(path, old)
         return False
 
 
@@ -272,32 +279,32 @@ def results_in(
     from filelock import FileLock, Timeout
 
     folder = Path(folder)
-    place, new = folder / UNFINISHED, unfinished(folder)
-    lock, existed = place / "lock", folder.exists()
+    folder_of_run, new_files = folder / UNFINISHED, unfinished(folder)
+    lock, existed = folder_of_run / "lock", folder.exists()
     with written(folder):
-        if new.exists() and not lock.exists():
+        if new_files.exists() and not lock.exists():
             problem = "it blocks unfinished results, and was not written by mckibben"
-            raise DataError(problem, file=new, remedy="move it away, or give another folder")
-        place.mkdir(parents=True, exist_ok=True)
-        held = FileLock(lock, timeout=0)
+            raise DataError(problem, file=new_files, remedy="move it away, or give another folder")
+        folder_of_run.mkdir(parents=True, exist_ok=True)
+        file_lock = FileLock(lock, timeout=0)
         try:
-            held.acquire()
+            file_lock.acquire()
         except Timeout:
             problem = "another process is writing its results there"
             remedy = "wait until it has ended, or give another folder"
             raise DataError(problem, file=folder, remedy=remedy) from None
     try:
-        found = Results(folder, inputs=inputs, force=force, kind=kind)
-        found.claim(names)
-        yield found
+        results = Results(folder, inputs=inputs, force=force, kind=kind)
+        results.claim(names)
+        yield results
     finally:
-        _prune(new)
-        if not new.exists():
+        _prune(new_files)
+        if not new_files.exists():
             lock.unlink(missing_ok=True)
-        held.release()
-        for empty in (place, folder) if not existed else (place,):
+        file_lock.release()
+        for folder_to_remove in (folder_of_run, folder) if not existed else (folder_of_run,):
             with suppress(OSError):  # not empty
-                empty.rmdir()
+                folder_to_remove.rmdir()
 
 
 def _prune(folder: Path) -> None:
@@ -307,32 +314,32 @@ def _prune(folder: Path) -> None:
             Path(place).rmdir()
 
 
-def _listed(folder: Path) -> Mapping[str, str]:
+def _listed_digests(folder: Path) -> Mapping[str, str]:
     """Return the digests by file of the last run; empty if missing or damaged."""
-    found = _noted(folder).get("files")
-    return found if isinstance(found, dict) else {}
+    files = _record(folder).get("files")
+    return files if isinstance(files, dict) else {}
 
 
-def _noted(folder: Path) -> Mapping[str, Any]:
+def _record(folder: Path) -> Mapping[str, Any]:
     """Return the record of the last run; empty if missing or damaged."""
     try:
-        found = json.loads(ordinary.read_text(folder / RUN, most=ordinary.DESCRIPTION))
-        return dict(found) if found["format"] == FORMAT else {}
+        record = json.loads(ordinary.read_text(folder / RUN, most=ordinary.DESCRIPTION))
+        return dict(record) if record["format"] == FORMAT else {}
     except (DataError, ValueError, TypeError, KeyError):
         return {}
 
 
-def _holds(path: Path, expected: str | None) -> bool:
+def _has_digest(path: Path, expected: str | None) -> bool:
     """Return whether a file, not a link, has this digest."""
     if path.is_symlink():
         return False
     try:
-        return digest(ordinary.read_bytes(path, most=LARGEST)) == expected
+        return digest(ordinary.read_bytes(path, most=LARGEST_INSPECTED)) == expected
     except DataError:
         return False
 
 
-def _inside(folder: Path, name: str) -> Path:
+def _path_inside(folder: Path, name: str) -> Path:
     """Return a file of a folder; raise an error if links or the name lead outside."""
     path = folder / name
     if not path.parent.resolve().is_relative_to(folder.resolve()):

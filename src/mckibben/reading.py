@@ -26,12 +26,12 @@ DERIVED = "displacement"
 
 def files_of(data: Data) -> list[Path]:
     """Return the files among data."""
-    return [one for one in items(data) if isinstance(one, Path)]
+    return [item for item in items(data) if isinstance(item, Path)]
 
 
 def loaded(data: Data) -> list[InMemory]:
     """Return what of data is in memory."""
-    return [one for one in items(data) if not isinstance(one, Path)]
+    return [item for item in items(data) if not isinstance(item, Path)]
 
 
 def read_files(
@@ -90,22 +90,22 @@ def read_sides(
     for needed in ((), None):  # flaws of columns matter where what is left of others does not do
         try:
             with warnings.catch_warnings(record=True) as caught:
-                found = [read_files(some, needed, reading) for some in data]
+                runs = [read_files(side, needed, reading) for side in data]
             if reading.rest_length is not None:
-                found = [[one.with_derived(named or [DERIVED]) for one in some] for some in found]
-            channels = resolve([one for some in found for one in some])
+                runs = [[run.with_derived(named or [DERIVED]) for run in side] for side in runs]
+            channels = resolve([run for side in runs for run in side])
         except DataError:
             if needed is None:
                 raise
             continue
-        every = [one for runs in found for one in runs]
-        wanted = (*channels.sides, *(named if needed is not None else ()))
-        if all(name in one for one in every for name in wanted):
-            for one in caught:
-                warnings.warn(one.message, one.category, stacklevel=2)
-            return found, channels
+        every_run = [run for side in runs for run in side]
+        needed_channels = (*channels.sides, *(named if needed is not None else ()))
+        if all(name in run for run in every_run for name in needed_channels):
+            for warning in caught:
+                warnings.warn(warning.message, warning.category, stacklevel=2)
+            return runs, channels
     assert channels is not None
-    return [read_files(some, [*channels.sides, *named], reading) for some in data], channels
+    return [read_files(side, [*channels.sides, *named], reading) for side in data], channels
 
 
 def read_loop(
@@ -127,8 +127,8 @@ def read_loop(
     (recordings,), channels = read_sides(
         [data], lambda runs: channels_of(runs, input, output), (input, output, others), reading
     )
-    given, wanted = channels.pair
-    return recordings, moved_by(recordings, given) if input is None else given, wanted
+    driving, driven = channels.pair
+    return recordings, moved_by(recordings, driving) if input is None else driving, driven
 
 
 @dataclass(frozen=True, repr=False)
@@ -161,14 +161,14 @@ class Contents(Result):
 
         rows = [
             {
-                "recording": one.name,
+                "recording": run.name,
                 "channel": name,
-                "unit": one.units[name],
+                "unit": run.units[name],
                 "min": low,
                 "max": high,
             }
-            for one in self.recordings
-            for name, (low, high) in one.ranges.items()
+            for run in self.recordings
+            for name, (low, high) in run.ranges.items()
         ]
         return pd.DataFrame(rows)
 
@@ -178,21 +178,26 @@ class Contents(Result):
 
         recordings = [
             {
-                "name": one.name,
-                "n_samples": one.n_samples,
-                "sample_time": one.sample_time,
-                "start_time": one.start_time,
+                "name": run.name,
+                "n_samples": run.n_samples,
+                "sample_time": run.sample_time,
+                "start_time": run.start_time,
                 "channels": {
-                    name: {"unit": one.units[name], "min": low, "max": high, "lag": late.get(name)}
-                    for name, (low, high) in one.ranges.items()
+                    name: {
+                        "unit": run.units[name],
+                        "min": low,
+                        "max": high,
+                        "lag": lag_of.get(name),
+                    }
+                    for name, (low, high) in run.ranges.items()
                 },
-                "meta": dict(one.meta),
+                "meta": dict(run.meta),
             }
-            for one in self.recordings
-            for late in [{name: one.step * lag.samples for name, lag in lags(one).items()}]
+            for run in self.recordings
+            for lag_of in [{name: run.step * lag.samples for name, lag in lags(run).items()}]
         ]
-        read = {"files": plain(self.columns), "recordings": recordings}
-        return {**read, "data_gaps": plain(self.gaps)}
+        content = {"files": plain(self.columns), "recordings": recordings}
+        return {**content, "data_gaps": plain(self.gaps)}
 
 
 def contents(
@@ -214,13 +219,13 @@ def contents(
     columns: dict[str, list[Seen]] = {}
     if reading.join:
         recordings = read(data, reading, channels=named, informative=False)
-    for one in () if reading.join else items(data):
-        if isinstance(one, Recording) or (isinstance(one, Path) and one.is_dir()):
-            recordings += read(one, reading, channels=named, informative=False)
+    for item in () if reading.join else items(data):
+        if isinstance(item, Recording) or (isinstance(item, Path) and item.is_dir()):
+            recordings += read(item, reading, channels=named, informative=False)
         else:
-            found, seen = look(one, reading, named)
-            recordings += found
-            columns[str(one) if isinstance(one, Path) else found[0].name] = seen
+            runs, columns_of_item = look(item, reading, named)
+            recordings += runs
+            columns[str(item) if isinstance(item, Path) else runs[0].name] = columns_of_item
     gaps: tuple[Gap, ...] | str
     try:
         gaps = data_gaps(recordings, inputs, outputs)

@@ -12,7 +12,7 @@ import pytest
 from mckibben import GPI, DataError, Recording, compare, read, write
 from mckibben.measured.page import page
 from mckibben.measured.running import outcomes
-from mckibben.measured.scoring import KEYS, START, entries
+from mckibben.measured.scoring import KEYS, START_SAMPLES, entries
 from mckibben.measured.sets import parted, sets_in, split_of
 from mckibben.signals import irregular_triangle
 from tests.cli.conftest import Cli
@@ -202,7 +202,7 @@ def test_an_error_is_over_the_scored_rows_of_all_that_is_left_out(
     folder: Path, tmp_path: Path
 ) -> None:
     given = predictions(folder, "in turn", ["run2", "run3"])
-    given.loc[given["row"] < START, "displacement"] = np.nan  # not scored, may be absent
+    given.loc[given["row"] < START_SAMPLES, "displacement"] = np.nan  # not scored, may be absent
     given.loc[given["recording"] == "run3", "displacement"] += 0.3
     ((_, rmse, width),) = scored(folder, tmp_path, given)
     assert rmse == pytest.approx(0.3 / np.sqrt(2))
@@ -211,10 +211,10 @@ def test_an_error_is_over_the_scored_rows_of_all_that_is_left_out(
 
 def test_a_cut_recording_begins_anew_and_is_scored_as_others(folder: Path, tmp_path: Path) -> None:
     given = predictions(folder, "cut", ["run2"], first=900)
-    given.loc[given["row"] == START - 1, "displacement"] += 3.0
-    given.loc[given["row"] == START, "displacement"] += 1.0
+    given.loc[given["row"] == START_SAMPLES - 1, "displacement"] += 3.0
+    given.loc[given["row"] == START_SAMPLES, "displacement"] += 1.0
     ((_, rmse, _),) = scored(folder, tmp_path, given)
-    assert rmse == pytest.approx(1.0 / np.sqrt(600 - START))
+    assert rmse == pytest.approx(1.0 / np.sqrt(600 - START_SAMPLES))
 
 
 def test_the_metrics_are_those_of_the_comparison(folder: Path, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import click
 import pytest
 
 import mckibben
-from mckibben.cli.parameters import chosen_models
+from mckibben.cli.parameters import named_models
 from tests.cli.calls import CALLS, commands, files
 from tests.cli.conftest import Cli
 from tests.golden.commands import answered
@@ -158,6 +158,6 @@ def test_the_package_runs_as_a_module() -> None:
 
 
 def test_models_that_are_named_are_not_replaced_by_the_quick_choice() -> None:
-    assert chosen_models(("pi", "gpi"), quick=True) == ("pi", "gpi")
-    assert chosen_models("all", quick=True) == "quick"
-    assert chosen_models("all", quick=False) == "all"
+    assert named_models(("pi", "gpi"), quick=True) == ("pi", "gpi")
+    assert named_models("all", quick=True) == "quick"
+    assert named_models("all", quick=False) == "all"

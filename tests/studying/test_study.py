@@ -17,7 +17,7 @@ from mckibben.diagnosis.check import Validation
 from mckibben.files import read, write
 from mckibben.rigs import load_rig
 from mckibben.signals import triangle
-from mckibben.studying.study import closed_loops, named, recorded_rig
+from mckibben.studying.study import closed_loops, recorded_rig, rig_title
 from tests.blocks.balances import CROWDED
 from tests.refusals import refused
 
@@ -121,10 +121,10 @@ def test_a_loop_is_closed_on_the_rig_as_it_was_changed(tmp_path: Path) -> None:
     rebuilt = recorded_rig([run, heavy.changed({"start.pressure": 1.0}).run(given)])
     assert rebuilt == heavy.changed({})
     assert rebuilt is not None
-    assert named(rebuilt) == "mas20-hanging (changed: muscle.friction.extending, payload)"
+    assert rig_title(rebuilt) == "mas20-hanging (changed: muscle.friction.extending, payload)"
     plain = recorded_rig([stock.run(given)])
     assert plain is not None
-    assert named(plain) == "mas20-hanging"
+    assert rig_title(plain) == "mas20-hanging"
     assert recorded_rig([given, given]) is None
 
 

@@ -119,7 +119,7 @@ def offered(workspace: Workspace, sides: Channels) -> Offered:
     items = {name: Candidate(name) for name in names}
     reasons = objections(items, [*train, *test], sides)
     reasons |= objections(
-        {need: item for need, item in items.items() if need not in reasons}, fitted, sides
+        {name: item for name, item in items.items() if name not in reasons}, fitted, sides
     )
     remaining = (
         replace(need, models=tuple(model for model in need.models if model not in reasons))

@@ -60,9 +60,9 @@ class Commands(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands, each with what it does."""
-        about = {**_summaries("mckibben.workflow"), **_summaries("mckibben.cli.commands")}
+        summaries = {**_summaries("mckibben.workflow"), **_summaries("mckibben.cli.commands")}
         with formatter.section("Commands"):
-            formatter.write_dl([(name, about[name]) for name in COMMANDS])
+            formatter.write_dl([(name, summaries[name]) for name in COMMANDS])
 
 
 def _summaries(package: str) -> dict[str, str]:
@@ -158,14 +158,14 @@ def _run() -> int:
 def _usage(error: click.UsageError) -> str:
     """Return what is wrong with a command line; of earlier versions, with what to do now."""
     message = error.format_message()
-    if found := re.match(r"No such (?:option|command):? '?([\w-]+)'?\.?", message):
+    if match := re.match(r"No such (?:option|command):? '?([\w-]+)'?\.?", message):
         context, command = error.ctx, list[str]()
         while context is not None and context.parent is not None:
             command.insert(0, context.info_name or "")
             context = context.parent
-        if hint := former(command, found[1]):
+        if hint := former(command, match[1]):
             what = in_terms_of(hint, as_flag, as_command)
-            return f"{found[0]} {what[0].upper()}{what[1:]}."
+            return f"{match[0]} {what[0].upper()}{what[1:]}."
     return message
 
 

@@ -22,41 +22,45 @@ def operation_command(name: str) -> click.Command:
     """Return the command of an operation."""
     operation = OPERATIONS[name]
     parameters = signature(operation.run).parameters
-    taken: dict[str, tuple[Any, Any]] = {}
-    for key, about in operation.arguments.items():
+    declared: dict[str, tuple[Any, Any]] = {}
+    for key, content in operation.arguments.items():
         default = parameters[key].default
-        single: Any = about.kind if isinstance(about, Argument) else Path
-        many = about.several if isinstance(about, Argument) else default == ()
-        taken[key] = (Annotated[tuple[Path, ...] if many else single, about], default)
+        kind: Any = content.kind if isinstance(content, Argument) else Path
+        several = content.several if isinstance(content, Argument) else default == ()
+        declared[key] = (Annotated[tuple[Path, ...] if several else kind, content], default)
     if operation.options is not None:
-        taken["options"] = (operation.options, None)
+        declared["options"] = (operation.options, None)
     if operation.reads:
-        taken["reading"] = (ReadOptions, None)
+        declared["reading"] = (ReadOptions, None)
     if operation.out is not None:
         default = parameters["out"].empty if operation.must_write else None
-        taken["out"] = (Annotated[Path | None, operation.out], default)
-        taken["force"] = (Force, False)
-    taken["as_json"] = (Json, False)
+        declared["out"] = (Annotated[Path | None, operation.out], default)
+        declared["force"] = (Force, False)
+    declared["as_json"] = (Json, False)
     progress = {"progress": True} if "progress" in parameters else {}
 
-    def run(*, as_json: bool, **given: Any) -> int:
+    def run(*, as_json: bool, **values: Any) -> int:
         from mckibben.files.notices import observed
         from mckibben.report import text
 
-        out = given.get("out")
+        out = values.get("out")
         with stoppable(out if operation.writes else None), observed() as read:
-            found = operation.run(**given, **progress)
-            stop_short(found, out)
-        about = {"folder" if operation.writes else "file": str(out)} if out else {}
-        if found is not None:
-            about |= found.to_dict()
-        written = [out / one for one in operation.writes] if out and operation.writes else [out]
-        notes = getattr(found, "notes", ())
-        lines = () if found is None else text.lines_of_result(found)
-        show(about, lambda: lines, as_json, notes, written, read)
-        return NO_RESULT if getattr(found, "failed", False) else 0
+            result = operation.run(**values, **progress)
+            stop_short(result, out)
+        content = {"folder" if operation.writes else "file": str(out)} if out else {}
+        if result is not None:
+            content |= result.to_dict()
+        written = (
+            [out / name_of_file for name_of_file in operation.writes]
+            if out and operation.writes
+            else [out]
+        )
+        notes = getattr(result, "notes", ())
+        lines = () if result is None else text.lines_of_result(result)
+        show(content, lambda: lines, as_json, notes, written, read)
+        return NO_RESULT if getattr(result, "failed", False) else 0
 
-    return command_of(name, _help(operation.run), run, taken)
+    return command_of(name, _help(operation.run), run, declared)
 
 
 def _help(run: Any) -> str:

@@ -35,7 +35,7 @@ def visible(text: str) -> str:
     >>> visible("\x1b[2J")
     '\\u001b[2J'
     """
-    return _UNSEEN.sub(lambda found: f"\\u{ord(found.group()):04x}", text)
+    return _UNSEEN.sub(lambda match: f"\\u{ord(match.group()):04x}", text)
 
 
 def say(text: str = "", *, end: str = "\n", flush: bool = False, error: bool = False) -> None:
@@ -111,7 +111,7 @@ def show(
             note(line.removeprefix("Note: "))
         else:
             say(in_terms_of(line, as_flag, as_command))
-    for one in notes:
-        note(one)
+    for text in notes:
+        note(text)
     if paths := [printable(str(path)) for path in written if path is not None]:
         say(f"Written: {', '.join(paths)}")

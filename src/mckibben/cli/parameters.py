@@ -43,9 +43,9 @@ class Command(click.Command):
         for param in self.params:
             if isinstance(param, click.Option) and param.name:
                 _flags[param.name] = max(param.opts, key=len)
-                typed = [word for word in args if word.partition("=")[0] in param.opts]
-                if len(typed) > 1 and not param.multiple and not param.is_flag:
-                    raise click.UsageError(f"{typed[0]} is given {len(typed)} times.")
+                spelled = [word for word in args if word.partition("=")[0] in param.opts]
+                if len(spelled) > 1 and not param.multiple and not param.is_flag:
+                    raise click.UsageError(f"{spelled[0]} is given {len(spelled)} times.")
         return super().make_context(info_name, args, parent, **more)
 
 
@@ -75,7 +75,7 @@ Force = Annotated[bool, Option("Replace files that mckibben did not write, excep
 Json = Annotated[bool, Option("Print the result as JSON on standard output.", flag="--json")]
 
 
-def chosen_models(models: str | Sequence[str], quick: bool) -> str | Sequence[str]:
+def named_models(models: str | Sequence[str], quick: bool) -> str | Sequence[str]:
     """Return the named models, or the quick choice where none are named."""
     return "quick" if quick and models == "all" else models
 
@@ -92,30 +92,37 @@ def command(run: Callable[..., int | None]) -> click.Command:
     function, or of its module where it has none. What the function returns is the exit code.
     """
     hints = get_type_hints(run, include_extras=True)
-    taken = {name: (hints[name], one.default) for name, one in signature(run).parameters.items()}
+    parameters = {
+        name: (hints[name], parameter.default)
+        for name, parameter in signature(run).parameters.items()
+    }
     text = run.__doc__ or sys.modules[run.__module__].__doc__ or ""
-    return command_of(run.__name__.strip("_").replace("_", "-"), text, run, taken)
+    return command_of(run.__name__.strip("_").replace("_", "-"), text, run, parameters)
 
 
 def command_of(
-    name: str, text: str, run: Callable[..., int | None], taken: Mapping[str, tuple[Any, Any]]
+    name: str, text: str, run: Callable[..., int | None], parameters: Mapping[str, tuple[Any, Any]]
 ) -> click.Command:
     """Return a command that calls a function with parameters of some types and defaults."""
-    groups: dict[str, Any] = {key: hint for key, (hint, _) in taken.items() if is_dataclass(hint)}
-    params: list[click.Parameter] = []
-    for key, (hint, default) in taken.items():
+    groups: dict[str, Any] = {
+        key: hint for key, (hint, _) in parameters.items() if is_dataclass(hint)
+    }
+    declared: list[click.Parameter] = []
+    for key, (hint, default) in parameters.items():
         if key in groups:
-            inner = get_type_hints(hint, include_extras=True)
-            params += [made(f.name, inner[f.name], _default(f)) for f in fields(hint)]
+            hints = get_type_hints(hint, include_extras=True)
+            declared += [
+                parameter_of(item.name, hints[item.name], _default(item)) for item in fields(hint)
+            ]
         else:
-            params.append(made(key, hint, default))
+            declared.append(parameter_of(key, hint, default))
 
-    def call(**given: Any) -> int | None:
+    def call(**values: Any) -> int | None:
         for key, group in groups.items():
-            given[key] = group(**{f.name: given.pop(f.name) for f in fields(group)})
-        return run(**given)
+            values[key] = group(**{item.name: values.pop(item.name) for item in fields(group)})
+        return run(**values)
 
-    return Command(name, callback=call, params=params, help=cleandoc(text))
+    return Command(name, callback=call, params=declared, help=cleandoc(text))
 
 
 def _default(field: Any) -> Any:
@@ -124,38 +131,42 @@ def _default(field: Any) -> Any:
     return MISSING if field.default_factory is MISSING else field.default_factory()
 
 
-def made(name: str, hint: Any, default: Any) -> click.Parameter:
+def parameter_of(name: str, hint: Any, default: Any) -> click.Parameter:
     """Return the argument or flag of one parameter."""
     kind, *extras = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-    about = next((one for one in extras if isinstance(one, Option | Argument)), Option(""))
+    declaration = next(
+        (extra for extra in extras if isinstance(extra, Option | Argument)), Option("")
+    )
     required = default is Parameter.empty or default is MISSING
-    kind, several, width = _unwrapped(kind)
-    if isinstance(about, Argument):
+    kind, repeated, width = _unwrapped(kind)
+    if isinstance(declaration, Argument):
         return click.Argument(
             [name],
             type=_click_type(kind),
-            metavar=about.metavar,
+            metavar=declaration.metavar,
             required=required,
-            nargs=-1 if several else 1,
-            **({} if required or several else {"default": default}),  # None would count as given
+            nargs=-1 if repeated else 1,
+            **({} if required or repeated else {"default": default}),  # None would count as given
         )
-    flags = [name, *_spellings(name, about.flag)]
+    flags = [name, *_spellings(name, declaration.flag)]
     if kind is bool:
-        on = flags[1]
-        both = f"{on}/--no-{on[2:]}" if default is True else on
-        return click.Option([name, both], is_flag=True, default=bool(default), help=about.help)
-    mapping = kind is Mapping
+        flag_on = flags[1]
+        spelling = f"{flag_on}/--no-{flag_on[2:]}" if default is True else flag_on
+        return click.Option(
+            [name, spelling], is_flag=True, default=bool(default), help=declaration.help
+        )
+    is_map = kind is Mapping
     return click.Option(
         flags,
-        type=str if about.parse or mapping else _click_type(kind),
-        metavar=about.metavar or None,
-        help=about.help,
+        type=str if declaration.parse or is_map else _click_type(kind),
+        metavar=declaration.metavar or None,
+        help=declaration.help,
         required=required,
-        multiple=(several and about.parse is None) or mapping,
-        nargs=width if about.parse is None else 1,
-        show_default=_is_plain(default, about),
-        callback=_parsed(name, about, mapping, default),
-        **({"default": default} if _is_plain(default, about) else {}),
+        multiple=(repeated and declaration.parse is None) or is_map,
+        nargs=width if declaration.parse is None else 1,
+        show_default=_is_plain(default, declaration),
+        callback=_parsed(name, declaration, is_map, default),
+        **({"default": default} if _is_plain(default, declaration) else {}),
     )
 
 
@@ -168,13 +179,13 @@ def _spellings(name: str, flag: str) -> list[str]:
 def _unwrapped(kind: Any) -> tuple[Any, bool, int]:
     """Return the type of one value, whether it may be repeated, and its number of words."""
     if get_origin(kind) in (Union, types.UnionType):
-        known = [one for one in get_args(kind) if one not in (type(None), Any)]
-        kind = next((one for one in known if get_origin(one) is Sequence), known[0])
+        members = [item for item in get_args(kind) if item not in (type(None), Any)]
+        kind = next((item for item in members if get_origin(item) is Sequence), members[0])
     if get_origin(kind) in (list, tuple, Sequence):
-        inside = get_args(kind)
-        if get_origin(kind) is tuple and inside[-1] is not Ellipsis:
-            return inside[0], False, len(inside)
-        return inside[0], True, 1
+        items = get_args(kind)
+        if get_origin(kind) is tuple and items[-1] is not Ellipsis:
+            return items[0], False, len(items)
+        return items[0], True, 1
     if is_mapping(kind):
         return Mapping, False, 1
     return kind, False, 1
@@ -188,26 +199,26 @@ def _click_type(kind: Any) -> Any:
     return kind if kind in (int, float, str) else str
 
 
-def _is_plain(default: Any, about: Option) -> bool:
+def _is_plain(default: Any, option: Option) -> bool:
     """Return whether a default is shown as it would be typed."""
-    return isinstance(default, int | float | str | Path) and default != "" and not about.parse
+    return isinstance(default, int | float | str | Path) and default != "" and not option.parse
 
 
-def _parsed(name: str, about: Option, mapping: bool, default: Any) -> Callable[..., Any]:
+def _parsed(name: str, option: Option, mapping: bool, default: Any) -> Callable[..., Any]:
     """Return the parser of an option's words."""
 
-    def value(context: click.Context, parameter: click.Parameter, given: Any) -> Any:
+    def value(context: click.Context, parameter: click.Parameter, words: Any) -> Any:
         del context
-        if given is None or given == ():
+        if words is None or words == ():
             return None if default is Parameter.empty else default
-        if about.parse is None:
-            return given
+        if option.parse is None:
+            return words
         if not mapping:
-            return parsed(about, given, name)
-        found = [parsed(about, text, name) for text in given]
-        if len(both := dict(found)) < len(found):
-            double = next(key for key, _ in found if [k for k, _ in found].count(key) > 1)
-            raise DataError("it is given twice", parameter=name, channel=double, remedy="give one")
-        return both
+            return parsed(option, words, name)
+        pairs = [parsed(option, text, name) for text in words]
+        if len(merged := dict(pairs)) < len(pairs):
+            twice = next(key for key, _ in pairs if [k for k, _ in pairs].count(key) > 1)
+            raise DataError("it is given twice", parameter=name, channel=twice, remedy="give one")
+        return merged
 
     return value

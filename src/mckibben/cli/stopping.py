@@ -17,7 +17,7 @@ from mckibben.cli.output import INTERRUPTED, InterruptionError, say
 from mckibben.outputs import UNFINISHED
 from mckibben.system.workers import leave
 
-PATIENCE = 1.3
+STOPPING_TIME = 1.3
 """How long the work may take to stop before the program ends without it [s]."""
 
 
@@ -35,8 +35,8 @@ def stoppable(folder: Path | None) -> Iterator[None]:
     InterruptionError
         When it was stopped; the text says how to go on.
     """
-    ours = threading.current_thread() is threading.main_thread()
-    if not ours or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    is_main = threading.current_thread() is threading.main_thread()
+    if not is_main or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         yield
         return
     stopped = False
@@ -48,7 +48,7 @@ def stoppable(folder: Path | None) -> Iterator[None]:
             raise KeyboardInterrupt
 
     signal.signal(signal.SIGINT, stop)
-    printed, sys.unraisablehook = sys.unraisablehook, _quiet(sys.unraisablehook)
+    original_hook, sys.unraisablehook = sys.unraisablehook, _quiet(sys.unraisablehook)
     try:
         with _watched():
             try:
@@ -62,7 +62,7 @@ def stoppable(folder: Path | None) -> Iterator[None]:
                     leave(INTERRUPTED)
                 raise InterruptionError(text) from None
     finally:
-        sys.unraisablehook = printed
+        sys.unraisablehook = original_hook
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done, but for printing
 
 
@@ -77,27 +77,27 @@ def _watched() -> Iterator[None]:
             return  # all is done
         with suppress(OSError):
             os.write(2, b"\nStopping ...\n")
-        ready, _, _ = select.select([read_end], [], [], PATIENCE)
+        ready, _, _ = select.select([read_end], [], [], STOPPING_TIME)
         if not ready or os.read(read_end, 1):
             leave(INTERRUPTED)  # a second signal, or it takes too long
 
     threading.Thread(target=watch, daemon=True).start()
-    before = signal.set_wakeup_fd(write_end, warn_on_full_buffer=False)
+    earlier = signal.set_wakeup_fd(write_end, warn_on_full_buffer=False)
     try:
         yield
     finally:
-        signal.set_wakeup_fd(before)
+        signal.set_wakeup_fd(earlier)
         os.close(write_end)
 
 
-def _quiet(printed: Any) -> Any:
+def _quiet(original: Any) -> Any:
     """Suppress messages about interruptions that are lost in compiled code."""
 
-    def lost(what: sys.UnraisableHookArgs) -> None:
-        if what.exc_type is not KeyboardInterrupt:
-            printed(what)
+    def hook(arguments: sys.UnraisableHookArgs) -> None:
+        if arguments.exc_type is not KeyboardInterrupt:
+            original(arguments)
 
-    return lost
+    return hook
 
 
 def how_to_go_on(folder: Path | None) -> str:
@@ -110,7 +110,7 @@ def how_to_go_on(folder: Path | None) -> str:
     return f"Stopped; the same command resumes from {place}."
 
 
-def stop_short(found: Any, folder: Path | None) -> None:
+def stop_short(result: Any, folder: Path | None) -> None:
     """Exit if a comparison, or a study, was stopped before it was done.
 
     Raises
@@ -118,7 +118,7 @@ def stop_short(found: Any, folder: Path | None) -> None:
     InterruptionError
         With how many models are done.
     """
-    board = getattr(found, "leaderboard", found)
+    board = getattr(result, "leaderboard", result)
     if getattr(board, "stopped", False):
         done = len(board.rows)
         text = f"{done} of {done + len(board.pending)} models are done."

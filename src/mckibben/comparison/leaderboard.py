@@ -91,8 +91,8 @@ def recommended(rows: Sequence[R], constant: Ranked | None) -> tuple[R | None, A
     working = [row for row in rows if row.reason is None]
     if not working:
         return None, None
-    judged = [row.skill_least for row in working if row.skill_least is not None]
-    if judged and max(judged) <= 0:
+    skills = [row.skill_least for row in working if row.skill_least is not None]
+    if skills and max(skills) <= 0:
         return None, "validation"
     first = next((row for row in working if (row.skill_least or 0.0) > 0), working[0])
     return (None, "test") if constant and not _beats(first, constant) else (first, None)
@@ -208,9 +208,13 @@ class Row(Numbers):
     @property
     def sound(self) -> bool:
         """Whether there is a model with finite scores."""
-        known = self.reason is None and self.block is not None
-        scores = [one.rmse for one in (self.train, self.test) if one is not None]
-        return known and len(scores) == 2 and bool(np.isfinite(scores).all())
+        has_model = self.reason is None and self.block is not None
+        scores = [
+            scores_of_side.rmse
+            for scores_of_side in (self.train, self.test)
+            if scores_of_side is not None
+        ]
+        return has_model and len(scores) == 2 and bool(np.isfinite(scores).all())
 
     @property
     def test_error(self) -> float:
@@ -294,7 +298,7 @@ def _solves(block: Block) -> bool:
     if isinstance(block, Inverse):
         return block.forward.solved
     parts = [getattr(block, name, None) for name in block.parameters]
-    nested = [part for some in parts for part in (some if isinstance(some, tuple) else (some,))]
+    nested = [part for value in parts for part in (value if isinstance(value, tuple) else (value,))]
     return any(_solves(part) for part in nested if isinstance(part, Block))
 
 
@@ -468,11 +472,11 @@ class Leaderboard(Simulates, Result):
     @property
     def failures(self) -> dict[str, list[str]]:
         """Every distinct reason of failure, with the models."""
-        found: dict[str, list[str]] = {}
+        models_by_reason: dict[str, list[str]] = {}
         for row in self.rows:
             if row.reason is not None or row.test is None or row.train is None:
-                found.setdefault(row.reason or "no scores", []).append(row.model)
-        return found
+                models_by_reason.setdefault(row.reason or "no scores", []).append(row.model)
+        return models_by_reason
 
     @property
     def lowest(self) -> Row | None:
@@ -527,33 +531,35 @@ def doubts_of(
     The others are in the order of the choice, the parts those of the cross-validation.
     """
     sound = [row for row in others if row.sound]
-    found = []
-    beyond = [
+    doubts = []
+    better_on_test = [
         r for r in sound if r.difference_interval is not None and r.difference_interval[1] < 0
     ]
-    if beyond:
-        better = min(beyond, key=lambda row: row.test_error)
-        found.append(Doubt("test", better.model, best.test_error / better.test_error))
+    if better_on_test:
+        better = min(better_on_test, key=lambda row: row.test_error)
+        doubts.append(Doubt("test", better.model, best.test_error / better.test_error))
     errors = np.array(best.validation_by_part)
     if best.validation_rmse and errors.size:
         worst = int(np.argmax(errors))
         ratio = float(errors[worst] / best.validation_rmse)
         if ratio > BAD_PART:
-            found.append(Doubt("part", best.model, ratio, None, tuple(parts[worst])))
+            doubts.append(Doubt("part", best.model, ratio, None, tuple(parts[worst])))
     second = next((row for row in sound if row.validation_rmse is not None), None)
     if second is not None and best.validation_rmse is not None and errors.size >= FEWEST_PARTS:
         ratios = np.log(_counted(second)) - np.log(_counted(best))
         half = half_interval(ratios, LEVEL)
         low, high = ratios.mean() - half, ratios.mean() + half
         if low <= 0:
-            places = int(np.argmax(np.abs(ratios)))
+            part = int(np.argmax(np.abs(ratios)))
             ends = float(np.exp(low)), float(np.exp(high))
             ratio = float(np.exp(ratios.mean()))
-            found.append(Doubt("level", second.model, ratio, ends, tuple(parts[places])))
-    return tuple(found)
+            doubts.append(Doubt("level", second.model, ratio, ends, tuple(parts[part])))
+    return tuple(doubts)
 
 
 def _counted(row: Row) -> Array:
     """Return the errors on all parts as they count in the choice."""
-    least = np.finfo(float).tiny
-    return np.asarray(np.maximum(row.validation_by_part, least) * (CAUTION if row.doubted else 1.0))
+    smallest = np.finfo(float).tiny
+    return np.asarray(
+        np.maximum(row.validation_by_part, smallest) * (CAUTION if row.doubted else 1.0)
+    )

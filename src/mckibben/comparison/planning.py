@@ -21,7 +21,7 @@ from mckibben.signals import made_manageable
 from mckibben.signals.shared_rows import check_shared
 from mckibben.splits import Part, Split, parts_of, spans_of, split_of
 
-LONG = "it takes long, and is fitted where it is named"
+REASON_LONG = "it takes long, and is fitted where it is named"
 """Why a model is left out of all."""
 
 Models = str | Sequence[str] | Mapping[str, str | Estimator]
@@ -68,15 +68,15 @@ class Candidate:
     def estimator_class(self) -> type[Estimator]:
         """Class of the estimator."""
         if isinstance(self.model, str):
-            found: type[Estimator] = registry.load("estimators", self.model)
-            return found
+            kind: type[Estimator] = registry.load("estimators", self.model)
+            return kind
         return type(self.model)
 
     def estimator(self, channels: Channels) -> Estimator:
         """Return the estimator of the channels of a comparison."""
-        named = self.estimator_class.channel_settings(channels)
-        own = {} if isinstance(self.model, str) else self.model.get_params()
-        return self.estimator_class(**own | named | dict(self.settings))
+        channel_settings = self.estimator_class.channel_settings(channels)
+        parameters = {} if isinstance(self.model, str) else self.model.get_params()
+        return self.estimator_class(**parameters | channel_settings | dict(self.settings))
 
 
 @dataclass(frozen=True)
@@ -106,19 +106,21 @@ def plan_of(
     *,
     validation: Recording | Sequence[Recording] = (),
     channels: Channels | None = None,
-    **given: Any,
+    **keywords: Any,
 ) -> Plan:
     """Return the set-up of a comparison; see `compare`."""
-    chosen = given_options(CompareOptions, options, given)
-    data, empty = _data_of(train, test, validation, chosen, channels)
-    every = [*data.recordings, *data.checks]
-    items, left_out = _chosen(chosen.models, every, data.channels, chosen.seed)
-    made = {name: item.estimator_class for name, item in items.items()}
-    made |= {name: declared(name) for name in left_out}
-    own = settings_of_all(made, chosen.settings) if chosen.settings else {}
+    options = given_options(CompareOptions, options, keywords)
+    data, empty = _data_of(train, test, validation, options, channels)
+    recordings = [*data.recordings, *data.checks]
+    items, left_out = _candidates(options.models, recordings, data.channels, options.seed)
+    classes = {name: item.estimator_class for name, item in items.items()}
+    classes |= {name: declared(name) for name in left_out}
+    settings_by_name = settings_of_all(classes, options.settings) if options.settings else {}
     refused = refusals(items, data.split.train, data.channels)
     items = {
-        name: replace(items[name], settings={**items[name].settings, **own.get(name, {})})
+        name: replace(
+            items[name], settings={**items[name].settings, **settings_by_name.get(name, {})}
+        )
         for name in sorted(items, key=lambda name: items[name].estimator_class.effort)
     }
     return Plan(data, items, replace(empty, left_out=left_out, pending=tuple(items)), refused)
@@ -128,37 +130,37 @@ def _data_of(
     train: Recording | Sequence[Recording],
     test: Recording | Sequence[Recording],
     validation: Recording | Sequence[Recording],
-    chosen: CompareOptions,
+    options: CompareOptions,
     channels: Channels | None,
 ) -> tuple[Data, Leaderboard]:
     """Return the data of a comparison, and what a leaderboard states of them."""
     sides = [listed(train), listed(validation), listed(test)]
-    every = [one for side in sides for one in side]
-    notes = reading_notes(every)
+    recordings = [recording for side in sides for recording in side]
+    notes = reading_notes(recordings)
     if not sides[0]:
         raise DataError("there are none to fit", parameter="recordings", remedy="give at least one")
-    channels = channels or channels_of(every, chosen.input, chosen.output, chosen.load)
+    channels = channels or channels_of(recordings, options.input, options.output, options.load)
     unit = _unit_of(sides, channels)
-    sides = [[one.with_derived(channels.sides) for one in side] for side in sides]
+    sides = [[recording.with_derived(channels.sides) for recording in side] for side in sides]
     shared = check_shared(
         dict(zip(("fit", "validate", "test"), sides, strict=True)),
         [*channels.inputs, *channels.scheduling],
         channels.outputs,
-        allow=chosen.allow_shared,
+        allow=options.allow_shared,
     )
     if channels.single:
-        sides, thinned = made_manageable(sides, channels.inputs[0], chosen.most_samples)
+        sides, thinned = made_manageable(sides, channels.inputs[0], options.most_samples)
         notes = (*thinned, *notes)
-    elif chosen.most_samples is not None:
+    elif options.most_samples is not None:
         raise DataError(
             "recordings of several muscles, or under loads, are not thinned",
             remedy="leave `most_samples` out, or resample them to a longer sample time",
         )
-    recordings, checks, tests = sides
-    split = split_of(recordings, tests, channels)
+    fitted, checks, tests = sides
+    split = split_of(fitted, tests, channels)
     parts = parts_of(checks or split.train, channels)
     data = Data(split, parts, channels, tuple(checks))
-    empty = _empty_leaderboard(data, unit, chosen.seed)
+    empty = _empty_leaderboard(data, unit, options.seed)
     return data, replace(empty, notes=notes, shared=shared)
 
 
@@ -191,8 +193,10 @@ def _unit_of(sides: Sequence[Sequence[Recording]], channels: Channels) -> str:
     """Return the outputs' unit; raise an error for recordings that no model can use."""
     from mckibben.estimators.core.data import training_data
 
-    for some in (sides[0], [one for side in sides for one in side]):
-        data = training_data(some, channels.inputs, channels.outputs, one_rate=channels.single)
+    for recordings in (sides[0], [recording for side in sides for recording in side]):
+        data = training_data(
+            recordings, channels.inputs, channels.outputs, one_rate=channels.single
+        )
     units = {channel.name: channel.unit for channel in data.outputs}
     if len(set(units.values())) > 1:
         raise DataError(
@@ -205,7 +209,7 @@ def _unit_of(sides: Sequence[Sequence[Recording]], channels: Channels) -> str:
 
 def _outside(split: Split, names: Sequence[str]) -> dict[str, float]:
     """Return channels outside their training range, and the share of scored samples where they are."""
-    found = {}
+    shares = {}
     for name in names:
         trained = [recording[name] for recording in split.train if name in recording]
         runs = zip(split.test, split.test_rows, strict=True)
@@ -213,41 +217,43 @@ def _outside(split: Split, names: Sequence[str]) -> dict[str, float]:
         if trained and tested:
             low, high = min(map(np.min, trained)), max(map(np.max, trained))
             values = np.concatenate(tested)
-            found[name] = float(np.mean((values < low) | (values > high)))
-    return {name: share for name, share in found.items() if share > 0}
+            shares[name] = float(np.mean((values < low) | (values > high)))
+    return {name: share for name, share in shares.items() if share > 0}
 
 
-def _chosen(
+def _candidates(
     models: Models, recordings: Sequence[Recording], channels: Channels, seed: int
 ) -> tuple[dict[str, Candidate], dict[str, str]]:
     """Return the models to fit, and why others of "all" do not apply to these recordings."""
     seeded = {"seed": seed}
     if models in ("all", "quick"):
-        every = registry.names("estimators")
-        names = every if models == "all" else [name for name in every if declared(name).quick]
+        all_names = registry.names("estimators")
+        names = (
+            all_names if models == "all" else [name for name in all_names if declared(name).quick]
+        )
         items = {name: Candidate(name, seeded) for name in names}
         left_out = objections(items, recordings, channels)
         for name, item in items.items():
             if item.estimator_class.long:
-                left_out.setdefault(name, LONG)
+                left_out.setdefault(name, REASON_LONG)
         return {name: item for name, item in items.items() if name not in left_out}, left_out
     if isinstance(models, Mapping):
-        found = {str(label): _item(model, seeded) for label, model in models.items()}
+        candidates = {str(label): _item(model, seeded) for label, model in models.items()}
     else:
-        named = models.split(",") if isinstance(models, str) else models
-        if not (isinstance(named, Iterable) and all(isinstance(name, str) for name in named)):
+        labels = models.split(",") if isinstance(models, str) else models
+        if not (isinstance(labels, Iterable) and all(isinstance(name, str) for name in labels)):
             raise ModelError(
                 f"models cannot be {models!r:.60}", remedy="give 'all', 'quick', or a list of names"
             )
-        found = {name.strip(): _item(name.strip(), seeded) for name in named}
-    if CONSTANT in found:
+        candidates = {name.strip(): _item(name.strip(), seeded) for name in labels}
+    if CONSTANT in candidates:
         raise ModelError(f"{CONSTANT!r} is the mean of the output", remedy="choose another label")
-    if not found:
+    if not candidates:
         raise ModelError(
             "there are no models to compare",
             remedy=f"name some of {', '.join(registry.names('estimators'))}, or all",
         )
-    return found, {}
+    return candidates, {}
 
 
 def _item(model: object, seeded: Mapping[str, Any]) -> Candidate:
@@ -266,7 +272,7 @@ def objections(
     items: Mapping[str, Candidate], recordings: Sequence[Recording], channels: Channels
 ) -> dict[str, str]:
     """Return which models do not apply to recordings, and why."""
-    found: dict[str, str] = {}
+    reasons: dict[str, str] = {}
     for name, item in items.items():
         try:
             reason = item.estimator_class.objection(
@@ -275,8 +281,8 @@ def objections(
         except ModelError as error:  # a plug-in that is broken is not the end of all others
             reason = str(error)
         if reason is not None:
-            found[name] = reason
-    return found
+            reasons[name] = reason
+    return reasons
 
 
 def refusals(
@@ -295,7 +301,7 @@ def _missing_time_objection(
     estimator: type[Estimator], recordings: Sequence[Recording]
 ) -> str | None:
     """Return why a model that needs time cannot be fitted to recordings without it, or None."""
-    missing = [each.name for each in recordings if each.sample_time is None]
+    missing = [recording.name for recording in recordings if recording.sample_time is None]
     if not (missing and estimator.needs_time):
         return None
     more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""

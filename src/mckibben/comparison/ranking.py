@@ -6,9 +6,9 @@ Fit, held-out predictions and free runs of one model are a task for a worker pro
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -127,19 +127,23 @@ def _held_out(
     """Return the outputs over the recordings of the parts, each part by the model without it."""
     block, train, names = estimator.fitted, data.split.train, data.channels.outputs
     if data.checks:
-        return tuple(block.simulate(one).matrix(names) for one in data.checks), "given"
+        return tuple(block.simulate(recording).matrix(names) for recording in data.checks), "given"
     if not data.parts:
         return tuple(outputs[: len(train)]), "fit"
-    found = estimator.held_out(train, data.parts)
-    if found is None:
+    predictions = estimator.held_out(train, data.parts)
+    if predictions is None:
         return tuple(outputs[: len(train)]), "fit"
-    given = [channel.name for channel in block.outputs]
-    return tuple(table[:, [given.index(name) for name in names]] for table in found), "step"
+    names_of_model = [channel.name for channel in block.outputs]
+    return tuple(
+        table[:, [names_of_model.index(name) for name in names]] for table in predictions
+    ), "step"
 
 
 def outputs_of(block: Block, data: Data) -> tuple[Array, ...]:
     """Return a model's free-running outputs on every training recording, then every test recording."""
-    return tuple(block.simulate(one).matrix(data.channels.outputs) for one in data.recordings)
+    return tuple(
+        block.simulate(recording).matrix(data.channels.outputs) for recording in data.recordings
+    )
 
 
 def _step_cost(block: Block, recording: Recording) -> float:
@@ -155,14 +159,14 @@ def _step_cost(block: Block, recording: Recording) -> float:
     return min(times) / TIMED_SAMPLES * 1e9
 
 
-PIECES = 4
+PIECES_PER_PART = 4
 """Number of consecutive pieces of a part whose squared errors are summed, for resampling."""
 
 LEAST_SHARE = 0.1
 """Smallest error of a part that counts, relative to that of all parts together: a rest does not decide.
 """
 
-WORTH_A_PROCESS = 2.0
+SECONDS_WORTH_PROCESSES = 2.0
 """Seconds of work below which starting processes costs more time than it saves."""
 
 
@@ -194,8 +198,8 @@ class Standing:
         fitting = f", fitting {self.fitting[-1]}" if self.fitting else ""
         best = self.best
         so_far = "" if best is None else f"; best {best.model}, {best.chosen_by:.3g} {self.unit}"
-        left = f"; about {duration(self.seconds)} left" if self.seconds >= 1 else ""
-        return f"{self.done} of {self.total} models{fitting}{so_far}{left}".rstrip()
+        time_left = f"; about {duration(self.seconds)} left" if self.seconds >= 1 else ""
+        return f"{self.done} of {self.total} models{fitting}{so_far}{time_left}".rstrip()
 
 
 def compare(
@@ -210,7 +214,7 @@ def compare(
     clear: bool = True,
     progress: bool | Callable[[Standing], None] | None = None,
     found: Callable[[Leaderboard], None] | None = None,
-    **given: Any,
+    **keywords: Any,
 ) -> Leaderboard:
     """Fit models to the same data, choose one by cross-validation, and test all.
 
@@ -255,16 +259,11 @@ def compare(
     ModelError
         On unknown models or options.
     """
-    chosen = given_options(CompareOptions, options, given)
-    plan = plan_of(train, test, chosen, validation=validation, channels=channels)
+    options = given_options(CompareOptions, options, keywords)
+    plan = plan_of(train, test, options, validation=validation, channels=channels)
     board = plan.empty
     try:
-        with (
-            telling(progress, "comparing", lines=True) as tell,
-            closing(
-                ranked(plan, jobs=chosen.jobs, executor=executor, folder=folder, progress=tell)
-            ) as rankings,
-        ):
+        with rankings_of(plan, "comparing", options.jobs, executor, folder, progress) as rankings:
             for ranking in rankings:
                 board = ranking.board
                 if found is not None:
@@ -286,6 +285,25 @@ class Ranking:
     outputs: Mapping[str, tuple[Array, ...]] = field(repr=False)
 
 
+@contextmanager
+def rankings_of(
+    plan: Plan,
+    label: str,
+    jobs: int | None,
+    executor: Executor | None,
+    folder: str | Path | None,
+    progress: bool | Callable[[Standing], None] | None,
+) -> Iterator[Iterator[Ranking]]:
+    """Open the rankings of `ranked` with a bar, or a callback; closed, no model is fitted any more."""
+    with (
+        telling(progress, label, lines=True) as tell,
+        closing(
+            ranked(plan, jobs=jobs, executor=executor, folder=folder, progress=tell)
+        ) as rankings,
+    ):
+        yield rankings
+
+
 def ranked(
     plan: Plan,
     *,
@@ -304,21 +322,10 @@ def ranked(
     checked(jobs)
     data, table, checkpoints = plan.data, _Table(plan), Checkpoints(folder, plan.data)
     keys = {name: (item, source(item.estimator_class)) for name, item in plan.items.items()}
-    for name, reason in plan.refused.items():
-        table.add(Row(name, reason=reason), ())
-    for name in plan.items.keys() - plan.refused.keys():
-        stored = checkpoints.get(name, Row, *keys[name])
-        if (
-            stored is not None
-            and stored.model == name
-            and stored.sound
-            and stored.block is not None
-        ):
-            table.add(stored, outputs_of(stored.block, data))
-
+    _add_finished(table, plan, checkpoints, keys)
     remaining = {name: item for name, item in plan.items.items() if name not in table.rows}
     efforts = {name: effort_of(item, data) for name, item in remaining.items()}
-    workers = jobs or (cores() if sum(efforts.values()) > WORTH_A_PROCESS else 1)
+    workers = jobs or (cores() if sum(efforts.values()) > SECONDS_WORTH_PROCESSES else 1)
     tasks = sorted(remaining.items(), key=lambda task: -efforts[task[0]] if workers > 1 else 0.0)
     work = _Work(plan, table, efforts, workers, progress)
 
@@ -344,6 +351,21 @@ def ranked(
         yield table.ranking()
 
 
+def _add_finished(
+    table: _Table,
+    plan: Plan,
+    checkpoints: Checkpoints,
+    keys: Mapping[str, tuple[Candidate, str]],
+) -> None:
+    """Add the models that are refused, and those that an earlier run has finished."""
+    for name, reason in plan.refused.items():
+        table.add(Row(name, reason=reason), ())
+    for name in plan.items.keys() - plan.refused.keys():
+        row = checkpoints.get(name, Row, *keys[name])
+        if row is not None and row.model == name and row.sound and row.block is not None:
+            table.add(row, outputs_of(row.block, plan.data))
+
+
 @dataclass
 class _Work:
     """Models that remain to be fitted when it begins, by their ``efforts`` [s], and their progress."""
@@ -367,10 +389,10 @@ class _Work:
         if self.progress is None:
             return
         waiting = [name for name in self.efforts if name not in self.table.rows]
-        rest = sum(self.efforts[name] for name in waiting)
-        done = sum(self.efforts.values()) - rest
+        remaining = sum(self.efforts[name] for name in waiting)
+        finished = sum(self.efforts.values()) - remaining
         spent = time.monotonic() - self.started
-        pace = spent / done if done > SURE * (done + rest) else 1 / self.workers
+        pace = spent / finished if finished > SURE * (finished + remaining) else 1 / self.workers
         self.progress(
             Standing(
                 done=len(self.table.rows),
@@ -378,28 +400,28 @@ class _Work:
                 fitting=tuple(name for name in self.begun if name in waiting),
                 best=self.table.board(self.table.sorted()).best,
                 unit=self.plan.empty.unit,
-                seconds=rest * pace,
+                seconds=remaining * pace,
             )
         )
 
 
-def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
+def _row(plan: Plan, name: str, result: FitResult, table: _Table) -> Row:
     """Return the row of a model, with its band if it is the best so far."""
     data = plan.data
     try:
-        row = row_of(data, name, found, table.constant.squares, plan.empty.seed)
+        row = row_of(data, name, result, table.constant.squares, plan.empty.seed)
     except MckibbenError as error:  # its outputs overflow
         return Row(name, reason=str(error))
-    better = any(other.sound and other.order < row.order for other in table.rows.values())
-    if better or not row.sound or row.block is None or row.validation_rmse is None:
+    is_beaten = any(earlier.sound and earlier.order < row.order for earlier in table.rows.values())
+    if is_beaten or not row.sound or row.block is None or row.validation_rmse is None:
         return row
     if tuple(channel.name for channel in row.block.outputs) != data.channels.outputs:
         return row
-    predictions = held(data, found.predictions, row.block)
-    tested = tested_band(row.block, predictions, found.outputs, data.split)
-    if tested is None:
+    predictions = held(data, result.predictions, row.block)
+    with_band = tested_band(row.block, predictions, result.outputs, data.split)
+    if with_band is None:
         return row
-    banded, band = tested
+    banded, band = with_band
     return replace(row, band=band, banded=None if band.unknown else banded)
 
 
@@ -444,27 +466,27 @@ class _Table:
         failed.sort(key=lambda row: row.model)
         if not rows:
             return Ranking(self.board(failed), {})
-        every = [*rows, self.constant.row]
-        errors = np.array([row.test_error for row in every])
-        samples = np.array(self._resampled([row.model for row in every]))
+        tested = [*rows, self.constant.row]
+        errors = np.array([row.test_error for row in tested])
+        samples = np.array(self._resampled([row.model for row in tested]))
         best = self.board(rows).best or rows[0]
         by_test = sorted(errors[:-1])
         ends = difference_intervals(samples, errors, rows.index(best))
-        placed = [
+        complete = [
             replace(
                 row,
                 test_rank=None if row.model == CONSTANT else 1 + by_test.index(row.test_error),
-                rmse_interval=interval(own),
-                difference_interval=between,
+                rmse_interval=interval(resamples),
+                difference_interval=difference,
                 # others have a band if they were the best when they were done, which is chance
                 band=row.band if row is best else None,
                 banded=row.banded if row is best else None,
             )
-            for row, own, between in zip(every, samples, ends, strict=True)
+            for row, resamples, difference in zip(tested, samples, ends, strict=True)
         ]
-        board = self.board([*placed[:-1], *failed])
+        board = self.board([*complete[:-1], *failed])
         outputs = {row.model: self._outputs[row.model] for row in rows}
-        return Ranking(replace(board, constant=placed[-1]), outputs)
+        return Ranking(replace(board, constant=complete[-1]), outputs)
 
     def _resampled(self, models: Sequence[str]) -> list[Array]:
         """Return resampled test RMSE of models; block lengths fit their median correlation length."""
@@ -482,14 +504,14 @@ def test_errors(data: Data, outputs: Sequence[Array]) -> Array:
     """Return the errors of outputs on all recordings at the samples scored, shape (n, k)."""
     split, names = data.split, data.channels.outputs
     runs = zip(outputs[len(split.train) :], split.test, split.test_rows, strict=True)
-    return np.concatenate([(found - run.matrix(names))[rows] for found, run, rows in runs])
+    return np.concatenate([(table - run.matrix(names))[rows] for table, run, rows in runs])
 
 
 def part_errors(data: Data, predictions: Sequence[Array]) -> list[Array]:
     """Return the errors of held-out predictions on every part, shape (n, k) each."""
     names = data.channels.outputs
     pairs = zip(predictions, data.held_out, strict=True)
-    errors = [found - run.matrix(names) for found, run in pairs]
+    errors = [table - run.matrix(names) for table, run in pairs]
     return [
         np.concatenate([error[rows] for error, rows in zip(errors, part, strict=True)])
         for part in data.parts
@@ -499,32 +521,32 @@ def part_errors(data: Data, predictions: Sequence[Array]) -> list[Array]:
 def held(data: Data, predictions: Sequence[Array], block: Block) -> list[FreeRun]:
     """Return the held-out predictions of every recording of the parts, as runs."""
     inputs, outputs = [channel.name for channel in block.inputs], data.channels.outputs
-    each = zip(data.held_out, predictions, zip(*data.parts, strict=True), strict=True)
+    parts_of_runs = zip(data.held_out, predictions, zip(*data.parts, strict=True), strict=True)
     return [
-        FreeRun.of(run_of(one, inputs, outputs, counts=np.any(rows, axis=0)), found)
-        for one, found, rows in each
+        FreeRun.of(run_of(run, inputs, outputs, counts=np.any(rows, axis=0)), table)
+        for run, table, rows in parts_of_runs
     ]
 
 
-def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed: int) -> Row:
+def row_of(data: Data, name: str, result: FitResult, constant: Array | None, seed: int) -> Row:
     """Return the row of a model: all scores, and its skill over the constant of `squares_of`."""
-    if found.reason is not None:
-        return Row(name, reason=found.reason)
-    on_train, on_test = _scores(data, found.outputs)
-    validation = _validation(data, found.predictions, constant, seed)
+    if result.reason is not None:
+        return Row(name, reason=result.reason)
+    on_train, on_test = _scores(data, result.outputs)
+    validation = _validation(data, result.predictions, constant, seed)
     return Row(
         model=name,
-        n_parameters=found.diagnostics.get("n_free", len(data.channels.outputs)),
-        fit_seconds=found.seconds,
-        step_ns=found.step_ns,
+        n_parameters=result.diagnostics.get("n_free", len(data.channels.outputs)),
+        fit_seconds=result.seconds,
+        step_ns=result.step_ns,
         train=mean_scores(list(on_train.values())),
         test=mean_scores(list(on_test.values())),
         outputs=on_test,
-        validated=found.validated,
-        caution=found.caution,
-        memory=found.memory,
-        block=found.block,
-        diagnostics=found.diagnostics,
+        validated=result.validated,
+        caution=result.caution,
+        memory=result.memory,
+        block=result.block,
+        diagnostics=result.diagnostics,
         **validation,
     )
 
@@ -574,7 +596,7 @@ def _validation(
 
 def squares_of(errors: Sequence[Array]) -> Array:
     """Return summed squared errors of consecutive pieces of every part, shape (pieces, k)."""
-    pieces = [piece for error in errors for piece in np.array_split(error, PIECES)]
+    pieces = [piece for error in errors for piece in np.array_split(error, PIECES_PER_PART)]
     return np.array([(piece**2).sum(axis=0) for piece in pieces])
 
 
@@ -594,12 +616,12 @@ def constant_of(data: Data) -> Constant:
     outputs = tuple(np.tile(mean, (len(recording), 1)) for recording in data.recordings)
     predictions = tuple(np.tile(mean, (len(recording), 1)) for recording in data.held_out)
     for part in () if data.checks else data.parts:
-        rest = [table[~rows] for table, rows in zip(tables, part, strict=True)]
+        others = [table[~rows] for table, rows in zip(tables, part, strict=True)]
         for table, rows in zip(predictions, part, strict=True):
-            table[rows] = np.concatenate(rest).mean(axis=0)
+            table[rows] = np.concatenate(others).mean(axis=0)
     squares = squares_of(part_errors(data, predictions)) if data.parts else None
-    found = FitResult(predictions, outputs=outputs)
-    return Constant(row_of(data, CONSTANT, found, None, 0), outputs, squares)
+    result = FitResult(predictions, outputs=outputs)
+    return Constant(row_of(data, CONSTANT, result, None, 0), outputs, squares)
 
 
 def skill_of(squares: Array, constant: Array, seed: int) -> tuple[float, float]:
@@ -611,7 +633,7 @@ def skill_of(squares: Array, constant: Array, seed: int) -> tuple[float, float]:
     both = np.array([squares, constant])
     if not np.isfinite(both).all() or both[1].sum() == 0:
         return float("-inf"), float("-inf")
-    drawn = np.random.default_rng(seed).integers(0, both.shape[1], (RESAMPLES, both.shape[1]))
-    model, mean = both[:, drawn].sum(axis=2)
-    left = model / np.maximum(mean, np.finfo(float).tiny)
-    return float(1 - both[0].sum() / both[1].sum()), float(1 - np.quantile(left, 0.99))
+    resamples = np.random.default_rng(seed).integers(0, both.shape[1], (RESAMPLES, both.shape[1]))
+    model, mean = both[:, resamples].sum(axis=2)
+    remaining = model / np.maximum(mean, np.finfo(float).tiny)
+    return float(1 - both[0].sum() / both[1].sum()), float(1 - np.quantile(remaining, 0.99))

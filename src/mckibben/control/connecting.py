@@ -28,38 +28,38 @@ Line = tuple[int, float, float]
 """Index of a value in an array, and the gain and offset of its unit conversion."""
 
 
-def match(wanted: Channel, offered: Sequence[Channel], rest_length: float | None) -> Line | None:
+def match(channel: Channel, offered: Sequence[Channel], rest_length: float | None) -> Line | None:
     """Return the index of the matching channel, with gain and offset, or None."""
     names = [plain(channel.name) for channel in offered]
-    own = plain(wanted.name)
-    if own in names:  # be it in another unit, which is refused
-        place = names.index(own)
-        return (place, 1.0, 0.0) if offered[place].unit == wanted.unit else None
-    for place, name in enumerate(names):
-        line = conversion(own, name, rest_length)
-        units = wanted.unit == standard_unit(own), offered[place].unit == standard_unit(name)
+    wanted = plain(channel.name)
+    if wanted in names:  # be it in another unit, which is refused
+        index = names.index(wanted)
+        return (index, 1.0, 0.0) if offered[index].unit == channel.unit else None
+    for index, name in enumerate(names):
+        line = conversion(wanted, name, rest_length)
+        units = channel.unit == standard_unit(wanted), offered[index].unit == standard_unit(name)
         if line is not None and all(units):
-            return (place, *line)
+            return (index, *line)
     return None
 
 
 def find(
-    wanted: Channel, offered: Sequence[Channel], rest_length: float | None, taker: str, giver: str
+    channel: Channel, offered: Sequence[Channel], rest_length: float | None, taker: str, giver: str
 ) -> Line:
     """Return the result of `match`, or raise an error that names both sides."""
-    line = match(wanted, offered, rest_length)
+    line = match(channel, offered, rest_length)
     if line is not None:
         return line
     units = {plain(other.name): other.unit or "no unit" for other in offered}
-    own, unit = plain(wanted.name), wanted.unit or "no unit"
+    wanted, unit = plain(channel.name), channel.unit or "no unit"
     problem = f"{taker} needs it, but {giver} has {', '.join(units) or 'nothing'}"
     remedy = f"give it under that name, in {unit}, or use a block and a plant of the same channels"
-    if own in units:
-        problem = f"{taker} has it in {unit}, and {giver} in {units[own]}"
-        remedy = f"identify the model with it in {units[own]}"
-    elif any(conversion(own, name, 1.0) for name in units):
+    if wanted in units:
+        problem = f"{taker} has it in {unit}, and {giver} in {units[wanted]}"
+        remedy = f"identify the model with it in {units[wanted]}"
+    elif any(conversion(wanted, name, 1.0) for name in units):
         remedy = f"state {REST_LENGTH}"
-    raise DataError(problem, channel=wanted.name, remedy=remedy)
+    raise DataError(problem, channel=channel.name, remedy=remedy)
 
 
 class Selection:
@@ -73,8 +73,8 @@ class Selection:
 
     def __call__(self, values: Array) -> Array:
         """Return the values, a new array."""
-        found: Array = values[self._places]
-        return found if self._as_they_are else self._gains * found + self._offsets
+        selected: Array = values[self._places]
+        return selected if self._as_they_are else self._gains * selected + self._offsets
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Offer:
         What is driven through the block follows a reference; what ends in `MEASURED` is measured; and
         what schedules it is in the reference or is measured.
         """
-        every = (*self.followed, *self.scheduled, *self.measured, *beside)
+        signals = (*self.followed, *self.scheduled, *self.measured, *beside)
         start = len(self.followed) + len(self.scheduled)
         length, title, loop = self.rest_length, block.title, f"a loop on {self.plant}"
         lines = []
@@ -116,19 +116,19 @@ class Offer:
             if k < block.n_driven:
                 line = find(channel, self.followed, length, title, f"what is followed in {loop}")
             elif channel.name.endswith(MEASURED):
-                own = Channel(channel.name.removesuffix(MEASURED), channel.unit)
-                line = find(own, self.measured, length, title, self.plant)
+                measured = Channel(channel.name.removesuffix(MEASURED), channel.unit)
+                line = find(measured, self.measured, length, title, self.plant)
                 line = start + line[0], *line[1:]
             else:
-                line = find(channel, every, length, title, loop)
+                line = find(channel, signals, length, title, loop)
             lines.append(line)
         return Selection(lines)
 
     def selected(
-        self, wanted: Channels, offered: Sequence[Channel], taker: str, giver: str
+        self, channels: Channels, offered: Sequence[Channel], taker: str, giver: str
     ) -> Selection:
         """Return the selection of channels out of others; raise an error as `find` does."""
-        return Selection([find(c, offered, self.rest_length, taker, giver) for c in wanted])
+        return Selection([find(c, offered, self.rest_length, taker, giver) for c in channels])
 
     def commands(self, block: Block) -> Selection:
         """Return the selection of the plant's commands from a block's outputs."""
@@ -206,10 +206,10 @@ def asked(plant: Plant, reference: Recording, compensator: Block | None = None) 
     if compensator is not None:
         outputs = [channel.name for channel in compensator.outputs]
         commanded = {*outputs, *map(plain, outputs)}
-        others = [name for name in reference.channels if name not in commanded]
+        recorded = [name for name in reference.channels if name not in commanded]
         # a reference of pressures alone is unchanged: following it raises an error
-        if 0 < len(others) < len(reference.channels):
-            reference = reference.select(others)
+        if 0 < len(recorded) < len(reference.channels):
+            reference = reference.select(recorded)
     if (length := rest_length_of(plant)) is not None:
         reference = reference.with_meta(rest_length=length)
     return reference.with_derived([*plant.outputs, *plant.inputs])
@@ -232,14 +232,16 @@ def offered(plant: Plant, reference: Recording) -> Offer:
     followed = followed_by(plant, reference)
     held = tuple(name for name in plant.inputs if name in reference)
     driven = actuated(plant, held)
-    given = [Channel(name, unit) for name, unit in reference.units.items()]
+    reference_channels = [Channel(name, unit) for name, unit in reference.units.items()]
     for channel in channels_of(plant, (*plant.inputs, *plant.outputs)):
         if channel.name in reference:  # in its unit, or refused
-            find(channel, given, None, plant.name, "the reference")
+            find(channel, reference_channels, None, plant.name, "the reference")
     return Offer(
         plant.name,
         channels_of(plant, followed),
-        tuple(channel for channel in given if channel.name not in (*followed, *driven)),
+        tuple(
+            channel for channel in reference_channels if channel.name not in (*followed, *driven)
+        ),
         channels_of(plant, plant.outputs),
         channels_of(plant, driven),
         held,
@@ -261,7 +263,7 @@ def followed_by(plant: Plant, reference: Recording) -> list[str]:
     if isinstance(plant, Twin):
         followed = followed or measured_too
     if not followed:
-        pairs = [(name, given) for name in plant.outputs for given in reference.channels]
+        pairs = [(name, channel) for name in plant.outputs for channel in reference.channels]
         state = f", or state {REST_LENGTH}" if any(conversion(*pair, 1.0) for pair in pairs) else ""
         raise DataError(
             f"it has no displacement, angle or force that {plant.name!r} measures",
@@ -279,22 +281,25 @@ def resting(plant: Plant, held: Mapping[str, float]) -> dict[str, float]:
     DataError
         Where it is farther beyond.
     """
-    found = {}
+    settings = {}
     for name, value in held.items():
-        found[f"start.{name}"] = value
+        settings[f"start.{name}"] = value
         if isinstance(plant, Twin):  # takes any recorded value
             continue
         limits = plant.limits(name)
-        near, beyond = min(max(value, limits.low), limits.high), NOISE * (limits.high - limits.low)
-        if abs(value - near) > beyond:
+        nearest, tolerance = (
+            min(max(value, limits.low), limits.high),
+            NOISE * (limits.high - limits.low),
+        )
+        if abs(value - nearest) > tolerance:
             raise DataError(
                 f"the reference begins at {value:g}, and {plant.name!r} takes {limits.low:g} to "
                 f"{limits.high:g}",
                 channel=name,
                 remedy="begin it within that range, or leave the column out",
             )
-        found[f"start.{name}"] = near
-    return found
+        settings[f"start.{name}"] = nearest
+    return settings
 
 
 def actuated(plant: Plant, held: Collection[str]) -> list[str]:

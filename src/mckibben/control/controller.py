@@ -134,13 +134,13 @@ class BlockController(Controller):
         self.samples_ahead = self.block.samples_ahead
 
     def connect(self, offer: Offer) -> None:
-        whole = self.block
-        self._compensator, self._pid = whole, None
-        if isinstance(whole, FeedforwardFeedback):
+        block = self.block
+        self._compensator, self._pid = block, None
+        if isinstance(block, FeedforwardFeedback):
             # both parts may take references of different times
-            self._compensator, self._pid = whole.compensator, whole.feedback
+            self._compensator, self._pid = block.compensator, block.feedback
         self._inputs = offer.inputs(self._compensator)
-        self._commands = offer.commands(whole)
+        self._commands = offer.commands(block)
         if self._pid is not None:
             bases = tuple(Channel(f"{c.name}{BASE}", c.unit) for c in self._compensator.outputs)
             self._pid_inputs = offer.inputs(self._pid, bases)
@@ -158,13 +158,13 @@ class BlockController(Controller):
         reference_ahead, schedule = ahead if self._uses_preview else (reference, scheduled)
         schedule = scheduled if self._predicts else schedule
         assert self.stream is not None
-        found = self.stream.step(
+        outputs = self.stream.step(
             self._inputs(np.concatenate((reference_ahead, schedule, measured)))
         )
         if self._feedback is not None:
-            given = np.concatenate((reference, scheduled, measured, found))
-            found = self._feedback.step(self._pid_inputs(given))
-        return self._commands(found)
+            signals = np.concatenate((reference, scheduled, measured, outputs))
+            outputs = self._feedback.step(self._pid_inputs(signals))
+        return self._commands(outputs)
 
 
 @dataclass
@@ -197,9 +197,9 @@ class DisturbanceObserver(Controller):
         block, model = self.compensator, self._model
         references = block.inputs[: block.n_driven]
         self._inputs, self._commands = offer.inputs(block), offer.commands(block)
-        given = (*offer.driven, *offer.scheduled)
+        signals = (*offer.driven, *offer.scheduled)
         self._measured = offer.selected(references, offer.measured, block.title, offer.plant)
-        self._taken = offer.selected(model.inputs, given, model.title, f"a loop on {offer.plant}")
+        self._taken = offer.selected(model.inputs, signals, model.title, f"a loop on {offer.plant}")
         self._modelled = offer.selected(references, model.outputs, block.title, model.title)
 
     def reset(self, sample_time: float) -> None:
@@ -216,15 +216,15 @@ class DisturbanceObserver(Controller):
             residual = self._measured(measured) - self._expected
             self._disturbance += self._filter_gain * (residual - self._disturbance)
         self._scheduled = scheduled
-        wanted = self._inputs(np.concatenate((*ahead, measured)))
-        wanted[: self._disturbance.size] -= self._disturbance
+        inputs = self._inputs(np.concatenate((*ahead, measured)))
+        inputs[: self._disturbance.size] -= self._disturbance
         assert self.stream is not None
-        return self._commands(self.stream.step(wanted))
+        return self._commands(self.stream.step(inputs))
 
     def applied(self, pressures: Array) -> None:
         """Advance the model by the applied commands."""
-        taken = self._taken(np.concatenate((pressures, self._scheduled)))
-        self._expected = self._modelled(self._model_stream.step(taken))
+        inputs = self._taken(np.concatenate((pressures, self._scheduled)))
+        self._expected = self._modelled(self._model_stream.step(inputs))
 
 
 @dataclass
@@ -265,10 +265,10 @@ class EstimatedLoad(Controller):
 
     def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
         """Return the controller's commands, with the current load estimate for the next step."""
-        found = self._estimate.step(self._inputs(measured))
-        self._load = self._load + self._filter_gain * (found - self._load)
-        now, then = (np.concatenate((self._load, others)) for others in (scheduled, ahead[1]))
-        return self.controller.step(reference, measured, now, (ahead[0], then))
+        outputs = self._estimate.step(self._inputs(measured))
+        self._load = self._load + self._filter_gain * (outputs - self._load)
+        now, later = (np.concatenate((self._load, further)) for further in (scheduled, ahead[1]))
+        return self.controller.step(reference, measured, now, (ahead[0], later))
 
     def applied(self, pressures: Array) -> None:
         self.controller.applied(pressures)

@@ -44,10 +44,10 @@ from mckibben.system.showing import Result
 SEGMENTS = 8
 """Half-overlapping parts of the motion over which its spectrum is averaged."""
 
-LESS, MORE = 0.5, 1.2
+GAIN_DECREASE, GAIN_INCREASE = 0.5, 1.2
 """Factors of the gain where an error has changed its sign, and where it has not."""
 
-SLOWER = 2.0
+FILTER_WIDENING = 2.0
 """Factor of the width of the filter after a repetition that is worse than the one before."""
 
 MOST_REPETITIONS = 1000
@@ -131,8 +131,8 @@ def learn(
     )
     runs = [run(compensator)]
     for _ in range(repetitions):
-        found = learned(compensator, runs, ahead=ahead, settle=settle, repeats=repeats)
-        runs.append(run(found.next))
+        learning = learned(compensator, runs, ahead=ahead, settle=settle, repeats=repeats)
+        runs.append(run(learning.next))
     return learned(compensator, runs, ahead=ahead, settle=settle, repeats=repeats)
 
 
@@ -175,14 +175,7 @@ def learned(
     require(0 <= ahead < length, "ahead", ahead, f"0 to {length - 1} samples")
     require(0 <= settle < length, "settle", settle, f"0 to {length - 1} samples")
     channels = compensator.inputs[: compensator.n_driven]
-    desired, measured = (_outputs(compensator, runs, prefix) for prefix in (REFERENCE, ""))
-    if not np.array_equal(desired, np.broadcast_to(desired[0], desired.shape)):
-        raise DataError("repetitions have different references", remedy="repeat one motion")
-    bounds = compensator.input_bounds
-    lessons = [
-        _Lesson.of(desired[0, :, k], measured[:, :, k], bounds[k], settle, repeats)
-        for k in range(len(channels))
-    ]
+    lessons = _lessons(compensator, runs, settle, repeats)
     errors = np.array([lesson.errors for lesson in lessons])
     floor = np.maximum(errors[:, :1], np.finfo(float).tiny)
     best = int(np.argmin(np.mean((errors / floor) ** 2, axis=0)))
@@ -208,6 +201,19 @@ def learned(
         dict(zip(names, shrunk.tolist(), strict=True)),
         tuple(runs),
     )
+
+
+def _lessons(
+    compensator: Block, runs: Sequence[Recording], settle: int, repeats: bool
+) -> list[_Lesson]:
+    """Return what is learned of every output; parameters and errors as of `learned`."""
+    desired, measured = (_outputs(compensator, runs, prefix) for prefix in (REFERENCE, ""))
+    if not np.array_equal(desired, np.broadcast_to(desired[0], desired.shape)):
+        raise DataError("repetitions have different references", remedy="repeat one motion")
+    return [
+        _Lesson.of(desired[0, :, k], measured[:, :, k], bounds, settle, repeats)
+        for k, bounds in enumerate(compensator.input_bounds[: compensator.n_driven])
+    ]
 
 
 def _outputs(compensator: Block, runs: Sequence[Recording], prefix: str) -> Array:
@@ -265,29 +271,33 @@ class _Lesson:
         width = math.sqrt(2 * math.log(2)) / (2 * math.pi * cutoff)
         errors = np.sqrt(np.mean((desired - measured)[:, settle:] ** 2, axis=1))
         corrections, gain = [np.zeros(len(desired))], np.ones(len(desired))
-        before: Array | None = None
+        last_error: Array | None = None
         for k, output in enumerate(measured):
             if k and errors[k] >= errors[k - 1]:
-                width *= SLOWER
+                width *= FILTER_WIDENING
             error = _smooth(_advanced(desired - output, delay, repeats), width, repeats)
-            if before is not None:
-                gain = np.where(error * before < 0, LESS * gain, np.minimum(MORE * gain, 1.0))
-            before = error
-            wanted = corrections[-1] + _smooth(gain, width, repeats) * error
-            corrections.append(np.clip(wanted, low, high))
+            if last_error is not None:
+                gain = np.where(
+                    error * last_error < 0,
+                    GAIN_DECREASE * gain,
+                    np.minimum(GAIN_INCREASE * gain, 1.0),
+                )
+            last_error = error
+            correction = corrections[-1] + _smooth(gain, width, repeats) * error
+            corrections.append(np.clip(correction, low, high))
         return cls(np.array(corrections), errors, cutoff, expected)
 
 
 def _delay(desired: Array, output: Array) -> int:
     """Return by how many samples an output follows, not negative: the first least difference."""
 
-    def difference(late: int) -> float:
-        return float(np.mean((output[late:] - desired[: len(desired) - late]) ** 2))
+    def difference(delay: int) -> float:
+        return float(np.mean((output[delay:] - desired[: len(desired) - delay]) ** 2))
 
-    late, least = 0, difference(0)
-    while late + 2 < len(desired) and (following := difference(late + 1)) < least:
-        late, least = late + 1, following
-    return late
+    delay, least = 0, difference(0)
+    while delay + 2 < len(desired) and (next_difference := difference(delay + 1)) < least:
+        delay, least = delay + 1, next_difference
+    return delay
 
 
 def _cutoff(desired: Array, error: Array) -> tuple[float, float]:
@@ -298,8 +308,8 @@ def _cutoff(desired: Array, error: Array) -> tuple[float, float]:
     from scipy.signal import detrend, welch
 
     def spectrum(samples: Array) -> Array:
-        found: Array = welch(samples, nperseg=length, detrend=detrend)[1]
-        return found
+        power: Array = welch(samples, nperseg=length, detrend=detrend)[1]
+        return power
 
     length = max(len(desired) // SEGMENTS, 2)
     motion, missed = spectrum(desired), spectrum(error)
@@ -313,9 +323,9 @@ def _cutoff(desired: Array, error: Array) -> tuple[float, float]:
     return float(frequencies[end]), expected
 
 
-def _advanced(samples: Array, late: int, repeats: bool) -> Array:
+def _advanced(samples: Array, samples_ahead: int, repeats: bool) -> Array:
     """Return samples moved forward in time; the end is held, or is the beginning."""
-    places = np.arange(len(samples)) + late
+    places = np.arange(len(samples)) + samples_ahead
     return samples[places % len(samples) if repeats else np.minimum(places, len(samples) - 1)]
 
 
@@ -323,5 +333,5 @@ def _smooth(samples: Array, width: float, repeats: bool) -> Array:
     """Return samples behind a Gaussian low-pass without delay, of a width in samples."""
     from scipy.ndimage import gaussian_filter1d
 
-    found: Array = gaussian_filter1d(samples, width, mode="wrap" if repeats else "nearest")
-    return found
+    smooth: Array = gaussian_filter1d(samples, width, mode="wrap" if repeats else "nearest")
+    return smooth

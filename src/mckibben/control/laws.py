@@ -36,8 +36,8 @@ def control_law(name: str, compensator: Block, tuned: Tuned) -> Block | Controll
     ModelError
         If there is no law of that name.
     """
-    made: Block | Controller = registry.load("controllers", name)(compensator, tuned)
-    return made
+    controller: Block | Controller = registry.load("controllers", name)(compensator, tuned)
+    return controller
 
 
 def refusal(name: str, compensator: Block, plant: Plant) -> str:

@@ -55,7 +55,7 @@ class PressureLoop:
         self._integral_term = np.zeros_like(self.low)
         self._previous: tuple[Array, Array, Array] | None = None
 
-    def step(self, wanted: Array, measured: Array) -> Array:
+    def step(self, desired: Array, measured: Array) -> Array:
         """Return the command for a wanted pressure, from the measured one [bar], shape (n,) each."""
         if self._previous is not None:
             self._learn(measured, *self._previous)
@@ -65,12 +65,12 @@ class PressureLoop:
             1.0,
         )
         gain = 1.0 / progress_per_step - 1.0
-        command = wanted + gain * (wanted - measured) + self._integral_term
+        command = desired + gain * (desired - measured) + self._integral_term
         command = np.clip(command, self.low, self.high)
-        self._previous = wanted.copy(), measured.copy(), command
+        self._previous = desired.copy(), measured.copy(), command
         return command
 
-    def _learn(self, measured: Array, wanted: Array, start: Array, command: Array) -> None:
+    def _learn(self, measured: Array, desired: Array, start: Array, command: Array) -> None:
         """Integrate the error, and update the share of the way to a command that a step goes.
 
         ``wanted``, ``start`` and ``command`` are of the previous step: what was asked for, the pressure
@@ -78,7 +78,7 @@ class PressureLoop:
         """
         inside = (command > self.low) & (command < self.high)
         share_integrated = min(self.integral * self.sample_time, MOST_INTEGRATED)
-        self._integral_term += share_integrated * (wanted - measured) * inside
+        self._integral_term += share_integrated * (desired - measured) * inside
 
         distance, progress = command - start, measured - start
         weight = np.where(np.abs(distance) > self._shortest_move, FORGETTING, 0.0)

@@ -9,7 +9,7 @@ as the step, for which the gains are reduced.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -83,32 +83,50 @@ def tune_pid(
     driven = [channel.name for channel in untuned.given]
     starts = resting(plant, scheduled)
     rig = plant.changed({"sample_time": sample_time, **starts})
-    limits = [rig.limits(name) for name in driven]
-    middle = {
-        name: 0.5 * (limit.low + limit.high) for name, limit in zip(driven, limits, strict=True)
-    }
+    limits = {name: rig.limits(name) for name in driven}
+    middle = {name: 0.5 * (limit.low + limit.high) for name, limit in limits.items()}
     n = round(hold / sample_time)
+    rest = {**middle, **scheduled}
     gains = []
     with telling(progress, "tuning") as tell:
-        for name, moved, limit in one_by_one(zip(driven, followed, limits, strict=True), tell):
+        for name, motion in one_by_one(zip(driven, followed, strict=True), tell):
             rig.reset(seed)
-            place = rig.outputs.index(moved)
-            rest, limit_range = {**middle, **scheduled}, limit.high - limit.low
-            for share in STEPS:
-                for _ in range(n):
-                    before = rig.step(rest)[place]
-                size = share * limit_range
-                higher = {**rest, name: middle[name] + size}
-                response = np.array([rig.step(higher)[place] for _ in range(n)]) - before
-                if _moves(response):
-                    break
-            ramp = np.linspace(limit.low, limit.high, n)
-            slow = np.array([rig.step({**rest, name: at})[place] for at in (*ramp, *ramp[::-1])])
-            gains.append(_simc(response, size, (slow, ramp), sample_time, closed_loop_time, name))
+            response, size = _step_response(rig, name, motion, rest, n)
+            slow_cycle = _slow_cycle(rig, name, motion, rest, n)
+            gains.append(_simc(response, size, slow_cycle, sample_time, closed_loop_time, name))
     pairs = zip(measured, untuned.driven, strict=True)
-    per = [match(own, [one], rest_length_of(plant)) for own, one in pairs]
-    kp, ki = np.transpose(gains) * [1.0 if line is None else line[1] for line in per]
+    lines = [match(channel, [reference], rest_length_of(plant)) for channel, reference in pairs]
+    kp, ki = np.transpose(gains) * [1.0 if line is None else line[1] for line in lines]
     return replace(untuned, kp=tuple(kp.tolist()), ki=tuple(ki.tolist()))
+
+
+def _step_response(
+    rig: Plant, name: str, motion: str, rest: Mapping[str, float], n: int
+) -> tuple[Array, float]:
+    """Return the response of a motion, shape (n,), to the smallest step of an input that moves it.
+
+    Also the size of that step, or of the largest one where none does.
+    """
+    column, limit = rig.outputs.index(motion), rig.limits(name)
+    for share in STEPS:
+        for _ in range(n):
+            before = rig.step(rest)[column]
+        size = share * (limit.high - limit.low)
+        higher = {**rest, name: rest[name] + size}
+        response = np.array([rig.step(higher)[column] for _ in range(n)]) - before
+        if _moves(response):
+            break
+    return response, size
+
+
+def _slow_cycle(
+    rig: Plant, name: str, motion: str, rest: Mapping[str, float], n: int
+) -> tuple[Array, Array]:
+    """Return the response, shape (2 n,), to a ramp of an input up and down, and the ramp, (n,)."""
+    column, limit = rig.outputs.index(motion), rig.limits(name)
+    ramp = np.linspace(limit.low, limit.high, n)
+    commands = (*ramp, *ramp[::-1])
+    return np.array([rig.step({**rest, name: command})[column] for command in commands]), ramp
 
 
 def untuned_pid(
@@ -123,36 +141,42 @@ def untuned_pid(
     """
     driven = actuated(plant, scheduled)
     followed = [_moved_by(name, plant, driven) for name in driven]
-    limits, none = [plant.limits(name) for name in driven], [0.0] * len(driven)
+    limits, zeros = [plant.limits(name) for name in driven], [0.0] * len(driven)
     lowest, highest = min(limit.low for limit in limits), max(limit.high for limit in limits)
     length = rest_length_of(plant)
     channels = [
-        next((one for one in references if match(one, [own], length)), own)
-        for own in channels_of(plant, followed)
+        next(
+            (reference for reference in references if match(reference, [channel], length)), channel
+        )
+        for channel in channels_of(plant, followed)
     ]
     return PIDFeedback.of(
         tuple(channels),
         channels_of(plant, driven),
-        none,
-        none,
+        zeros,
+        zeros,
         limits=(float(lowest), float(highest)),
     )
 
 
 def _moved_by(name: str, rig: Plant, driven: Sequence[str]) -> str:
     """Return the motion driven by an input of a plant: that of the same number, or the only one."""
-    end = name[name.find("_") :] if "_" in name else ""
-    found = [stem + end for stem in MOVED if stem + end in rig.outputs]
-    if len(driven) == 1 and not found and isinstance(rig, Twin):
-        found = [one for one in rig.outputs if not one.startswith((*COMMANDS, "force"))]
-    if len(found) != 1:
+    suffix = name[name.find("_") :] if "_" in name else ""
+    motions = [stem + suffix for stem in MOVED if stem + suffix in rig.outputs]
+    if len(driven) == 1 and not motions and isinstance(rig, Twin):
+        motions = [
+            name_of_output
+            for name_of_output in rig.outputs
+            if not name_of_output.startswith((*COMMANDS, "force"))
+        ]
+    if len(motions) != 1:
         raise ModelError(
             "PID follows a displacement or an angle for every pressure or voltage, each "
             f"moved by its own; {rig.name} is driven by {', '.join(driven)} and gives "
             f"{', '.join(rig.outputs)}",
             remedy="use the compensator alone, or another rig",
         )
-    return found[0]
+    return motions[0]
 
 
 def _steepest(response: Array, ramp: Array, size: float) -> float:
@@ -160,7 +184,7 @@ def _steepest(response: Array, ramp: Array, size: float) -> float:
     lag = max(round(size / float(ramp[1] - ramp[0])), 1)
     up, down = np.split(response, 2)
     run = float(ramp[lag] - ramp[0])
-    return float(max((one[lag:] - one[:-lag]).max() for one in (up, down[::-1]))) / run
+    return float(max((branch[lag:] - branch[:-lag]).max() for branch in (up, down[::-1]))) / run
 
 
 def _settled(response: Array) -> Array:
@@ -176,9 +200,9 @@ def _moves(response: Array) -> bool:
 def _simc(
     response: Array,
     size: float,
-    slowly: tuple[Array, Array],
+    slow_cycle: tuple[Array, Array],
     step: float,
-    wanted: float | None,
+    closed_loop_time: float | None,
     name: str,
 ) -> tuple[float, float]:
     final = float(_settled(response).mean())
@@ -188,14 +212,14 @@ def _simc(
             channel=name,
             remedy=f"check the plant, or its middle {name.partition('_')[0]}",
         )
-    way = np.sign(final)  # a displacement that counts stretching falls as pressure rises
-    final, response = way * final, way * response
-    early = (np.argmax(response >= 0.283 * final) + 1) * step
-    late = (np.argmax(response >= 0.632 * final) + 1) * step
-    time = max(1.5 * (late - early), step)
-    dead = max(late - time, 0.5 * step)
-    closed = wanted or max(dead, 3 * step)
-    slow, ramp = slowly
-    gain = max(final / size, _steepest(way * slow, ramp, size) / STEEPER)
-    kp = way * time / (gain * (closed + dead))
-    return float(kp), float(kp / min(time, 4 * (closed + dead)))
+    direction = np.sign(final)  # a displacement that counts stretching falls as pressure rises
+    final, response = direction * final, direction * response
+    time_28 = (np.argmax(response >= 0.283 * final) + 1) * step
+    time_63 = (np.argmax(response >= 0.632 * final) + 1) * step
+    time = max(1.5 * (time_63 - time_28), step)
+    dead_time = max(time_63 - time, 0.5 * step)
+    closed_time = closed_loop_time or max(dead_time, 3 * step)
+    slow, ramp = slow_cycle
+    gain = max(final / size, _steepest(direction * slow, ramp, size) / STEEPER)
+    kp = direction * time / (gain * (closed_time + dead_time))
+    return float(kp), float(kp / min(time, 4 * (closed_time + dead_time)))

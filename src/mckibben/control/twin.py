@@ -95,36 +95,29 @@ class Twin:
         self.inputs = tuple(plain(c.name) for c in self.forward.inputs)
         ends = (*self.forward.inputs, *self.forward.outputs)
         self.units = {plain(channel.name): channel.unit for channel in ends}
-        own = self.forward.sample_time
-        self.sample_time = own if sample_time is None else float(sample_time)
-        if own and self.sample_time and abs(self.sample_time - own) > 1e-9 * own:
-            raise ModelError(
-                f"{self.forward.title!r} is a model of steps of {own:g} s, and a loop of "
-                f"{self.sample_time:g} s is closed on it",
-                parameter="sample_time",
-                remedy="resample the reference to that, or take a model of any sample time",
-            )
+        self.sample_time = _checked_step(self.forward, sample_time)
         self.held = dict(held or {})
-        given = {name: Ends(*map(float, ends)) for name, ends in (limits or {}).items()}
-        for channel in (*given, *self.held):
+        self._given = {name: Ends(*map(float, ends)) for name, ends in (limits or {}).items()}
+        self._check_channels()
+        known = known_ranges(model.inputs, model.known_inputs)
+        self._limits = {plain(name): Ends(*ends) for name, ends in known.items()} | self._given
+        self._rest = np.empty(0)
+        self._stream: Stream | None = None
+
+    def _check_channels(self) -> None:
+        """Raise an error for limits and held values of what is no input, or limits out of order."""
+        for channel in (*self._given, *self.held):
             if channel not in self.inputs:
                 raise DataError(
                     f"{self.forward.title!r} has no such input; it has {', '.join(self.inputs)}",
                     channel=channel,
                     remedy="name one of these",
                 )
-        for channel, (low, high) in given.items():
+        for channel, (low, high) in self._given.items():
             if not -np.inf < low < high < np.inf:
                 raise DataError(
                     f"limits are {low:g} to {high:g}", channel=channel, remedy="give low, then high"
                 )
-        self._given = given
-        known = {
-            plain(n): Ends(*e) for n, e in known_ranges(model.inputs, model.known_inputs).items()
-        }
-        self._limits = known | given
-        self._rest = np.empty(0)
-        self._stream: Stream | None = None
 
     def __repr__(self) -> str:
         """Return its name, its model, and the limits of its commands."""
@@ -228,10 +221,10 @@ class Twin:
             inputs[name] if name in inputs else np.full(len(inputs), twin._resting(name))
             for name in twin.inputs
         ]
-        found = np.array([twin._measured(row) for row in np.column_stack(columns)])
-        given = dict(zip(twin.inputs, columns, strict=True))
+        outputs = np.array([twin._measured(row) for row in np.column_stack(columns)])
+        inputs_by_name = dict(zip(twin.inputs, columns, strict=True))
         return Recording(
-            given | dict(zip(twin.outputs, found.T, strict=True)),
+            inputs_by_name | dict(zip(twin.outputs, outputs.T, strict=True)),
             twin.sample_time,
             start_time=inputs.start_time,
             meta={"plant": twin.name},
@@ -246,8 +239,10 @@ class Twin:
     @property
     def driving(self) -> set[str]:
         """Inputs driven by a controller: commands, or, without any, all that are not held."""
-        named = {plain(channel.name) for channel in self.forward.inputs if drives(channel)}
-        return named or set(self.inputs).difference(self.held)
+        commands_of_model = {
+            plain(channel.name) for channel in self.forward.inputs if drives(channel)
+        }
+        return commands_of_model or set(self.inputs).difference(self.held)
 
     def _resting(self, name: str) -> float:
         if name in self.held:
@@ -263,11 +258,24 @@ class Twin:
     def _measured(self, row: Array) -> Array:
         assert self._stream is not None
         low, high = self._clips
-        found = self._stream.step(np.minimum(np.maximum(row, low), high))
+        outputs = self._stream.step(np.minimum(np.maximum(row, low), high))
         if self._stream.status & (Stream.BAD_INPUT | Stream.BAD_OUTPUT):
             raise ModelError(
                 f"{self.forward.title!r} is far beyond its identified range, or not finite, at "
                 f"{', '.join(f'{x:g}' for x in row)}",
                 remedy="stay where it was identified, or identify it again",
             )
-        return found.copy()
+        return outputs.copy()
+
+
+def _checked_step(model: Block, sample_time: float | None) -> float | None:
+    """Return the sample time of a loop on a model, by default the model's; raise an error if not its."""
+    step = model.sample_time if sample_time is None else float(sample_time)
+    if model.sample_time and step and abs(step - model.sample_time) > 1e-9 * model.sample_time:
+        raise ModelError(
+            f"{model.title!r} is a model of steps of {model.sample_time:g} s, and a loop of "
+            f"{step:g} s is closed on it",
+            parameter="sample_time",
+            remedy="resample the reference to that, or take a model of any sample time",
+        )
+    return step

@@ -24,13 +24,13 @@ from mckibben.recording import Recording, sample_time_of
 UNCOMPENSATED = "no compensation"
 """Label of that loop in tables and figures."""
 
-CYCLE = 60.0
+CYCLE_TIME = 60.0
 """Duration of the slow cycle of pressure [s]: long compared with air dynamics."""
 
 KNOTS = 65
 """Number of knots of a curve."""
 
-SMALLEST = 1e-3
+SIZE_WEIGHT = 1e-3
 """Weight of the command's size against the motion error: of equivalent commands the smallest is
 chosen.
 """
@@ -56,12 +56,12 @@ def straight(rest: Array, slopes: Array, low: Array, high: Array) -> Callable[[A
     """
     from scipy.optimize import lsq_linear  # slow to load
 
-    small = SMALLEST * float(np.abs(slopes).max()) * np.eye(low.size)
+    size_weights = SIZE_WEIGHT * float(np.abs(slopes).max()) * np.eye(low.size)
 
     def commands(reference: Array) -> Array:
-        wanted = np.concatenate([reference - rest, np.zeros(low.size)])
+        targets = np.concatenate([reference - rest, np.zeros(low.size)])
         limits = (0.0, high - low)
-        return low + lsq_linear(np.vstack([slopes, small]), wanted, limits, method="bvls").x
+        return low + lsq_linear(np.vstack([slopes, size_weights]), targets, limits, method="bvls").x
 
     return commands
 
@@ -99,23 +99,23 @@ def slow_cycle(
         As of `track`.
     """
     offer = offered(plant, reference)
-    followed, driven = ([c.name for c in some] for some in (offer.followed, offer.driven))
+    followed, driven = ([c.name for c in channels] for channels in (offer.followed, offer.driven))
     low, high = _limits(plant, driven)
     if only is not None:
         high = np.where([name == only for name in driven], high, low)
-    steps = round(CYCLE / sample_time_of(reference, "be a reference"))
+    steps = round(CYCLE_TIME / sample_time_of(reference, "be a reference"))
     first = {name: np.full(steps + 2, reference[name][0]) for name in (*followed, *offer.held)}
     shares = np.maximum(0.0, 1.0 - np.abs(2.0 * np.arange(steps + 2) / steps - 1.0))
     cycle = low + shares[:, np.newaxis] * (high - low)
     rows = iter(cycle)
-    given = Recording(first, reference.sample_time, {n: reference.units[n] for n in first})
+    held_reference = Recording(first, reference.sample_time, {n: reference.units[n] for n in first})
     ramp = Rule(lambda _: next(rows))
-    found = track(
-        ramp, plant, given, approach=0.0, pressure_loop=pressure_loop, seed=seed
+    response = track(
+        ramp, plant, held_reference, approach=0.0, pressure_loop=pressure_loop, seed=seed
     ).recording
     channels = {name: first[name][:-1] for name in offer.held}
     channels |= dict(zip(driven, cycle[:-1].T, strict=True))
-    channels |= {name: found[name][1:] for name in followed}
+    channels |= {name: response[name][1:] for name in followed}
     return Recording(channels, reference.sample_time)
 
 
@@ -150,20 +150,26 @@ def uncompensated(
         If something does not move.
     """
     offer = offered(plant, reference)
-    followed, driven = ([c.name for c in some] for some in (offer.followed, offer.driven))
+    followed, driven = ([c.name for c in channels] for channels in (offer.followed, offer.driven))
     if len(followed) != len(driven):
-        found = []
+        lines = []
         for name in driven:
-            alone = slow_cycle(plant, reference, only=name, pressure_loop=pressure_loop, seed=seed)
-            driven_by = alone[name] - alone[name][0]
-            found.append(np.polynomial.polynomial.polyfit(driven_by, alone.matrix(followed), 1))
-        rests, slopes = np.transpose(found, (1, 2, 0))
+            single_cycle = slow_cycle(
+                plant, reference, only=name, pressure_loop=pressure_loop, seed=seed
+            )
+            driven_by = single_cycle[name] - single_cycle[name][0]
+            lines.append(
+                np.polynomial.polynomial.polyfit(driven_by, single_cycle.matrix(followed), 1)
+            )
+        rests, slopes = np.transpose(lines, (1, 2, 0))
         return Rule(straight(rests.mean(axis=1), slopes, *_limits(plant, driven)))
     curves = [curve(cycle[u], cycle[y], y) for u, y in zip(driven, followed, strict=True)]
-    return Rule(lambda y: np.array([np.interp(x, *one) for x, one in zip(y, curves, strict=True)]))
+    return Rule(
+        lambda y: np.array([np.interp(x, *knots) for x, knots in zip(y, curves, strict=True)])
+    )
 
 
-def curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
+def curve(command: Array, output: Array, name: str) -> tuple[Array, Array]:
     """Return the monotonic curve of a slow cycle: output, increasing, and command.
 
     Raises
@@ -174,19 +180,21 @@ def curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
     from scipy.optimize import isotonic_regression  # slow to load
 
     order = np.argsort(command, kind="stable")
-    command, moved = command[order], moved[order]
-    falls = np.polynomial.polynomial.polyfit(command, moved, 1)[1] < 0.0
-    smooth = np.asarray(isotonic_regression(moved, increasing=not falls).x)
+    command, output = command[order], output[order]
+    falls = np.polynomial.polynomial.polyfit(command, output, 1)[1] < 0.0
+    smooth = np.asarray(isotonic_regression(output, increasing=not falls).x)
     if falls:
         smooth, command = smooth[::-1], command[::-1]
-    places, of = np.unique(smooth, return_inverse=True)
-    if places.size < 2:
+    outputs, group = np.unique(smooth, return_inverse=True)
+    if outputs.size < 2:
         raise ModelError(
             f"{name} does not move with the command", remedy="check the plant and its limits"
         )
-    at = np.bincount(of, command) / np.bincount(of)  # of a stretch that is flat, its middle
-    knots = np.linspace(places[0], places[-1], KNOTS)
-    return knots, np.interp(knots, places, at)
+    commands = np.bincount(group, command) / np.bincount(
+        group
+    )  # of a stretch that is flat, its middle
+    knots = np.linspace(outputs[0], outputs[-1], KNOTS)
+    return knots, np.interp(knots, outputs, commands)
 
 
 @dataclass(frozen=True)
@@ -208,10 +216,10 @@ class Before:
         """Return a loop's recording with the uncompensated outputs, as ``uncompensated_...``."""
         if self.tracked is None:
             return recording
-        units, without = recording.units, self.tracked.recording
+        units, uncompensated = recording.units, self.tracked.recording
         return recording.with_channels(
             {f"uncompensated_{name}": units[name] for name in self.tracked.rmse},
-            **{f"uncompensated_{name}": without[name] for name in self.tracked.rmse},
+            **{f"uncompensated_{name}": uncompensated[name] for name in self.tracked.rmse},
         )
 
 
@@ -222,10 +230,12 @@ def before(compensator: Block, plant: Plant, reference: Recording, **settings: A
     """
     settings.pop("preview", None)
     reference = asked(plant, reference, compensator)
-    few = {name: settings[name] for name in ("pressure_loop", "seed") if name in settings}
+    cycle_settings = {
+        name: settings[name] for name in ("pressure_loop", "seed") if name in settings
+    }
     try:
-        cycle = slow_cycle(plant, reference, **few)
-        controller = uncompensated(plant, reference, cycle, **few)
+        cycle = slow_cycle(plant, reference, **cycle_settings)
+        controller = uncompensated(plant, reference, cycle, **cycle_settings)
         return Before(track(controller, plant, reference, **settings))
     except MckibbenError as error:
         return Before(None, (f"there is no run without compensation: {error}",))

@@ -67,12 +67,12 @@ class Frame(NamedTuple):
 
 def unpacked(piece: bytes) -> Frame | None:
     """Return the frame of the bytes before a zero, or None where they are none."""
-    parts, at = [], 0
-    while at < len(piece):
-        parts.append(piece[at + 1 : at + piece[at]])
-        at += piece[at]
+    parts, position = [], 0
+    while position < len(piece):
+        parts.append(piece[position + 1 : position + piece[position]])
+        position += piece[position]
     content = b"\0".join(parts)
-    if at != len(piece) or not HEAD.size + CHECK.size <= len(content) <= PAYLOAD:
+    if position != len(piece) or not HEAD.size + CHECK.size <= len(content) <= PAYLOAD:
         return None
     content, check = content[: -CHECK.size], content[-CHECK.size :]
     version, kind, model, sequence = HEAD.unpack_from(content)
@@ -183,8 +183,8 @@ class Link(AbstractContextManager["Link"]):
             self._model, longest = bytes.fromhex(device.fingerprint)[:4], device.silence
             self._kind = np.dtype(device.numbers).newbyteorder("<")
             self._silence = longest if watchdog is None else round(watchdog / device.period)
-            wanted = f"{device.period:g} to {device.period * longest:g} s"
-            require(1 <= self._silence <= longest, "watchdog", watchdog, wanted, DataError)
+            allowed = f"{device.period:g} to {device.period * longest:g} s"
+            require(1 <= self._silence <= longest, "watchdog", watchdog, allowed, DataError)
         except BaseException:
             self._port.close()
             raise
@@ -203,19 +203,19 @@ class Link(AbstractContextManager["Link"]):
 
     def _drive(self, inputs: Inputs, *, lock_step: bool) -> State:
         if lock_step != self._lock_step:
-            right = "step()" if self._lock_step else "set()"
-            raise LinkError(f"lock_step is {self._lock_step}", remedy=f"call {right}")
+            method = "step()" if self._lock_step else "set()"
+            raise LinkError(f"lock_step is {self._lock_step}", remedy=f"call {method}")
         ports, values = self.device.inputs, np.empty(0)
-        names, given = [port.name for port in ports], inputs
+        names, row = [port.name for port in ports], inputs
         with suppress(KeyError, TypeError, ValueError):
             if isinstance(inputs, Mapping) and inputs.keys() <= {*names}:
-                given = [inputs[name] for name in names]
-            values = np.asarray(given, dtype=np.float64).ravel().astype(self._kind)
+                row = [inputs[name] for name in names]
+            values = np.asarray(row, dtype=np.float64).ravel().astype(self._kind)
         if values.size != len(ports):
             remedy = f"give numbers for {', '.join(names)}"
             raise DataError(f"{inputs!r:.100} cannot be set", remedy=remedy)
-        needed = len(ports) - self.device.n_missable
-        for port, value in zip(ports[:needed], values[:needed].tolist(), strict=True):
+        n_required = len(ports) - self.device.n_missable
+        for port, value in zip(ports[:n_required], values[:n_required].tolist(), strict=True):
             if not port.low <= value <= port.high:  # as NaN never is
                 problem = f"{value:g} {port.unit} is beyond {port.low:g} to {port.high:g}"
                 remedy = "stay within, or export the model with other limits"
@@ -235,8 +235,8 @@ class Link(AbstractContextManager["Link"]):
         """Return the steps that were received since the last call, waiting for the first one [s]."""
         until = time.monotonic() + timeout
         self._take(0.0)
-        while not self._samples and (left := until - time.monotonic()) > 0:
-            self._take(left)
+        while not self._samples and (remaining := until - time.monotonic()) > 0:
+            self._take(remaining)
         return [self._samples.popleft() for _ in range(len(self._samples))]
 
     def reset(self) -> State:
@@ -286,18 +286,20 @@ class Link(AbstractContextManager["Link"]):
         """Send a frame until it is answered, and return the answer, without its status."""
         self._sequence = (self._sequence + 1) % WORDS
         packed = Frame(kind, self._model, self._sequence, body).packed()
-        begun, answer, sent = time.monotonic(), None, 0
+        started, answer, sent = time.monotonic(), None, 0
         while answer is None:
-            asked = time.monotonic()
-            if asked - begun >= self._patience:
+            last_sent = time.monotonic()
+            if last_sent - started >= self._patience:
                 problem = f"nothing has answered for {self._patience:g} s"
                 remedy = "check power, port, rate, and other users of it"
                 raise LinkError(problem, parameter="patience", remedy=remedy)
             with working():
                 self._port.write(b"\0" + packed if sent else packed)  # a zero ends noise
             sent += 1
-            while answer is None and (left := asked + self._timeout - time.monotonic()) > 0:
-                answer = self._take(left, kind)
+            while (
+                answer is None and (remaining := last_sent + self._timeout - time.monotonic()) > 0
+            ):
+                answer = self._take(remaining, kind)
         self.statistics.repeated += sent - 1
         if not answer or answer[0] >= len(STATUSES):
             raise unreadable()
@@ -313,17 +315,17 @@ class Link(AbstractContextManager["Link"]):
         with working():
             self._port.timeout = max(timeout, 0.0)
             received = self._port.read(max(self._port.in_waiting, 1))
-        *pieces, begun = (self._begun + received).split(b"\0")
-        self._begun, found = begun[: PAYLOAD + 2], None  # more is no frame
+        *pieces, rest = (self._begun + received).split(b"\0")
+        self._begun, body = rest[: PAYLOAD + 2], None  # more is no frame
         for piece in filter(None, pieces):
             frame = unpacked(piece)
             if frame and kind and frame[::2] == (kind | ANSWER, self._sequence):
-                found = frame.body
+                body = frame.body
             elif frame and frame[:2] == (Kind.SAMPLE | ANSWER, self._model) and self._driving:
                 self._samples.append(self._state(frame.body[1:]))
             else:
                 self.statistics.dropped += 1
-        return found
+        return body
 
     def _state(self, body: bytes) -> State:
         if len(body) < 5:

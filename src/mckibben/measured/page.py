@@ -21,7 +21,7 @@ from mckibben.report import words
 from mckibben.report.builder import Code, Item, Page, Section, Table, Text
 from mckibben.report.results import board_table
 
-SHOWN = 8
+MODELS_SHOWN = 8
 """Models of a section, and the chosen one; the rest are in ``measured.csv``."""
 
 FILES = ["measured.html", "measured.md", "measured.csv"]
@@ -30,7 +30,7 @@ FILES = ["measured.html", "measured.md", "measured.csv"]
 KEYS = ("test", "interval", "chosen", "rank", "gap", "parameters", "seconds", "step")
 """Columns of a section."""
 
-BEST = 1.1
+BOLD_FACTOR = 1.1
 """Times the least error that is set in bold."""
 
 ABOUT = (
@@ -48,23 +48,28 @@ CHOICE = ("set", "chosen", "its test RMSE", "rank", "least test RMSE", "above it
 def page(outcomes: Sequence[Outcome], command: str) -> Page:
     """Return the page of all tasks."""
     sections = []
-    compared = [one for one in outcomes if one.board and one.board.rows]
-    if compared:
-        choices = Table(CHOICE, [_choice(one) for one in compared])
+    with_board = [outcome for outcome in outcomes if outcome.board and outcome.board.rows]
+    if with_board:
+        choices = Table(CHOICE, [_choice(outcome) for outcome in with_board])
         sections.append(Section("choice", "How good the choice is", [choices]))
-    if done := [one for one in compared if not one.left_out]:
-        items: list[Item | None] = [Text([OVERVIEW]), _matrix(done, [one.heading for one in done])]
+    if complete := [outcome for outcome in with_board if not outcome.left_out]:
+        items: list[Item | None] = [
+            Text([OVERVIEW]),
+            _matrix(complete, [outcome.heading for outcome in complete]),
+        ]
         sections.append(Section("all", "All models on all sets", items))
-    for place, name in enumerate(dict.fromkeys(one.set.name for one in outcomes)):
-        own = [one for one in outcomes if one.set.name == name]
-        about = own[0].set.split.about
-        own_items: list[Item | None] = [Text([about])] if about.strip() else []
-        for one in own:
-            if not one.left_out:
-                own_items += _section(one)
-        for task in dict.fromkeys(one.task.name for one in own if one.left_out):
-            own_items += _in_turn([one for one in own if one.left_out and one.task.name == task])
-        sections.append(Section(f"set-{place}", own[0].set.title, own_items))
+    for place, name in enumerate(dict.fromkeys(outcome.set.name for outcome in outcomes)):
+        of_set = [outcome for outcome in outcomes if outcome.set.name == name]
+        about = of_set[0].set.split.about
+        items_of_set: list[Item | None] = [Text([about])] if about.strip() else []
+        for outcome in of_set:
+            if not outcome.left_out:
+                items_of_set += _section(outcome)
+        for task in dict.fromkeys(outcome.task.name for outcome in of_set if outcome.left_out):
+            items_of_set += _in_turn(
+                [outcome for outcome in of_set if outcome.left_out and outcome.task.name == task]
+            )
+        sections.append(Section(f"set-{place}", of_set[0].set.title, items_of_set))
     sections.append(Section("method", "How to repeat", [Code("", command)]))
     return Page("Every model on recordings", ABOUT, sections)
 
@@ -72,25 +77,33 @@ def page(outcomes: Sequence[Outcome], command: str) -> Page:
 def table(outcomes: Iterable[Outcome]) -> pd.DataFrame:
     """Return every row of every task, one under another."""
     frames = {
-        (one.set.name, one.task.name, one.left_out): one.board.to_frame().assign(
-            unit=one.board.unit, range=one.span
+        (outcome.set.name, outcome.task.name, outcome.left_out): outcome.board.to_frame().assign(
+            unit=outcome.board.unit, range=outcome.span
         )
-        for one in outcomes
-        if one.board is not None
+        for outcome in outcomes
+        if outcome.board is not None
     }
     keys = ["set", "task", "left_out"]
     return pd.concat(frames, names=keys).reset_index(keys) if frames else pd.DataFrame()
 
 
-def _choice(one: Outcome) -> list[Any]:
-    board, seconds = one.board, f"{one.seconds:.0f} s"
+def _choice(outcome: Outcome) -> list[Any]:
+    board, seconds = outcome.board, f"{outcome.seconds:.0f} s"
     assert board is not None
     best, lowest = board.best, board.lowest
     if best is None or lowest is None:
-        return [one.label, f"none: {words.chosen(board) or one.failed}", "", "", "", "", seconds]
+        return [
+            outcome.label,
+            f"none: {words.chosen(board) or outcome.failed}",
+            "",
+            "",
+            "",
+            "",
+            seconds,
+        ]
     above = f"{100 * (best.test_error / lowest.test_error - 1):.0f} %"
     return [
-        *(one.label, best.model, _error(best, board), best.test_rank),
+        *(outcome.label, best.model, _error(best, board), best.test_rank),
         *(f"{lowest.model} {_error(lowest, board)}", "–" if lowest is best else above, seconds),
     ]
 
@@ -99,28 +112,34 @@ def _error(row: Row, board: Leaderboard) -> str:
     return f"{numeral(row.test_error, 3)} {board.unit}".strip()
 
 
-def _tested(one: Outcome) -> list[Row]:
-    rows = one.board.rows if one.board else ()
+def _tested(outcome: Outcome) -> list[Row]:
+    rows = outcome.board.rows if outcome.board else ()
     return sorted((row for row in rows if row.test is not None), key=lambda row: row.test_error)
 
 
-def _matrix(done: Sequence[Outcome], headings: Sequence[str]) -> Table:
+def _matrix(outcomes: Sequence[Outcome], headings: Sequence[str]) -> Table:
     """Return a table of models by tasks, those of most tasks and least errors first."""
     errors = pd.DataFrame(
-        [{row.model: 100 * row.test_error / one.span for row in _tested(one)} for one in done]
+        [
+            {row.model: 100 * row.test_error / outcome.span for row in _tested(outcome)}
+            for outcome in outcomes
+        ]
     ).T
     ratios = errors / errors.min().clip(1e-12)
-    places = pd.DataFrame({"tasks": -ratios.count(axis=1), "error": ratios.median(axis=1)})
-    models = [*places.sort_values(["tasks", "error"]).index]
+    order = pd.DataFrame({"tasks": -ratios.count(axis=1), "error": ratios.median(axis=1)})
+    models = [*order.sort_values(["tasks", "error"]).index]
     values = errors.loc[models].to_numpy()
-    chosen = [one.board.best.model if one.board and one.board.best else "" for one in done]
+    chosen = [
+        outcome.board.best.model if outcome.board and outcome.board.best else ""
+        for outcome in outcomes
+    ]
     rows: list[list[str]] = []
     marked: dict[tuple[int, int], str] = {}
     for place, model in enumerate(models):
         row = [model]
         for column, error in enumerate(values[place]):
             row.append("–" if np.isnan(error) else numeral(error, 3) if error < 100 else "> 100")
-            marks = ["least"] * bool(error <= BEST * np.nanmin(values[:, column]))
+            marks = ["least"] * bool(error <= BOLD_FACTOR * np.nanmin(values[:, column]))
             marked[place, column + 1] = " ".join([*marks, *["chosen"] * (model == chosen[column])])
         rows.append(row)
     return Table(["model", *headings], rows, marked=marked)
@@ -129,22 +148,26 @@ def _matrix(done: Sequence[Outcome], headings: Sequence[str]) -> Table:
 def _in_turn(parts: Sequence[Outcome]) -> list[Any]:
     """Return the items of a task that leaves out in turn."""
     items: list[Any] = [Text([parts[0].task.name or "Each left out in turn"], "lead")]
-    done = [one for one in parts if _tested(one)]
-    if done:
+    tested = [one for one in parts if _tested(one)]
+    if tested:
         about = "Test RMSE on what is left out, in per cent of the range of all recordings."
-        items += [Text([about]), _matrix(done, [f"without {one.left_out}" for one in done])]
-    failed = [f"without {o.left_out}: not compared: {o.failed}" for o in parts if o not in done]
+        items += [Text([about]), _matrix(tested, [f"without {one.left_out}" for one in tested])]
+    failed = [
+        f"without {part.left_out}: not compared: {part.failed}"
+        for part in parts
+        if part not in tested
+    ]
     return [*items, Text(failed, listed=True)] if failed else items
 
 
-def _section(one: Outcome) -> list[Any]:
-    items: list[Any] = [Text([one.task.name], "lead")] if one.task.name else []
-    board, tested = one.board, _tested(one)
+def _section(outcome: Outcome) -> list[Any]:
+    items: list[Any] = [Text([outcome.task.name], "lead")] if outcome.task.name else []
+    board, tested = outcome.board, _tested(outcome)
     if board is None or not board.rows:
-        return [*items, Text([f"Not compared: {one.failed}"])]
+        return [*items, Text([f"Not compared: {outcome.failed}"])]
     chosen = board.best.model if board.best else ""
-    shown = [row for k, row in enumerate(tested) if k < SHOWN or row.model == chosen]
-    table = board_table(board, shown, KEYS)
+    rows = [row for k, row in enumerate(tested) if k < MODELS_SHOWN or row.model == chosen]
+    table = board_table(board, rows, KEYS)
     printed = [
         [
             f"{figure.what} (printed)",
@@ -153,12 +176,12 @@ def _section(one: Outcome) -> list[Any]:
                 for name in table.headings[1:]
             ),
         ]
-        for figure in one.task.published
+        for figure in outcome.task.published
     ]
     notes = []
-    if one.notes:  # that of the first file in full
-        more = f" (and {len(one.notes) - 1} more of the kind)" if len(one.notes) > 1 else ""
-        notes = [f"as read: {one.notes[0]}{more}"]
+    if outcome.notes:  # that of the first file in full
+        more = f" (and {len(outcome.notes) - 1} more of the kind)" if len(outcome.notes) > 1 else ""
+        notes = [f"as read: {outcome.notes[0]}{more}"]
     notes += [*words.marks(board), *words.comparison(board)]
     notes += [f"failed: {row.model}: {row.reason}" for row in board.rows if row.reason]
     items += [
@@ -207,17 +230,17 @@ def measure(
     from mckibben.outputs import results_in
     from mckibben.system import workers
 
-    chosen = chosen_in(folder, only)
+    sets = chosen_in(folder, only)
     if out.resolve().is_relative_to(folder.resolve()):
         problem = f"it is inside {folder}, where the next run would read results as recordings"
         raise DataError(problem, file=out, remedy="give a folder elsewhere")
     if jobs != 1:
         workers.prepare()
-    inputs = [one.folder for one in chosen]
+    inputs = [item.folder for item in sets]
     with results_in(out, FILES, inputs=inputs, force=force, kind="measured") as results:
-        every: list[Outcome] = []
-        for one in outcomes(
-            chosen,
+        outcomes_so_far: list[Outcome] = []
+        for item in outcomes(
+            sets,
             models=models,
             seed=seed,
             jobs=jobs,
@@ -225,14 +248,14 @@ def measure(
             folder=out,
             tell=progress,
         ):
-            every.append(one)
+            outcomes_so_far.append(item)
             if found is not None:
-                found(one)
+                found(item)
         if results is not None:
-            whole = page(every, command)
-            results.write_text("measured.html", whole.html())
-            results.write_text("measured.md", whole.markdown())
-            results.write_text("measured.csv", table(every).to_csv(index=False))
+            report = page(outcomes_so_far, command)
+            results.write_text("measured.html", report.html())
+            results.write_text("measured.md", report.markdown())
+            results.write_text("measured.csv", table(outcomes_so_far).to_csv(index=False))
             results.commit()
         Checkpoints(out).clear()
-    return every
+    return outcomes_so_far

@@ -103,21 +103,21 @@ def outcomes(
     tell : callable, optional
         Called with the share of tasks done, and words.
     """
-    listed = [(one, task) for one in sets for task in one.tasks()]
-    read: dict[str, list[Recording]] = {}
-    named = models not in ("all", "quick")
-    for place, (one, task) in enumerate(listed):
-        whose = " ".join(filter(None, [one.name, task.name, *task.leave_out]))
+    tasks = [(data_set, task) for data_set in sets for task in data_set.tasks()]
+    recordings_of: dict[str, list[Recording]] = {}
+    models_named = models not in ("all", "quick")
+    for number, (data_set, task) in enumerate(tasks):
+        label = " ".join(filter(None, [data_set.name, task.name, *task.leave_out]))
 
-        def progress(standing: Standing, place: int = place, whose: str = whose) -> None:
+        def progress(standing: Standing, number: int = number, label: str = label) -> None:
             if tell is not None:
-                tell((place + standing.share) / len(listed), f"{whose}: {standing}")
+                tell((number + standing.share) / len(tasks), f"{label}: {standing}")
 
         started = time.perf_counter()
         try:
-            if one.name not in read:
-                read = {one.name: one.recordings()}  # of one set at a time
-            train, test = parted(task, read[one.name], one.folder)
+            if data_set.name not in recordings_of:
+                recordings_of = {data_set.name: data_set.recordings()}  # of one set at a time
+            train, test = parted(task, recordings_of[data_set.name], data_set.folder)
             board = compare(
                 train,
                 test,
@@ -125,25 +125,29 @@ def outcomes(
                 outputs=task.outputs,
                 load=task.load,
                 models=task.models if models == "all" else models,
-                settings={m: own for m, own in task.settings.items() if not named or m in models},
+                settings={
+                    m: values
+                    for m, values in task.settings.items()
+                    if not models_named or m in models
+                },
                 seed=seed,
                 jobs=jobs,
                 executor=executor,
-                folder=Checkpoints(folder).inside(f"{one.name}-{place}"),
+                folder=Checkpoints(folder).inside(f"{data_set.name}-{number}"),
                 clear=False,
                 progress=progress,
             )
         except MckibbenError as error:
-            if named and not isinstance(error, DataError):
+            if models_named and not isinstance(error, DataError):
                 raise
-            yield Outcome(one, task, None, reason=str(error))
+            yield Outcome(data_set, task, None, reason=str(error))
             continue
         if board.stopped:
             raise KeyboardInterrupt
         span = span_of(task, train, test, board.outputs)
         seconds = time.perf_counter() - started
         notes = tuple(f"{r.name}: {note}" for r in (*train, *test) for note in r.notes)
-        yield Outcome(one, task, board, span, seconds, notes=notes)
+        yield Outcome(data_set, task, board, span, seconds, notes=notes)
 
 
 def span_of(
@@ -151,4 +155,4 @@ def span_of(
 ) -> float:
     """Return the range of what is tested on, the largest of all outputs'; see `Outcome`."""
     tested = test if test and not task.leave_out else [*train, *test]
-    return max(float(np.ptp(np.concatenate([r[y] for r in tested]))) for y in outputs)
+    return max(float(np.ptp(np.concatenate([run[y] for run in tested]))) for y in outputs)

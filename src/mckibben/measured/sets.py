@@ -85,8 +85,10 @@ class Task(_Strict):
 
     def parts(self) -> list[Task]:
         """Return the task, or one for every pattern of a leave-one-out task."""
-        each = [self.model_copy(update={"leave_out": [pattern]}) for pattern in self.leave_out]
-        return each or [self]
+        single_tasks = [
+            self.model_copy(update={"leave_out": [pattern]}) for pattern in self.leave_out
+        ]
+        return single_tasks or [self]
 
 
 class Split(_Strict):
@@ -127,10 +129,10 @@ class Split(_Strict):
         return tasks
 
 
-def split_of(given: dict[str, Any] | None, file: str | Path = NAME) -> Split:
+def split_of(table: dict[str, Any] | None, file: str | Path = NAME) -> Split:
     """Return a table ``split``, checked; without one, a single task with the default split."""
     try:
-        return Split.model_validate(given or {})
+        return Split.model_validate(table or {})
     except ValidationError as error:
         remedy = "correct it; docs/channels.md shows what it can hold"
         raise DataError(f"split.{reason(error)}", file=file, remedy=remedy) from None
@@ -156,14 +158,14 @@ class Set:
 
     def recordings(self) -> list[Recording]:
         """Return all recordings, resampled, each named as its file."""
-        split, found = self.split, list[Recording]()
+        split, runs = self.split, list[Recording]()
         with describing(self.folder, self.description):
             for path in inside(self.folder):
-                for one in read(path, gaps=split.gaps, informative=False):
-                    even = one if split.resample is None else resample(one, split.resample)
-                    periodic = split.period is not None and matches(one.name, split.periodic)
-                    found += _periods(even, split.period or 0) if periodic else [even]
-        return found
+                for run in read(path, gaps=split.gaps, informative=False):
+                    resampled = run if split.resample is None else resample(run, split.resample)
+                    periodic = split.period is not None and matches(run.name, split.periodic)
+                    runs += _periods(resampled, split.period or 0) if periodic else [resampled]
+        return runs
 
     def tasks(self) -> Iterator[Task]:
         """Yield every task; a leave-one-out task is several."""
@@ -178,11 +180,11 @@ def matches(name: str, patterns: Sequence[str]) -> bool:
     return any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
-def _periods(one: Recording, length: int) -> list[Recording]:
-    if len(one) % length:
-        problem = f"{len(one)} samples are not a whole number of periods of {length}"
-        raise DataError(problem, file=one.source, remedy="correct period in [split]")
-    parts = (one.slice(start, start + length) for start in range(0, len(one), length))
+def _periods(run: Recording, length: int) -> list[Recording]:
+    if len(run) % length:
+        problem = f"{len(run)} samples are not a whole number of periods of {length}"
+        raise DataError(problem, file=run.source, remedy="correct period in [split]")
+    parts = (run.slice(start, start + length) for start in range(0, len(run), length))
     return [replace(part, start_time=0.0).with_meta(**{PERIODIC: True}) for part in parts]
 
 
@@ -197,7 +199,9 @@ def sets_in(folder: Path) -> list[Set]:
     if not folder.is_dir():
         remedy = "name a folder of recordings"
         raise DataError("there is no such folder", file=folder, remedy=remedy)
-    places = [one for one in sorted(folder.iterdir()) if one.is_dir() and _has_recordings(one)]
+    places = [
+        place for place in sorted(folder.iterdir()) if place.is_dir() and _has_recordings(place)
+    ]
     if not places and not _has_recordings(folder):
         raise DataError(
             "there are no recordings in it, nor in the folders in it",
@@ -210,21 +214,21 @@ def sets_in(folder: Path) -> list[Set]:
 def chosen_in(folder: Path, only: Sequence[str] = ()) -> list[Set]:
     """Return the sets of a folder with these names; without names all."""
     sets = sets_in(folder)
-    if unknown := sorted({*only} - {one.name for one in sets}):
-        listed = ", ".join(one.name for one in sets)
+    if unknown := sorted({*only} - {data_set.name for data_set in sets}):
+        names = ", ".join(data_set.name for data_set in sets)
         problem = f"there is no set {unknown[0]!r} in it"
-        raise DataError(problem, file=folder, remedy=f"use one of {listed}")
-    return [one for one in sets if not only or one.name in only]
+        raise DataError(problem, file=folder, remedy=f"use one of {names}")
+    return [data_set for data_set in sets if not only or data_set.name in only]
 
 
 def _has_recordings(place: Path) -> bool:
-    every = (place, *place.iterdir())
-    return any(is_bag(one) or one.suffix.casefold() in SOUGHT for one in every)
+    places = (place, *place.iterdir())
+    return any(is_bag(path) or path.suffix.casefold() in SOUGHT for path in places)
 
 
 def _set(place: Path) -> Set:
     files = (place / NAME, KNOWN / f"{place.name}.toml")
-    file = next((one for one in files if one.is_file()), None)
+    file = next((path for path in files if path.is_file()), None)
     content = Folder() if file is None else description(file)
     return Set(place, content, split_of(content.split, file or NAME))
 
@@ -239,7 +243,7 @@ def parted(
     DataError
         If a pattern matches nothing, or a side would be empty.
     """
-    names = sorted({one.name for one in recordings})
+    names = sorted({run.name for run in recordings})
 
     def wrong(problem: str) -> DataError:
         problem += f": the recordings are {', '.join(names)}"
@@ -248,15 +252,15 @@ def parted(
     for pattern in (*task.files, *task.tested):
         if not any(fnmatchcase(name, pattern) for name in names):
             raise wrong(f"no recording is called {pattern}")
-    used = [one for one in recordings if matches(one.name, task.files)]
+    used = [run for run in recordings if matches(run.name, task.files)]
     if task.cut is None:
-        train = [one for one in used if not matches(one.name, task.tested)]
-        test = [one for one in used if matches(one.name, task.tested)]
+        train = [run for run in used if not matches(run.name, task.tested)]
+        test = [run for run in used if matches(run.name, task.tested)]
     else:
-        cuts = [round(task.cut * len(one)) for one in used]
-        train = [one.slice(0, cut) for one, cut in zip(used, cuts, strict=True)]
-        test = [one.slice(cut, len(one)) for one, cut in zip(used, cuts, strict=True)]
-        if any(len(one) < FEWEST_SAMPLES for one in (*train, *test)):
+        cuts = [round(task.cut * len(run)) for run in used]
+        train = [run.slice(0, cut) for run, cut in zip(used, cuts, strict=True)]
+        test = [run.slice(cut, len(run)) for run, cut in zip(used, cuts, strict=True)]
+        if any(len(run) < FEWEST_SAMPLES for run in (*train, *test)):
             raise wrong(f"cutting at {task.cut:g} leaves too little")
     if not train or (task.tested and not test):
         raise wrong(f"no recording is to be {'tested on' if train else 'fitted'}")

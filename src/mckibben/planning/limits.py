@@ -59,51 +59,51 @@ Limits = dict[str, Limit]
 
 def limits_of_rig(rig: Rig) -> Limits:
     """Return a rig's hardware limits, at a rate that crosses its range in 2 s."""
-    found = {}
+    limits = {}
     for name, rest in zip(rig.inputs, rig.resting[0].tolist(), strict=True):
         ends = rig.limits(name)
         rate = (ends.high - ends.low) / CROSSING
         if name == "length":
             rate = min(rate, float(getattr(rig, "drive_speed", rate)))
-        found[name] = Limit(ends.low, ends.high, rate, rest)
-    return found
+        limits[name] = Limit(ends.low, ends.high, rate, rest)
+    return limits
 
 
-def limits_of_recordings(known: Excitation) -> Limits:
+def limits_of_recordings(excitation: Excitation) -> Limits:
     """Return the recorded ranges and rates of inputs and loads; those constant in each run stay so."""
-    found = {}
-    for name in known.driven:
-        low, high = known.ranges[name]
+    limits = {}
+    for name in excitation.driven:
+        low, high = excitation.ranges[name]
         if name.startswith("pressure") and -BELOW_ZERO * high < low < 0.0:
             low = 0.0
-        rest = min(max(float(known.recordings[0][name][0]), low), high)
-        if known.branches.get(name):
-            rate = max(known.speed(name, branch) for branch in known.branches[name])
-            found[name] = Limit(low, high, rate, rest)
+        rest = min(max(float(excitation.recordings[0][name][0]), low), high)
+        if excitation.branches.get(name):
+            rate = max(excitation.speed(name, branch) for branch in excitation.branches[name])
+            limits[name] = Limit(low, high, rate, rest)
         else:
-            found[name] = Limit(rest, rest, 1.0, rest)
-    return found
+            limits[name] = Limit(rest, rest, 1.0, rest)
+    return limits
 
 
-def narrowed(limits: Limits, asked: Mapping[str, Iterable[float | None]]) -> Limits:
+def narrowed(limits: Limits, wanted_limits: Mapping[str, Iterable[float | None]]) -> Limits:
     """Return limits with some replaced: by channel low, high and optionally rate."""
-    found = dict(limits)
-    for name, given in asked.items():
+    result = dict(limits)
+    for name, ends in wanted_limits.items():
         if name not in limits:
             raise DataError(
                 "limits are given for it, and it is not driven",
                 channel=name,
                 remedy=f"give them for {', '.join(limits)}",
             )
-        own, unit = limits[name], standard_unit(name) or ""
-        low, high, rate = (*given, None, None, None)[:3]
-        low = own.low if low is None else low
-        high = own.high if high is None else high
+        limit, unit = limits[name], standard_unit(name) or ""
+        low, high, rate = (*ends, None, None, None)[:3]
+        low = limit.low if low is None else low
+        high = limit.high if high is None else high
         if not (math.isfinite(low) and math.isfinite(high) and low <= high):
             raise DataError(
                 f"the limits {low:g} to {high:g} {unit} are not in order",
                 channel=name,
-                remedy=f"give the lower one first, for instance {name}={own.low:g}:{own.high:g}",
+                remedy=f"give the lower one first, for instance {name}={limit.low:g}:{limit.high:g}",
             )
         if unit == "bar" and not LOWEST <= low <= high <= HIGHEST:
             raise DataError(
@@ -112,15 +112,15 @@ def narrowed(limits: Limits, asked: Mapping[str, Iterable[float | None]]) -> Lim
                 remedy=f"give what your valve and muscle bear, for instance {name}=0:6",
             )
         if rate is None:
-            rate = own.rate if own.span > 0 or high == low else (high - low) / CROSSING
+            rate = limit.rate if limit.span > 0 or high == low else (high - low) / CROSSING
         if not 0 < rate < math.inf:
             raise DataError(
                 f"there is no motion at {rate:g} {unit}/s",
                 channel=name,
-                remedy=f"give a positive rate, for instance {name}={low:g}:{high:g}:{own.rate:.3g}",
+                remedy=f"give a positive rate, for instance {name}={low:g}:{high:g}:{limit.rate:.3g}",
             )
-        found[name] = Limit(low, high, rate, min(max(own.rest, low), high))
-    return found
+        result[name] = Limit(low, high, rate, min(max(limit.rest, low), high))
+    return result
 
 
 def check_possible(limits: Limits, seconds: float, rig: Rig | None) -> None:

@@ -9,16 +9,16 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.planning.limits import Limits
 
-SLOWEST = 10.0
+MOST_SLOWER = 10.0
 """Times longer than at the highest rate that a stroke of random motion takes, at most."""
 
-STROKES = 12.0
+FEWEST_STROKES = 12.0
 """Strokes over the whole range, at the slowest speed, for which there must be time."""
 
-SHARE = 0.3
+MOST_SHARE = 0.3
 """Most of the time that holds take, and that full cycles take."""
 
-HOLD = 10.0
+SHORTEST_HOLD = 10.0
 """Shortest hold [s]."""
 
 CYCLES = 3
@@ -47,50 +47,57 @@ def motion(
         Whether to hold.
     """
     low, high, rest = (
-        np.array([getattr(one, end) for one in limits.values()]) for end in ("low", "high", "rest")
+        np.array([getattr(limit, end) for limit in limits.values()])
+        for end in ("low", "high", "rest")
     )
-    crossing = PEAK * max(one.crossing for one in limits.values())
+    crossing = PEAK * max(limit.crossing for limit in limits.values())
     stops: list[tuple[str, Array, float]] = []  # levels to go to, and how long to stay there
-    if (2 * CYCLES + 1) * crossing <= SHARE * seconds:
+    if (2 * CYCLES + 1) * crossing <= MOST_SHARE * seconds:
         stops += [("repeats", end, 0.0) for end in (low, *(high, low) * CYCLES)]
     for count in (2, 1) if holds else ():
-        stays = SHARE * seconds / count - crossing
-        if stays >= HOLD:
+        stays = MOST_SHARE * seconds / count - crossing
+        if stays >= SHORTEST_HOLD:
             shares = rng.uniform(0.15, 0.85, (count, low.size))
             stops += [("holds", level, stays) for level in low + shares * (high - low)]
             break
     stops.append(("rest", rest, 0.0))
-    ways = [crossing, *(_lasts(limits, a, b) for (_, a, _), (_, b, _) in pairwise(stops))]
-    left = seconds - sum(ways) - sum(stays for *_, stays in stops) - step * len(stops)
-    parts = [("random", _strokes(limits, left, step, rng))]
-    for what, level, stays in stops:
-        here = parts[-1][1][-1]
-        count = max(int(np.ceil(_lasts(limits, here, level) / step)), 1)
+    durations = [crossing, *(_duration(limits, a, b) for (_, a, _), (_, b, _) in pairwise(stops))]
+    random_seconds = (
+        seconds - sum(durations) - sum(stays for *_, stays in stops) - step * len(stops)
+    )
+    parts = [("random", _strokes(limits, random_seconds, step, rng))]
+    for purpose, level, stays in stops:
+        last_level = parts[-1][1][-1]
+        count = max(int(np.ceil(_duration(limits, last_level, level) / step)), 1)
         share = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, count + 1) / count)[:, np.newaxis]
-        stay = np.tile(level, (round(stays / step), 1))
-        parts.append((what, np.concatenate([here + share * (level - here), stay])))
-    idle = round(seconds / step) - sum(len(part) for _, part in parts)
-    return [*parts, ("rest", np.tile(rest, (max(idle, 0), 1)))]
+        hold_rows = np.tile(level, (round(stays / step), 1))
+        parts.append(
+            (purpose, np.concatenate([last_level + share * (level - last_level), hold_rows]))
+        )
+    n_idle = round(seconds / step) - sum(len(part) for _, part in parts)
+    return [*parts, ("rest", np.tile(rest, (max(n_idle, 0), 1)))]
 
 
 def _strokes(limits: Limits, seconds: float, step: float, rng: np.random.Generator) -> Array:
     """Return random levels joined by half cosines of random speeds, each channel independently."""
     columns = []
     for limit in limits.values():
-        slowest = np.clip(seconds / (STROKES * PEAK * max(limit.crossing, step)), 1.0, SLOWEST)
+        slowest = np.clip(
+            seconds / (FEWEST_STROKES * PEAK * max(limit.crossing, step)), 1.0, MOST_SLOWER
+        )
         times, levels = [0.0], [limit.rest]
         while times[-1] < seconds:
             levels.append(float(rng.uniform(limit.low, limit.high)))
-            lasts = PEAK * abs(levels[-1] - levels[-2]) / limit.rate
-            times.append(times[-1] + max(lasts * float(slowest ** rng.uniform()), step))
+            duration = PEAK * abs(levels[-1] - levels[-2]) / limit.rate
+            times.append(times[-1] + max(duration * float(slowest ** rng.uniform()), step))
         time = step * np.arange(round(seconds / step))
-        at = np.searchsorted(times, time, side="right") - 1
-        share = 0.5 - 0.5 * np.cos(np.pi * (time - np.take(times, at)) / np.diff(times)[at])
-        columns.append(np.take(levels, at) + np.diff(levels)[at] * share)
+        stroke = np.searchsorted(times, time, side="right") - 1
+        share = 0.5 - 0.5 * np.cos(np.pi * (time - np.take(times, stroke)) / np.diff(times)[stroke])
+        columns.append(np.take(levels, stroke) + np.diff(levels)[stroke] * share)
     return np.column_stack(columns)
 
 
-def _lasts(limits: Limits, here: Array, there: Array) -> float:
+def _duration(limits: Limits, start: Array, end: Array) -> float:
     """Return the duration of half cosines of all channels from one level to another [s]."""
-    ways = zip(limits.values(), (there - here).tolist(), strict=True)
-    return PEAK * max(abs(way) / limit.rate for limit, way in ways)
+    distances = zip(limits.values(), (end - start).tolist(), strict=True)
+    return PEAK * max(abs(distance) / limit.rate for limit, distance in distances)

@@ -72,8 +72,8 @@ class Plan(Result):
         """Return all but the samples, for JSON."""
         return {
             "seconds": self.recording.duration,
-            "steps": [vars(one) for one in self.steps],
-            "gaps": [one.to_dict() for one in self.gaps],
+            "steps": [vars(part) for part in self.steps],
+            "gaps": [part.to_dict() for part in self.gaps],
             "extrapolated": list(self.extrapolated),
             "start": {name: float(v[0]) for name, v in self.recording.channels.items()},
         }
@@ -115,26 +115,29 @@ def plan(
     require(possible, "minutes", minutes, f"3, or up to {MOST_MINUTES:g}", DataError)
     generator(seed)  # raises an error for an invalid seed
     plant = rig if isinstance(rig, Rig) or rig is None else load_rig(rig)
-    own = {} if plant is None else limits_of_rig(plant)
+    limits_of_channels = {} if plant is None else limits_of_rig(plant)
     recorded_limits: Limits = {}
     gaps: tuple[Gap, ...] = ()
     holds = True
     step = 0.0 if plant is None else plant.sample_time
     if recorded:
-        known = _known(recorded, plant)
-        gaps, recorded_limits = gaps_of(known), limits_of_recordings(known)
-        own, holds = recorded_limits | own, any(gap.run == "holds" for gap in gaps)
-        step = max(step, min(one.sample_time or math.inf for one in recorded))
-    within = narrowed(own, limits or {})
-    check_possible(within, seconds, plant)
-    parts = motion(within, seconds, step, holds, np.random.default_rng(seed))
+        excitation_of = _excitation_of(recorded, plant)
+        gaps, recorded_limits = gaps_of(excitation_of), limits_of_recordings(excitation_of)
+        limits_of_channels, holds = (
+            recorded_limits | limits_of_channels,
+            any(gap.run == "holds" for gap in gaps),
+        )
+        step = max(step, min(recording.sample_time or math.inf for recording in recorded))
+    allowed = narrowed(limits_of_channels, limits or {})
+    check_possible(allowed, seconds, plant)
+    parts = motion(allowed, seconds, step, holds, np.random.default_rng(seed))
     commands = np.concatenate([part for _, part in parts])
-    planned = Recording(dict(zip(within, commands.T, strict=True)), step)
+    commands_recording = Recording(dict(zip(allowed, commands.T, strict=True)), step)
     return Plan(
-        planned if plant is None else planned.select(plant.inputs),
+        commands_recording if plant is None else commands_recording.select(plant.inputs),
         _steps(parts, step, gaps),
         gaps,
-        tuple(name for name, limit in within.items() if limit.beyond(recorded_limits.get(name))),
+        tuple(name for name, limit in allowed.items() if limit.beyond(recorded_limits.get(name))),
     )
 
 
@@ -142,17 +145,17 @@ def _steps(
     parts: Sequence[tuple[str, Array]], step: float, gaps: Sequence[Gap]
 ) -> tuple[Step, ...]:
     """Return the purpose and the times of each part."""
-    found, start = [], 0.0
-    for what, group in groupby(parts, key=lambda part: part[0]):
+    steps, start = [], 0.0
+    for purpose, group in groupby(parts, key=lambda part: part[0]):
         stop = start + step * sum(len(commands) for _, commands in group)
-        runs = ("random", "speeds") if what == "random" else (what,)
+        runs = ("random", "speeds") if purpose == "random" else (purpose,)
         closed = tuple(gap.what for gap in gaps if gap.run in runs)
-        found.append(Step(round(start, 9), round(stop, 9), what, closed))
+        steps.append(Step(round(start, 9), round(stop, 9), purpose, closed))
         start = stop
-    return tuple(found)
+    return tuple(steps)
 
 
-def _known(recordings: list[Recording], rig: Rig | None) -> Excitation:
+def _excitation_of(recordings: list[Recording], rig: Rig | None) -> Excitation:
     """Return the excitation of recordings."""
     for recording in recordings:
         sample_time_of(recording, "be planned from")

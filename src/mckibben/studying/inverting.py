@@ -218,44 +218,44 @@ def build_compensator(block: Block, sample_time: float | None = None) -> Block:
 def _check(
     name: str, block: Block, inverse: Block, space: RecordedInputs, pace: float, seed: int
 ) -> InverseCheck:
-    driven = space.motion(pace, seed)
+    random_motion = space.motion(pace, seed)
     outputs = [channel.name for channel in block.outputs]
-    given = [channel.name for channel in inverse.outputs]
+    input_names = [channel.name for channel in inverse.outputs]
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore", ModelWarning)
-        wanted = block.simulate(driven)
-        asked = wanted.select([channel.name for channel in inverse.inputs])
-        commands, kept = inverse.simulate(asked), _first_clipped(inverse, asked)
-        again = driven.with_channels(**{name: commands[name] for name in given})
-        found = block.simulate(again).matrix(outputs)
-    reference = wanted.matrix(outputs)
+        desired = block.simulate(random_motion)
+        references = desired.select([channel.name for channel in inverse.inputs])
+        commands, clipped_at = inverse.simulate(references), _first_clipped(inverse, references)
+        commanded = random_motion.with_channels(**{name: commands[name] for name in input_names})
+        output = block.simulate(commanded).matrix(outputs)
+    reference = desired.matrix(outputs)
     step, dead = space.sample_time, block.dead_time + inverse.dead_time
-    late = 0 if step is None else round(dead / step)
+    lag = 0 if step is None else round(dead / step)
     span = np.maximum(np.ptp(reference, axis=0), np.finfo(float).tiny)
-    missed = np.abs(found[late:] - reference[: len(reference) - late]) / span
+    missed = np.abs(output[lag:] - reference[: len(reference) - lag]) / span
     return InverseCheck(
         model=name,
         inverse=inverse,
         reference=reference,
-        pressure=commands.matrix(given),
-        output=found,
-        time=driven.time,
+        pressure=commands.matrix(input_names),
+        output=output,
+        time=random_motion.time,
         timed=space.sample_time is not None,
-        error=float(missed[: max(kept - late, 0)].max(initial=0.0)),
+        error=float(missed[: max(clipped_at - lag, 0)].max(initial=0.0)),
         error_afterwards=float(missed.max()),
     )
 
 
-def _first_clipped(inverse: Block, asked: Recording) -> int:
+def _first_clipped(inverse: Block, references: Recording) -> int:
     """Return the first sample of a motion at which a compensator clips; all if it never does."""
-    if not inverse.n_clipped(inverse.final_state(asked)):
-        return len(asked)
-    stream = inverse.stream(asked.sample_time, initial=inverse.start_on(asked).tolist())
-    for place, row in enumerate(asked.matrix([channel.name for channel in inverse.inputs])):
+    if not inverse.n_clipped(inverse.final_state(references)):
+        return len(references)
+    stream = inverse.stream(references.sample_time, initial=inverse.start_on(references).tolist())
+    for sample, row in enumerate(references.matrix([channel.name for channel in inverse.inputs])):
         stream.step(row)
         if stream.status & Stream.CLIPPED:
-            return place
-    return len(asked)
+            return sample
+    return len(references)
 
 
 def _refuse_unrecorded(inverse: Block, split: Split) -> None:
@@ -292,18 +292,18 @@ Map = Callable[[Array], Array]
 
 def static_error(split: Split, inputs: Sequence[str], outputs: Sequence[str]) -> float:
     """Return the error on the test of a static map of the inputs, mean RMSE over outputs."""
-    every = [one.with_derived((*inputs, *outputs)) for one in (*split.train, *split.test)]
-    known = [name for name in inputs if all(name in one for one in every)]
-    train = [run_of(one, known, outputs) for one in split.train]
+    recordings = [run.with_derived((*inputs, *outputs)) for run in (*split.train, *split.test)]
+    names = [name for name in inputs if all(name in run for run in recordings)]
+    train = [run_of(run, names, outputs) for run in split.train]
     pairs = zip(split.test, split.test_rows, strict=True)
-    test = [run_of(one, known, outputs, counts=rows) for one, rows in pairs]
-    given = [run.driven[run.counts] for run in train]
-    found = static_map(given, [run.outputs[run.counts] for run in train])
-    errors = np.concatenate([(found(run.driven) - run.outputs)[run.counts] for run in test])
+    test = [run_of(run, names, outputs, counts=rows) for run, rows in pairs]
+    train_inputs = [run.driven[run.counts] for run in train]
+    predict = static_map(train_inputs, [run.outputs[run.counts] for run in train])
+    errors = np.concatenate([(predict(run.driven) - run.outputs)[run.counts] for run in test])
     return float(np.sqrt((errors**2).mean(axis=0)).mean())
 
 
-def static_map(given: Sequence[Array], wanted: Sequence[Array]) -> Map:
+def static_map(inputs: Sequence[Array], outputs: Sequence[Array]) -> Map:
     """Return a polynomial fitted to recordings by least squares.
 
     Its degree is that of the smallest error on recordings left out in turn; of one or two recordings,
@@ -311,39 +311,41 @@ def static_map(given: Sequence[Array], wanted: Sequence[Array]) -> Map:
 
     Parameters
     ----------
-    given, wanted : sequence of array, shapes (m, n) and (m, k)
+    inputs, outputs : sequence of array, shapes (m, n) and (m, k)
         Of every recording. Values beyond these count as the nearest one.
     """
-    if len(given) < FEWEST_PARTS:
-        given, wanted = (
-            [part for one in tables for part in np.array_split(one, FEWEST_PARTS)]
-            for tables in (given, wanted)
+    if len(inputs) < FEWEST_PARTS:
+        inputs, outputs = (
+            [part for table in tables for part in np.array_split(table, FEWEST_PARTS)]
+            for tables in (inputs, outputs)
         )
-    n = given[0].shape[1]
-    every = np.concatenate(given)
-    low, high = every.min(axis=0), every.max(axis=0)
-    possible = [d for d in range(1, LARGEST_DEGREE + 1) if d == 1 or comb(n + d, d) <= MOST_TERMS]
-    chosen, least = _constant(wanted), np.inf
-    for degree in possible:
+    n = inputs[0].shape[1]
+    all_inputs = np.concatenate(inputs)
+    low, high = all_inputs.min(axis=0), all_inputs.max(axis=0)
+    degrees = [d for d in range(1, LARGEST_DEGREE + 1) if d == 1 or comb(n + d, d) <= MOST_TERMS]
+    best_map, least = _constant(outputs), np.inf
+    for degree in degrees:
         terms = _polynomial(low, high, degree)
-        tables = [np.hstack([terms(part), y]) for part, y in zip(given, wanted, strict=True)]
-        width = tables[0].shape[1] - wanted[0].shape[1]
+        tables = [np.hstack([terms(part), y]) for part, y in zip(inputs, outputs, strict=True)]
+        width = tables[0].shape[1] - outputs[0].shape[1]
         products = np.array([table.T @ table for table in tables])
-        others = sums_of_others(products, np.arange(len(tables)))
-        missed = float(squared_errors(products, solve_products(others, width, RIDGE)).sum())
-        if missed < least:
-            least = missed
-            whole = solve_products(products.sum(axis=0, keepdims=True), width, RIDGE)[0]
-            chosen = _weighted(terms, whole)
-    return chosen
+        products_of_others = sums_of_others(products, np.arange(len(tables)))
+        error = float(
+            squared_errors(products, solve_products(products_of_others, width, RIDGE)).sum()
+        )
+        if error < least:
+            least = error
+            weights = solve_products(products.sum(axis=0, keepdims=True), width, RIDGE)[0]
+            best_map = _weighted(terms, weights)
+    return best_map
 
 
 def _weighted(terms: Map, weights: Array) -> Map:
     return lambda values: terms(values) @ weights
 
 
-def _constant(wanted: Sequence[Array]) -> Map:
-    mean = np.concatenate(wanted).mean(axis=0)
+def _constant(outputs: Sequence[Array]) -> Map:
+    mean = np.concatenate(outputs).mean(axis=0)
     return lambda values: np.tile(mean, (len(values), 1))
 
 

@@ -149,17 +149,19 @@ class RecordedInputs:
         step = block.sample_time or seconds / (2 * SAMPLES_PER_RANGE)
         n = max(round(seconds / step), 4)
         share = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(CYCLES * n + 1) / n)
-        others = {name: np.full(share.size, value) for name, value in held.items()}
+        other_channels = {name: np.full(share.size, value) for name, value in held.items()}
         units = {channel.name: channel.unit for channel in block.inputs}
         names = [channel.name for channel in block.outputs]
         ends = []
         for direction, low, high in zip(np.eye(len(self.names)), *self.extent, strict=True):
             inputs = self._inputs(np.outer(low + share * (high - low), direction))
-            run = Recording(dict(zip(self.names, inputs.T, strict=True)) | others, step, units)
-            given = block.simulate(run).matrix(names)[-n:]
-            ends += [given.min(axis=0), given.max(axis=0)]
-        found = zip(np.min(ends, axis=0).tolist(), np.max(ends, axis=0).tolist(), strict=True)
-        return dict(zip(names, found, strict=True))
+            run = Recording(
+                dict(zip(self.names, inputs.T, strict=True)) | other_channels, step, units
+            )
+            outputs = block.simulate(run).matrix(names)[-n:]
+            ends += [outputs.min(axis=0), outputs.max(axis=0)]
+        ranges = zip(np.min(ends, axis=0).tolist(), np.max(ends, axis=0).tolist(), strict=True)
+        return dict(zip(names, ranges, strict=True))
 
     def outside(self, inputs: Array) -> float:
         """Return the share of some inputs, shape (k, n), that are not as the recorded ones."""
@@ -198,11 +200,11 @@ def beyond_known(model: Block, recording: Recording) -> list[str]:
     """
     if model.inverts and balance_in(model) is None:
         return []
-    known, notes = known_ranges(model.inputs, model.known_inputs), []
+    ranges, notes = known_ranges(model.inputs, model.known_inputs), []
     for channel in model.inputs:
-        if channel.name not in known or channel.name not in recording:
+        if channel.name not in ranges or channel.name not in recording:
             continue
-        values, (low, high) = recording[channel.name], known[channel.name]
+        values, (low, high) = recording[channel.name], ranges[channel.name]
         reach = MARGIN * (high - low)
         if values.min() < low - reach or values.max() > high + reach:
             ends = " to ".join(numeral(float(end), 3) for end in (values.min(), values.max()))

@@ -65,33 +65,33 @@ class Fit(Simulates, Result):
         """Return the parameters as a data frame: name, value, standard error and unit."""
         import pandas as pd
 
-        about = self.to_dict()
+        numbers = self.to_dict()
         columns = {
-            "parameter": about["parameter_names"],
-            "value": about["parameters"],
-            "standard_error": about["standard_errors"],
-            "unit": about["parameter_units"],
+            "parameter": numbers["parameter_names"],
+            "value": numbers["parameters"],
+            "standard_error": numbers["standard_errors"],
+            "unit": numbers["parameter_units"],
         }
         return pd.DataFrame(columns)
 
     def to_dict(self) -> dict[str, Any]:
         """Return errors and parameters, for JSON."""
-        found, model = self.estimator.diagnostics_, self.estimator.model_
+        diagnostics, model = self.estimator.diagnostics_, self.estimator.model_
         numbers = quantities(model)
         names = [channel.name for channel in model.outputs]
         copied = ("rmse", "rmse_from_rest", "n_samples", "n_evaluations", "seconds")
         return {
             "model": self.name,
             "file": plain(self.file),
-            "n_parameters": found.n_free,
-            **{name: getattr(found, name) for name in copied},
-            "rmse_by_output": dict(zip(names, found.rmse_by_output, strict=True)),
-            "condition": found.condition,
+            "n_parameters": diagnostics.n_free,
+            **{name: getattr(diagnostics, name) for name in copied},
+            "rmse_by_output": dict(zip(names, diagnostics.rmse_by_output, strict=True)),
+            "condition": diagnostics.condition,
             "parameters": model.pack().tolist(),
-            "parameter_names": [one.name for one in numbers],
-            "parameter_units": [one.unit for one in numbers],
-            "standard_errors": list(found.standard_errors),
-            "at_bounds": list(found.at_bounds),
+            "parameter_names": [number.name for number in numbers],
+            "parameter_units": [number.unit for number in numbers],
+            "standard_errors": list(diagnostics.standard_errors),
+            "at_bounds": list(diagnostics.at_bounds),
             "undetermined": [numbers[place].name for place in self.estimator.undetermined()],
             "notes": list(self.notes),
             **({} if self.price is None else self.price._asdict()),
@@ -149,8 +149,8 @@ class Tracking(Result):
     @property
     def loops(self) -> dict[str, Tracked]:
         """The loop of the controller, and that without compensation, if there is one."""
-        ways = {self.law: self.tracked, "no compensation": self.uncompensated.tracked}
-        return {way: one for way, one in ways.items() if one is not None}
+        loops = {self.law: self.tracked, "no compensation": self.uncompensated.tracked}
+        return {law: loop for law, loop in loops.items() if loop is not None}
 
     @property
     def recording(self) -> Recording:
@@ -162,32 +162,32 @@ class Tracking(Result):
         import pandas as pd
 
         rows = [
-            {"controller": way, "output": name, "rmse": rmse, "largest": one.largest[name]}
-            for way, one in self.loops.items()
-            for name, rmse in one.rmse.items()
+            {"controller": law, "output": name, "rmse": rmse, "largest": loop.largest[name]}
+            for law, loop in self.loops.items()
+            for name, rmse in loop.rmse.items()
         ]
         return pd.DataFrame(rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the errors, for JSON."""
-        found, without = self.tracked, self.uncompensated.tracked
+        diagnostics, uncompensated = self.tracked, self.uncompensated.tracked
         return {
             "controller": self.law,
             "plant": {"name": self.plant.name, "kind": self.plant_kind},
             "flatters_feedback": self.flatters_feedback,
-            **_errors(found),
+            **_errors(diagnostics),
             "learned": plain(self.learned),
-            "out_of_reach": {name: far._asdict() for name, far in found.beyond.items()},
-            "uncompensated": None if without is None else _errors(without),
-            "step_time": dict(zip(("median", "p99.9"), found.step_time, strict=True)),
+            "out_of_reach": {name: far._asdict() for name, far in diagnostics.beyond.items()},
+            "uncompensated": None if uncompensated is None else _errors(uncompensated),
+            "step_time": dict(zip(("median", "p99.9"), diagnostics.step_time, strict=True)),
             "file": plain(self.file),
             "controller_file": plain(self.controller_file),
             "notes": list(self.notes),
         }
 
 
-def _errors(found: Tracked) -> dict[str, Any]:
-    return {"rmse": dict(found.rmse), "largest": dict(found.largest), "clipped": found.clipped}
+def _errors(loop: Tracked) -> dict[str, Any]:
+    return {"rmse": dict(loop.rmse), "largest": dict(loop.largest), "clipped": loop.clipped}
 
 
 @dataclass(frozen=True, repr=False)

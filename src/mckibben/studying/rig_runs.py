@@ -26,9 +26,9 @@ def catalogue() -> dict[str, Any]:
     rigs = {name: load_rig(name) for name in rig_names()}
     plans = {name: protocol(name) for name in registry.names("protocols")}
     signals = {name: settings_of(name) for name in registry.names("signals")}
-    named = ("title", "version", "inputs", "outputs")
+    fields = ("title", "version", "inputs", "outputs")
     return {
-        "rigs": {name: {key: getattr(rig, key) for key in named} for name, rig in rigs.items()},
+        "rigs": {name: {key: getattr(rig, key) for key in fields} for name, rig in rigs.items()},
         "protocols": {
             name: {"rig": plan.rig, "runs": len(plan.runs), "source": plan.source}
             for name, plan in plans.items()
@@ -68,39 +68,45 @@ def commands(
     time = np.arange(round(duration * rate) + 1) / rate
     channels = {}
     for item in signals:
-        head, _, tail = item.partition(":")
-        channel, equals, kind = head.rpartition("=")
-        channel = channel if equals else rig.inputs[0]
-        if channel not in rig.inputs:
-            raise DataError(
-                f"the rig {rig.name!r} has no input {channel!r}",
-                parameter="signal",
-                remedy=f"use one of {', '.join(rig.inputs)}",
-            )
-        settings: dict[str, Any] = {}
-        for pair in filter(None, tail.split(",")):
-            key, equals, value = pair.partition("=")
-            if not (key and equals and value):
-                raise DataError(
-                    f"{pair!r} is not of the form SETTING=VALUE",
-                    parameter="signal",
-                    remedy="write for instance triangle:period=10,high=5.5",
-                )
-            settings[key.replace("-", "_")] = value
-        known, limits = settings_of(kind), rig.limits(channel)
-        usual = {"low": limits.low, "high": limits.high, "peaks": limits.high, "seed": seed}
-        settings = {key: usual[key] for key in known if key in usual} | settings
-        channels[channel] = build(kind, time, **settings)
+        channel, kind, settings = _signal_of(item, rig)
+        limits = rig.limits(channel)
+        defaults = {"low": limits.low, "high": limits.high, "peaks": limits.high, "seed": seed}
+        taken = {key: defaults[key] for key in settings_of(kind) if key in defaults}
+        channels[channel] = build(kind, time, **taken | settings)
     return Recording(channels, 1 / rate)
 
 
-def at_first_commands(rig: Rig, given: Recording) -> Rig:
+def _signal_of(text: str, rig: Rig) -> tuple[str, str, dict[str, Any]]:
+    """Return channel, kind and settings of a signal, such as ``pressure=triangle:period=10,high=5``."""
+    head, _, tail = text.partition(":")
+    channel, equals, kind = head.rpartition("=")
+    channel = channel if equals else rig.inputs[0]
+    if channel not in rig.inputs:
+        raise DataError(
+            f"the rig {rig.name!r} has no input {channel!r}",
+            parameter="signal",
+            remedy=f"use one of {', '.join(rig.inputs)}",
+        )
+    settings: dict[str, Any] = {}
+    for pair in filter(None, tail.split(",")):
+        key, equals, value = pair.partition("=")
+        if not (key and equals and value):
+            raise DataError(
+                f"{pair!r} is not of the form SETTING=VALUE",
+                parameter="signal",
+                remedy="write for instance triangle:period=10,high=5.5",
+            )
+        settings[key.replace("-", "_")] = value
+    return channel, kind, settings
+
+
+def at_first_commands(rig: Rig, commands: Recording) -> Rig:
     """Return a rig at rest at the first commands, unless it has its own start."""
     if rig.start:
         return rig
-    limits = {name: rig.limits(name) for name in rig.inputs if name in given}
+    limits = {name: rig.limits(name) for name in rig.inputs if name in commands}
     starts = {
-        f"start.{name}": min(max(float(given[name][0]), limit.low), limit.high)
+        f"start.{name}": min(max(float(commands[name][0]), limit.low), limit.high)
         for name, limit in limits.items()
     }
     return rig.changed(starts)
@@ -136,32 +142,43 @@ def record_protocol(
 
     plant = load_rig(rig or protocol(name).rig).changed(changes or {})
     plan = protocol(name, plant)
-    runs = [run.name for run in plan.runs if only is None or only in run.name]
-    if not runs:
-        listed = ", ".join(run.name for run in plan.runs[:5])
-        problem = f"no run of {name!r} has {only!r} in its name"
-        raise DataError(problem, parameter="only", remedy=f"there are {listed}, ...")
-    text, place = to_json(_roles(plan, plant, seed)) + "\n", folder / "protocol.json"
-    if os.path.lexists(place) and ordinary.read_text(place, most=ordinary.DESCRIPTION) != text:
-        raise DataError(
-            "the folder holds another protocol, rig or seed",
-            file=place,
-            remedy="give another folder, or remove this one",
-        )
+    runs = _runs_named(plan, only)
+    text, protocol_file = to_json(_roles(plan, plant, seed)) + "\n", folder / "protocol.json"
+    _require_same_protocol(protocol_file, text)
     files = {run: folder / f"{run}.csv" for run in runs}
-    there = [run for run, file in files.items() if is_own(file)]
+    earlier = [run for run, file in files.items() if is_own(file)]
     with written(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    wanted = [run for run in runs if run not in there]
-    for run in wanted:
+    missing = [run for run in runs if run not in earlier]
+    for run in missing:
         claim(files[run], inputs=[Path(rig or "")], force=force)
-    write_text(place, text)
-    recorded = record(plan, plant, runs=wanted, seed=seed, jobs=jobs)
-    for done, (made, recording) in enumerate(recorded, start=1):
-        write(recording, files[made.name])
+    write_text(protocol_file, text)
+    recorded = record(plan, plant, runs=missing, seed=seed, jobs=jobs)
+    for count, (planned, recording) in enumerate(recorded, start=1):
+        write(recording, files[planned.name])
         if progress is not None:
-            progress(done / len(wanted), made.name)
-    return wanted, there, scaling(name, plant)
+            progress(count / len(missing), planned.name)
+    return missing, earlier, scaling(name, plant)
+
+
+def _runs_named(plan: Protocol, only: str | None) -> list[str]:
+    """Return the runs of a protocol with a text in their name; all where there is no text."""
+    runs = [run.name for run in plan.runs if only is None or only in run.name]
+    if not runs:
+        examples = ", ".join(run.name for run in plan.runs[:5])
+        problem = f"no run of {plan.name!r} has {only!r} in its name"
+        raise DataError(problem, parameter="only", remedy=f"there are {examples}, ...")
+    return runs
+
+
+def _require_same_protocol(file: Path, text: str) -> None:
+    """Raise an error if a folder has the description of another protocol, rig or seed."""
+    if os.path.lexists(file) and ordinary.read_text(file, most=ordinary.DESCRIPTION) != text:
+        raise DataError(
+            "the folder holds another protocol, rig or seed",
+            file=file,
+            remedy="give another folder, or remove this one",
+        )
 
 
 def _roles(plan: Protocol, rig: Rig, seed: int) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from mckibben.arrays import Array
-from mckibben.blocks.bands import Banded
+from mckibben.blocks.bands import Band, Banded
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.diagnosis.bands import outside
@@ -52,33 +52,40 @@ def simulated(
         runs = read(inputs)
     recording = only(runs)
     modelled = (banded or block).simulate(recording, initial=initial)
-    notes = beyond_known(block, recording)
-    beyond: tuple[tuple[Channel, float, Array, tuple[float, float]], ...] = ()
-    if banded is not None:
-        known = {one.name: one for one in (*banded.band.driving, *banded.band.given)}
-        ranges = dict(zip(known, zip(*banded.band.ends, strict=True), strict=True))
-        beyond = tuple(
-            (known[name], share, modelled[name], ranges[name])
-            for name, share in outside(banded.band, modelled.matrix(known)).items()
-        )
-    found, metrics = recording.select(inputs), {}
+    result, metrics = recording.select(inputs), {}
     for channel in block.outputs:
         name = channel.name
         added = {f"{name}_model": modelled[name]}
         if banded is not None:
             added |= {f"{name}_{end}": modelled[f"{name}_{end}"] for end in ("lower", "upper")}
-        found = found.with_channels(dict.fromkeys(added, channel.unit), **added)
+        result = result.with_channels(dict.fromkeys(added, channel.unit), **added)
         if name in recording and name not in inputs:
             measured = recording[name]
-            found = found.with_channels({name: recording.units[name]}, **{name: measured})
+            result = result.with_channels({name: recording.units[name]}, **{name: measured})
             metrics[name] = asdict(score(measured, modelled[name]))
             if banded is not None:
-                lower, upper = added[f"{name}_lower"], added[f"{name}_upper"]
-                metrics[name]["coverage"] = float(
-                    ((lower <= measured) & (measured <= upper)).mean()
-                )
-                metrics[name]["band_width"] = float((upper - lower).mean())
-    return Simulation(found, metrics, interval, tuple(notes), beyond)
+                limits = added[f"{name}_lower"], added[f"{name}_upper"]
+                metrics[name] |= _coverage(measured, *limits)
+    beyond = () if banded is None else _beyond_calibration(banded.band, modelled)
+    return Simulation(result, metrics, interval, tuple(beyond_known(block, recording)), beyond)
+
+
+def _coverage(measured: Array, lower: Array, upper: Array) -> dict[str, float]:
+    """Return the share of measured samples in a band, and its mean width."""
+    inside = (lower <= measured) & (measured <= upper)
+    return {"coverage": float(inside.mean()), "band_width": float((upper - lower).mean())}
+
+
+def _beyond_calibration(
+    band: Band, modelled: Recording
+) -> tuple[tuple[Channel, float, Array, tuple[float, float]], ...]:
+    """Return the channels beyond the range of a calibration: share of samples, samples and range."""
+    channels = {channel.name: channel for channel in (*band.driving, *band.given)}
+    ranges = dict(zip(channels, zip(*band.ends, strict=True), strict=True))
+    return tuple(
+        (channels[name], share, modelled[name], ranges[name])
+        for name, share in outside(band, modelled.matrix(channels)).items()
+    )
 
 
 def _with_band(block: Block, interval: float | None) -> tuple[Any, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
@@ -18,7 +18,7 @@ from mckibben.blocks.runs import FreeRun
 from mckibben.channels import Channels, moved_by
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.planning import Plan, plan_of
-from mckibben.comparison.ranking import Standing, ranked
+from mckibben.comparison.ranking import Standing, rankings_of
 from mckibben.control import UNCOMPENSATED, Tracked, before, control_law, track, tune_pid
 from mckibben.diagnosis import Characterization, characterize
 from mckibben.diagnosis.check import Validation, check_runs, check_usable
@@ -34,7 +34,6 @@ from mckibben.simulation import Simulates
 from mckibben.splits import Split
 from mckibben.studying.inverting import Compensation, compensation
 from mckibben.system.atomic import plain
-from mckibben.system.progress import telling
 from mckibben.system.showing import Result
 
 
@@ -135,7 +134,7 @@ def study(
     folder: str | Path | None = None,
     progress: bool | Callable[[Standing], None] | None = None,
     found: Callable[[Study], None] | None = None,
-    **given: Any,
+    **keywords: Any,
 ) -> Study:
     """Characterize recordings, choose a model by cross-validation, test it, and invert it if possible.
 
@@ -162,33 +161,25 @@ def study(
     DataError
         On recordings that cannot be used.
     """
-    chosen = given_options(StudyOptions, options, given)
-    recordings, tests, seed = listed(train), listed(test), chosen.seed
-    reviewed = None
-    if chosen.model is not None or chosen.compensator is not None:
-        # the review must not see the test data when it refits
-        ran: Any = {"model": chosen.model, "compensator": chosen.compensator}
-        reviewed = review(recordings, seed=seed, **ran)
-        if chosen.input is None:
-            recordings, channels = [_driven(one) for one in recordings], None
-    plan = plan_of(recordings, tests, chosen, validation=validation, channels=channels)
-    if chosen.rig is not None and plan.data.channels.single:
+    options = given_options(StudyOptions, options, keywords)
+    recordings, tests, seed = listed(train), listed(test), options.seed
+    log_review = _review_of(recordings, options)
+    if log_review is not None and options.input is None:
+        recordings = [_with_commands_as_pressures(recording) for recording in recordings]
+        channels = None
+    plan = plan_of(recordings, tests, options, validation=validation, channels=channels)
+    if options.rig is not None and plan.data.channels.single:
         raise DataError(
             "loops are closed on a rig with recordings of several muscles, or under a load",
             remedy="leave `rig` out, or use `track()`",
         )
-    rig = None if chosen.rig is None else load_rig(chosen.rig)
-    report = found if found is not None else _ignored
+    rig = None if options.rig is None else load_rig(options.rig)
+    report = found if found is not None else _no_report
 
-    so_far = replace(_characterized(plan, recordings, tests), load=chosen.load, review=reviewed)
+    so_far = replace(_characterized(plan, recordings, tests), load=options.load, review=log_review)
     report(so_far)
     try:
-        with (
-            telling(progress, "studying", lines=True) as tell,
-            closing(
-                ranked(plan, jobs=chosen.jobs, executor=executor, folder=folder, progress=tell)
-            ) as rankings,
-        ):
+        with rankings_of(plan, "studying", options.jobs, executor, folder, progress) as rankings:
             for ranking in rankings:
                 so_far = replace(so_far, leaderboard=ranking.board, predictions=ranking.outputs)
                 if ranking.board.pending:
@@ -207,7 +198,18 @@ def study(
     return so_far
 
 
-def _ignored(so_far: Study) -> None:
+def _review_of(recordings: Sequence[Recording], options: StudyOptions) -> Review | None:
+    """Return the review of recordings as logs of a loop; None without its model or compensator.
+
+    It does not see the test data, as it refits.
+    """
+    if options.model is None and options.compensator is None:
+        return None
+    blocks: Any = {"model": options.model, "compensator": options.compensator}
+    return review(recordings, seed=options.seed, **blocks)
+
+
+def _no_report(so_far: Study) -> None:
     """Take a study so far where nobody asks for it."""
     del so_far
 
@@ -260,17 +262,17 @@ def _looped_on_rig(
         if plant is None:
             return inverted
         loops = closed_loops(inverted.leaderboard, chosen, plant, inverted.test, seed)
-        return replace(inverted, loops=loops, plant=named(plant))
+        return replace(inverted, loops=loops, plant=rig_title(plant))
     except DataError as error:
         return replace(inverted, not_looped=str(error))
 
 
-def _driven(log: Recording) -> Recording:
+def _with_commands_as_pressures(log: Recording) -> Recording:
     """Return a log with its commands as pressures, if these were not measured."""
     names = [name.removeprefix(COMMAND) for name in log.channels if name.startswith(COMMAND)]
-    blind = [name for name in names if name not in log]
-    units = {name: log.units[COMMAND + name] for name in blind}
-    return log.with_channels(units, **{name: log[COMMAND + name] for name in blind})
+    unmeasured = [name for name in names if name not in log]
+    units = {name: log.units[COMMAND + name] for name in unmeasured}
+    return log.with_channels(units, **{name: log[COMMAND + name] for name in unmeasured})
 
 
 def check_on_test(
@@ -280,20 +282,20 @@ def check_on_test(
 
     ``modelled`` are free-running outputs on every test recording, shape (n, k), with their names.
     """
-    given = [channel.name for channel in model.outputs]
-    places = [list(outputs).index(name) for name in given]
-    trained = np.concatenate([recording.matrix(given) for recording in split.train])
+    names = [channel.name for channel in model.outputs]
+    places = [list(outputs).index(name) for name in names]
+    training_outputs = np.concatenate([recording.matrix(names) for recording in split.train])
     runs = []
-    for recording, rows, found in zip(split.test, split.test_rows, modelled, strict=True):
+    for recording, rows, table in zip(split.test, split.test_rows, modelled, strict=True):
         scored = np.flatnonzero(rows)
         if not scored.size:
             continue
         start, stop = int(scored[0]), int(scored[-1]) + 1
         run = model.as_run(recording.slice(start, stop))
-        runs.append(FreeRun.of(run, found[start:stop, places]))
+        runs.append(FreeRun.of(run, table[start:stop, places]))
     try:
         check_usable(model, [run.source for run in runs])
-        return check_runs(model, runs, means=trained.mean(axis=0))
+        return check_runs(model, runs, means=training_outputs.mean(axis=0))
     except DataError as error:
         return str(error)
 
@@ -315,15 +317,15 @@ def recorded_rig(recordings: Sequence[Recording]) -> Rig | None:
     """
     rigs = [recorded_on(recording) for recording in recordings]
     # where commands rest is no matter of the rig: a loop begins at its reference
-    kinds = [None if rig is None else rig.changed({"start": {}}) for rig in rigs]
-    if any(kind != kinds[0] for kind in kinds):
+    setups = [None if rig is None else rig.changed({"start": {}}) for rig in rigs]
+    if any(setup != setups[0] for setup in setups):
         raise DataError(
             "the recordings are not all of one virtual rig", remedy="name the rig to close it on"
         )
     return rigs[0]
 
 
-def named(rig: Rig) -> str:
+def rig_title(rig: Rig) -> str:
     """Return the name of a rig, and its changes from the published one."""
     changed = ", ".join(changes(rig) or ())
     return f"{rig.name} (changed: {changed})" if changed else rig.name
@@ -347,39 +349,41 @@ def closed_loops(
     inverses = {row.model: row.inverse for row in board.rows if row.inverse is not None}
     if not {channel.name for channel in inverses[chosen].outputs} <= set(rig.inputs):
         return {}
-    wanted = {channel.name for inverse in inverses.values() for channel in inverse.inputs}
-    held = [name for name in rig.inputs if name in wanted]
+    reference_names = {channel.name for inverse in inverses.values() for channel in inverse.inputs}
+    held = [name for name in rig.inputs if name in reference_names]
     reference = _followed(tests, board.outputs, held)
     step = sample_time_of(reference, "be tracked")
     scheduled = {name: float(reference[name][0]) for name in held}
-    asked = inverses[chosen].inputs
+    references = inverses[chosen].inputs
     tuned = cache(
-        partial(tune_pid, rig, sample_time=step, scheduled=scheduled, references=asked, seed=seed)
+        partial(
+            tune_pid, rig, sample_time=step, scheduled=scheduled, references=references, seed=seed
+        )
     )
     laws = [(f"{model} inverse", "feedforward", model) for model in inverses]
     laws += [("PID", "pid", chosen), (f"{chosen} inverse + PID", "feedforward-pid", chosen)]
-    found: dict[str, Tracked] = {}
-    without = before(inverses[chosen], rig, reference, approach=5.0, seed=seed).tracked
-    if without is not None:
-        found[UNCOMPENSATED] = without
+    loops: dict[str, Tracked] = {}
+    uncompensated = before(inverses[chosen], rig, reference, approach=5.0, seed=seed).tracked
+    if uncompensated is not None:
+        loops[UNCOMPENSATED] = uncompensated
     for name, law, model in laws:
         with suppress(MckibbenError):
             controller = control_law(law, inverses[model], tuned)
-            found[name] = track(controller, rig, reference, approach=5.0, seed=seed)
-    return found
+            loops[name] = track(controller, rig, reference, approach=5.0, seed=seed)
+    return loops
 
 
 def _followed(tests: Sequence[Recording], outputs: Sequence[str], held: Sequence[str]) -> Recording:
     """Return a smoothed measured motion, with scheduling inputs at their means."""
-    model = max(tests, key=lambda run: min(float(np.ptp(run[name])) for name in outputs))
-    step = sample_time_of(model, "be tracked")
-    n = min(len(model), round(LONGEST_MOTION / step))
+    widest = max(tests, key=lambda run: min(float(np.ptp(run[name])) for name in outputs))
+    step = sample_time_of(widest, "be tracked")
+    n = min(len(widest), round(LONGEST_MOTION / step))
     width = max(round(HALF_WINDOW / step), 1)
     window = np.ones(width) / width
     smooth = {
-        name: np.convolve(np.pad(model[name][:n], width, mode="edge"), window, "same")[
+        name: np.convolve(np.pad(widest[name][:n], width, mode="edge"), window, "same")[
             width : width + n
         ]
         for name in outputs
     }
-    return Recording(smooth | {name: np.full(n, float(model[name].mean())) for name in held}, step)
+    return Recording(smooth | {name: np.full(n, float(widest[name].mean())) for name in held}, step)

@@ -59,8 +59,8 @@ def _export(
     from mckibben import workflow
     from mckibben.report import results, text
 
-    found = workflow.export(model, out, target, options)
-    show(found, lambda: text.lines(results.exported(found)), as_json, written=[out])
+    exported = workflow.export(model, out, target, options)
+    show(exported, lambda: text.lines(results.exported(exported)), as_json, written=[out])
 
 
 export = click.Group(

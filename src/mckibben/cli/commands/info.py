@@ -29,16 +29,16 @@ def info(
     from mckibben.version import versions
 
     if models:
-        every: dict[str, Any] = described()
-        show(every, lambda: text.lines(results.models(every)), as_json)
+        descriptions: dict[str, Any] = described()
+        show(descriptions, lambda: text.lines(results.models(descriptions)), as_json)
         return
     if not files:
         installed = versions()
         show(installed, lambda: text.lines(results.versions(installed)), as_json)
         return
     if len(files) == 1 and files[0].suffix.lower() == ".json" and is_saved(files[0]):
-        about = summary(load(files[0]))
-        show(about, lambda: text.lines(results.model(about)), as_json)
+        content = summary(load(files[0]))
+        show(content, lambda: text.lines(results.model(content)), as_json)
         return
-    found = workflow.info(files, reading=reading, input=input, output=output)
-    show(found, lambda: text.lines_of_result(found), as_json, read=found.recordings)
+    contents = workflow.info(files, reading=reading, input=input, output=output)
+    show(contents, lambda: text.lines_of_result(contents), as_json, read=contents.recordings)

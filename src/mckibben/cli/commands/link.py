@@ -27,7 +27,7 @@ def link(
 
     with Link(port, baud=baud, fingerprint=fingerprint) as line:
         device, state = line.device, line.state()
-    about = {
+    content = {
         "device": asdict(device) | {"watchdog": device.period * device.silence},
         "state": {
             "steps": state.steps,
@@ -37,4 +37,4 @@ def link(
             "outputs": state.outputs.tolist(),
         },
     }
-    show(about, lambda: text.lines(results.device(device, state)), as_json)
+    show(content, lambda: text.lines(results.device(device, state)), as_json)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from mckibben.cli.output import say, show
-from mckibben.cli.parameters import Force, Json, Quick, chosen_models, command, repeated
+from mckibben.cli.parameters import Force, Json, Quick, command, named_models, repeated
 from mckibben.cli.stopping import stoppable
 from mckibben.options import Argument, Jobs, Option, Seed
 from mckibben.parsers import names
@@ -74,7 +74,7 @@ def measured(
             folder,
             out,
             only=only,
-            models=chosen_models(models, quick),
+            models=named_models(models, quick),
             seed=seed,
             jobs=jobs,
             force=force,

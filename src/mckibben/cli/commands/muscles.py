@@ -16,9 +16,9 @@ def list_(as_json: Json = False) -> None:
     """List the identified muscles, what they are and where their recordings come from."""
     from mckibben import muscles
 
-    found = muscles.list()
-    lines = [f"{one.name}: {one.title}\n  {one.source}" for one in found]
-    show({one.name: one.summary() for one in found}, lambda: lines, as_json)
+    library = muscles.list()
+    lines = [f"{muscle.name}: {muscle.title}\n  {muscle.source}" for muscle in library]
+    show({muscle.name: muscle.summary() for muscle in library}, lambda: lines, as_json)
 
 
 @command

@@ -36,17 +36,17 @@ def reproduce(
     from mckibben.report.reproduction import tables
 
     if listed:
-        every = papers()
-        about = [{"name": key} | one.about() for key, one in every.items()]
-        show(about, lambda: text.lines(results.papers(every)), as_json)
+        papers_by_name = papers()
+        content = [{"name": key} | paper.about() for key, paper in papers_by_name.items()]
+        show(content, lambda: text.lines(results.papers(papers_by_name)), as_json)
         return
     if name is None:
         raise DataError("there is no paper to run again", remedy="name one, or give `listed`")
     with stoppable(out):
-        found = workflow.reproduce(
+        result = workflow.reproduce(
             name, options, data=data, reading=reading, out=out, force=force, progress=True,
             command=repeated(),
             recognised=lambda table: say("\n".join(text.lines(tables([table]))), error=True),
         )  # fmt: skip
     written = [out / "report.html", out / "tables.json"] if out else []
-    show(found, lambda: text.lines_of_result(found), as_json, found.notes, written)
+    show(result, lambda: text.lines_of_result(result), as_json, result.notes, written)

@@ -28,8 +28,8 @@ def list_(as_json: Json = False) -> None:
     from mckibben.report import results, text
     from mckibben.studying.rig_runs import catalogue
 
-    found = catalogue()
-    show(found, lambda: text.lines(results.rigs(found)), as_json)
+    lists = catalogue()
+    show(lists, lambda: text.lines(results.rigs(lists)), as_json)
 
 
 @command
@@ -101,17 +101,19 @@ def run(
             "a rig is driven by signals or by a recording", remedy="give `signal` or `inputs`"
         )
     if inputs is None:
-        given = commands(rig, signal, duration, rate, seed)
+        command_recording = commands(rig, signal, duration, rate, seed)
     else:
-        given, *others = read(inputs, channels=[rig.inputs[0]], informative=False)
+        command_recording, *others = read(inputs, channels=[rig.inputs[0]], informative=False)
         if others:
             raise DataError("there are several recordings in it", file=inputs, remedy="give one")
-        given = given.select([one for one in rig.inputs if one in given])
-    recording = at_first_commands(rig, given).run(given, seed, ideal=ideal)
+        command_recording = command_recording.select(
+            [name_of_input for name_of_input in rig.inputs if name_of_input in command_recording]
+        )
+    recording = at_first_commands(rig, command_recording).run(command_recording, seed, ideal=ideal)
     write(recording.with_meta(name=out.stem), out)
-    about = {"file": str(out), "n_samples": len(recording), "ranges": recording.ranges}
-    about["saturated"] = dict(recording.meta.get("saturated", {}))
-    show(about, lambda: text.lines(results.recording(recording)), as_json, written=[out])
+    content = {"file": str(out), "n_samples": len(recording), "ranges": recording.ranges}
+    content["saturated"] = dict(recording.meta.get("saturated", {}))
+    show(content, lambda: text.lines(results.recording(recording)), as_json, written=[out])
 
 
 @command
@@ -140,9 +142,9 @@ def record(
         )  # fmt: skip
     more = f", {len(earlier)} were there already" if earlier else ""
     lines = [f"Written: {len(recorded)} recordings to {out}{more}; roles are in protocol.json"]
-    about: dict[str, Any] = {"folder": str(out), "recorded": recorded, "earlier": sorted(earlier)}
-    about |= {"scaled": [one._asdict() for one in scaled]}
-    show(about, lambda: [*text.lines(results.scaled(scaled)), *lines], as_json)
+    content: dict[str, Any] = {"folder": str(out), "recorded": recorded, "earlier": sorted(earlier)}
+    content |= {"scaled": [level._asdict() for level in scaled]}
+    show(content, lambda: [*text.lines(results.scaled(scaled)), *lines], as_json)
 
 
 rig = click.Group(

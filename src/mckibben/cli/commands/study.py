@@ -49,7 +49,7 @@ def study(
     from mckibben.recording import notes_by_file
     from mckibben.report import results, text
 
-    def begun(so_far: Study) -> None:
+    def on_update(so_far: Study) -> None:
         if not so_far.leaderboard.rows and not as_json:
             for line in text.lines(results.study_started(so_far)):
                 say(line)
@@ -57,7 +57,7 @@ def study(
             say(f"Report so far, updated with every model: {printable(live)}\n", flush=True)
 
     with stoppable(out), observed() as read:
-        found = workflow.study(
+        result = workflow.study(
             files,
             test,
             options,
@@ -66,16 +66,16 @@ def study(
             force=force,
             command=repeated(),
             progress=True,
-            found=begun,
+            found=on_update,
         )
-        stop_short(found, out)
-    about = {"folder": str(out)} | found.to_dict()
-    about["notes"] = notes_by_file([*found.train, *found.test])
+        stop_short(result, out)
+    content = {"folder": str(out)} | result.to_dict()
+    content["notes"] = notes_by_file([*result.train, *result.test])
     show(
-        about if as_json else found,
-        lambda: text.lines_of_result(found),
+        content if as_json else result,
+        lambda: text.lines_of_result(result),
         as_json,
-        found.leaderboard.notes,
+        result.leaderboard.notes,
         written=[out / "report.html"],
         read=read,
     )

@@ -29,7 +29,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import track
 from mckibben.measured.running import span_of
-from mckibben.measured.sets import parted, sets_in
+from mckibben.measured.sets import fit_and_test_data, sets_in
 from mckibben.papers.activation_pressure.protocol import FORCES
 from mckibben.papers.recognising import EXTENSOR
 from mckibben.papers.sdchm.loops import MOVES, single_task, widths
@@ -298,7 +298,7 @@ def measured(folder: Path | None) -> Iterator[Row]:
     """Yield the targets of measured muscles, by the splits of docs/measured; nothing without them."""
     for one in sets_in(folder) if folder else ():
         for task in one.tasks() if one.name in MEASURED else ():
-            train, test = parted(task, one.recordings(), one.folder)
+            train, test = fit_and_test_data(task, one.recordings(), one.folder)
             (output,) = task.outputs or ("displacement",)
             models = ("coupled-memory", BALANCE) if task.load else BASELINES[output]
             board = compare(

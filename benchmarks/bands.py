@@ -27,7 +27,14 @@ from tests.plants import PLANTS
 import mckibben
 from mckibben import Recording
 from mckibben.comparison.planning import Plan, plan_of
-from mckibben.comparison.ranking import FitResult, constant_of, fit, held, row_of, test_errors
+from mckibben.comparison.ranking import (
+    FitResult,
+    constant_of,
+    fit,
+    held_out_runs,
+    row_of,
+    test_errors,
+)
 from mckibben.diagnosis.bands import SHARES, TestedBand, tested_band
 from mckibben.errors import MckibbenError
 from regret import RIGS, on_rig
@@ -90,7 +97,7 @@ def tested(plan: Plan, found: FitResult, rows: Sequence[int]) -> tuple[TestedBan
     outputs = [*found.outputs[:n], *(found.outputs[n + k] for k in rows)]
     assert found.block is not None
     predictions, data = (
-        held(plan.data, found.predictions, found.block),
+        held_out_runs(plan.data, found.predictions, found.block),
         replace(plan.data, split=some),
     )
     banded = tested_band(found.block, predictions, outputs, some)

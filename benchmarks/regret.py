@@ -33,7 +33,7 @@ from mckibben import Recording, registry
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.errors import MckibbenError
 from mckibben.estimators.catalogue import declared
-from mckibben.measured.sets import chosen_in, parted
+from mckibben.measured.sets import chosen_in, fit_and_test_data
 from mckibben.rigs import load_rig
 from mckibben.studying.rig_runs import commands
 
@@ -136,7 +136,7 @@ def tasks(data: Path | None) -> Iterator[Task]:
         for place, task in enumerate(one.tasks()):
             yield Task(
                 f"measured {one.name} {task.name or place}",
-                lambda task=task, one=one: parted(task, one.recordings(), one.folder),  # type: ignore[misc]
+                lambda task=task, one=one: fit_and_test_data(task, one.recordings(), one.folder),  # type: ignore[misc]
                 task.inputs,
                 task.outputs,
                 task.load,

@@ -17,7 +17,7 @@ from mckibben import registry
 from mckibben.checkpoints import Checkpoints
 from mckibben.papers.experiment import Reproduction, reproduce
 from mckibben.papers.paper import papers
-from mckibben.report.printed import METADATA, STYLE, drawn
+from mckibben.report.printed import METADATA, STYLE, draw_figure
 from mckibben.report.reproduction import drawing, markdown
 
 HERE = Path(__file__).parent
@@ -76,7 +76,9 @@ def write(found: Reproduction) -> None:
     for figure in found.figures:
         file = folder / f"{figure.key}.png"
         with rc_context(dict(STYLE)):
-            drawn(drawing(figure)).savefig(file, dpi=RESOLUTION, metadata=dict(METADATA["png"]))
+            draw_figure(drawing(figure)).savefig(
+                file, dpi=RESOLUTION, metadata=dict(METADATA["png"])
+            )
         with Image.open(file) as whole:
             few = whole.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
         few.save(file, optimize=True)

@@ -144,15 +144,9 @@ def _as_declared(hint: Any, name: str, value: Any) -> Any:
     if isinstance(value, str) and kind in (Names, Sequence[str]) and option.parse is None:
         value = (value,)
     if not _fits(kind, value):
-        values_allowed = [
-            entry for kind_part in (kind, *get_args(kind)) for entry in choices(kind_part)
-        ]
+        allowed = [entry for part in (kind, *get_args(kind)) for entry in choices(part)]
         type_name = str(kind).replace("collections.abc.", "").replace("typing.", "")
-        remedy = (
-            f"use one of {', '.join(map(str, values_allowed))}"
-            if values_allowed
-            else f"give {type_name}"
-        )
+        remedy = f"use one of {', '.join(map(str, allowed))}" if allowed else f"give {type_name}"
         raise ModelError(f"it cannot be {value!r:.60}", parameter=name, remedy=remedy)
     return value
 

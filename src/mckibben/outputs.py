@@ -132,8 +132,8 @@ def refuse_inputs(path: str | Path, inputs: Iterable[str | Path]) -> None:
     """
     from mckibben.files.sources import read_with
 
-    for path_of_input in inputs:
-        for source in read_with(Path(path_of_input)):
+    for given in inputs:
+        for source in read_with(Path(given)):
             if _same(Path(path), source):
                 problem = f"it is read from {source}, so it is not written to"
                 raise DataError(problem, file=path, remedy="give another name")
@@ -279,13 +279,13 @@ def results_in(
     from filelock import FileLock, Timeout
 
     folder = Path(folder)
-    folder_of_run, new_files = folder / UNFINISHED, unfinished(folder)
-    lock, existed = folder_of_run / "lock", folder.exists()
+    run_folder, new_files = folder / UNFINISHED, unfinished(folder)
+    lock, existed = run_folder / "lock", folder.exists()
     with written(folder):
         if new_files.exists() and not lock.exists():
             problem = "it blocks unfinished results, and was not written by mckibben"
             raise DataError(problem, file=new_files, remedy="move it away, or give another folder")
-        folder_of_run.mkdir(parents=True, exist_ok=True)
+        run_folder.mkdir(parents=True, exist_ok=True)
         file_lock = FileLock(lock, timeout=0)
         try:
             file_lock.acquire()
@@ -302,9 +302,9 @@ def results_in(
         if not new_files.exists():
             lock.unlink(missing_ok=True)
         file_lock.release()
-        for folder_to_remove in (folder_of_run, folder) if not existed else (folder_of_run,):
+        for unused in (run_folder, folder) if not existed else (run_folder,):
             with suppress(OSError):  # not empty
-                folder_to_remove.rmdir()
+                unused.rmdir()
 
 
 def _prune(folder: Path) -> None:

@@ -223,9 +223,9 @@ def contents(
         if isinstance(item, Recording) or (isinstance(item, Path) and item.is_dir()):
             recordings += read(item, reading, channels=named, informative=False)
         else:
-            runs, columns_of_item = look(item, reading, named)
+            runs, seen = look(item, reading, named)
             recordings += runs
-            columns[str(item) if isinstance(item, Path) else runs[0].name] = columns_of_item
+            columns[str(item) if isinstance(item, Path) else runs[0].name] = seen
     gaps: tuple[Gap, ...] | str
     try:
         gaps = data_gaps(recordings, inputs, outputs)

@@ -13,7 +13,7 @@ from mckibben import GPI, DataError, Recording, compare, read, write
 from mckibben.measured.page import page
 from mckibben.measured.running import outcomes
 from mckibben.measured.scoring import KEYS, START_SAMPLES, entries
-from mckibben.measured.sets import parted, sets_in, split_of
+from mckibben.measured.sets import fit_and_test_data, sets_in, split_of
 from mckibben.signals import irregular_triangle
 from tests.cli.conftest import Cli
 from tests.refusals import refused
@@ -115,7 +115,7 @@ def test_every_task_is_the_comparison_it_says(folder: Path) -> None:
     assert board is not None
     assert [r.test_error for r in board.rows] == [r.test_error for r in expected.rows]
     assert done["By volts: last run"].span == pytest.approx(np.ptp(runs["run4"]["displacement"]))
-    train, test = parted(volts.split.tasks[2], list(runs.values()), volts.folder)
+    train, test = fit_and_test_data(volts.split.tasks[2], list(runs.values()), volts.folder)
     assert [len(run) for run in (*train, *test)] == [900, 600]
     assert plain.title == "plain"
 
@@ -155,7 +155,7 @@ def test_each_pattern_has_to_match_something(folder: Path) -> None:
     (folder / "volts" / "channels.toml").write_text(text)
     _, volts = sets_in(folder)
     with refused(DataError, file=folder / "volts", names=("run9", "run2", "run3", "run4")):
-        parted(volts.split.tasks[0], volts.recordings(), volts.folder)
+        fit_and_test_data(volts.split.tasks[0], volts.recordings(), volts.folder)
 
 
 def test_results_among_recordings_are_refused(cli: Cli, folder: Path) -> None:

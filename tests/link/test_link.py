@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from mckibben.errors import DataError
 from mckibben.link import Link, LinkError, Note, State
-from mckibben.link.client import STATUSES, Frame, Kind, unpacked, unreadable
+from mckibben.link.client import STATUSES, Frame, Kind, unpacked, unreadable_answer
 from tests.link.serving import SAMPLE_TIME, SERVING, Line, block
 from tests.refusals import refused
 from tests.tools import needs
@@ -199,9 +199,9 @@ LIES: tuple[dict[str, Any], ...] = (
 def test_what_a_device_answers_is_not_trusted() -> None:
     texts = [json.dumps(ABOUT | lie).encode() for lie in LIES]
     for text in (b"", b"{}", b"[", *texts):
-        with refused(LinkError, problem=unreadable().problem):
+        with refused(LinkError, problem=unreadable_answer().problem):
             Link(cast(Any, Impostor(text)), timeout=0.5)
-    with refused(LinkError, problem=unreadable().problem):
+    with refused(LinkError, problem=unreadable_answer().problem):
         Link(cast(Any, Impostor(*[b" " * 200] * 400)))
     for outputs, is_good in (((3.0,), True), ((np.nan,), False), ((1.0, 2.0), False), ((), False)):
         body = struct.pack(f"<BI{len(outputs)}d", 1, 7, *outputs)
@@ -209,7 +209,7 @@ def test_what_a_device_answers_is_not_trusted() -> None:
         if is_good:
             assert link.state().outputs == [3.0]
         else:
-            with refused(LinkError, problem=unreadable().problem):
+            with refused(LinkError, problem=unreadable_answer().problem):
                 link.state()
 
 

@@ -13,7 +13,7 @@ from mckibben import PI, Recording, data_gaps, load_rig, plan
 from mckibben.blocks.base import Block
 from mckibben.errors import DataError
 from mckibben.parsers import limits as limits_of
-from mckibben.planning.limits import Limit, narrowed
+from mckibben.planning.limits import Limit, limits_as_wanted
 from mckibben.planning.motion import motion
 from mckibben.report.words import plan_sentences
 from tests.diagnosis.lacking import Recorder
@@ -86,7 +86,9 @@ def test_limits_are_read_and_narrowed() -> None:
         with pytest.raises(ValueError):
             limits_of(text)
     limits = {"pressure": Limit(0.5, 4.0, 1.5, 0.5)}
-    assert narrowed(limits, {"pressure": [1.0, None]})["pressure"] == Limit(1.0, 4.0, 1.5, 1.0)
+    assert limits_as_wanted(limits, {"pressure": [1.0, None]})["pressure"] == Limit(
+        1.0, 4.0, 1.5, 1.0
+    )
 
 
 def test_what_goes_beyond_recordings_is_told(play: Block) -> None:

@@ -27,7 +27,7 @@ LINES = {"line", "fine", "broad", "beads"}
 def made(drawing: Drawing, columns: Literal[1, 2] | None = None) -> Iterator[Figure]:
     """Yield a drawing as it is printed."""
     with rc_context(dict(printed.STYLE)):
-        figure = printed.drawn(drawing, columns)
+        figure = printed.draw_figure(drawing, columns)
         figure.draw_without_rendering()
         yield figure
 

@@ -108,10 +108,10 @@ def models_usable_as(workspace: Workspace, use: str) -> list[str]:
 
 def estimate_force(workspace: Workspace, name: str, recording: str) -> Simulation:
     """Return what a model estimates of a force over a recording."""
-    from mckibben.studying.simulating import simulated
+    from mckibben.studying.simulating import simulate_recording
 
     block, run = block_for_use(workspace, name, "force", {}), workspace.recording(recording)
-    return simulated(block, lambda names: [run.select(names)])
+    return simulate_recording(block, lambda names: [run.select(names)])
 
 
 def reference_channels(

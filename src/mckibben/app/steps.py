@@ -117,7 +117,7 @@ class Entry(StoredModel):
         return expression
 
 
-def applied(recording: Recording, steps: Sequence[Step]) -> Recording:
+def apply_steps(recording: Recording, steps: Sequence[Step]) -> Recording:
     """Return a recording after steps."""
     for step in steps:
         recording = step.apply(recording)

@@ -30,7 +30,7 @@ from mckibben.app.steps import (
     Reading,
     Role,
     Step,
-    applied,
+    apply_steps,
     understand,
 )
 from mckibben.errors import DataError, MckibbenError
@@ -196,7 +196,7 @@ class Workspace:
             if entry.part >= len(parts := self._parts(path, entry.reading)):
                 problem = f"it has {len(parts)} recordings, and this is number {entry.part + 1}"
                 raise DataError(problem, file=path, remedy="remove this recording")
-            return applied(parts[entry.part], entry.steps).with_meta(name=entry.name)
+            return apply_steps(parts[entry.part], entry.steps).with_meta(name=entry.name)
 
         recording: Recording = self._derived(entry, "", make)
         return recording

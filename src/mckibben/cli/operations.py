@@ -50,11 +50,7 @@ def operation_command(name: str) -> click.Command:
         content = {"folder" if operation.writes else "file": str(out)} if out else {}
         if result is not None:
             content |= result.to_dict()
-        written = (
-            [out / name_of_file for name_of_file in operation.writes]
-            if out and operation.writes
-            else [out]
-        )
+        written = [out / file for file in operation.writes] if out and operation.writes else [out]
         notes = getattr(result, "notes", ())
         lines = () if result is None else text.lines_of_result(result)
         show(content, lambda: lines, as_json, notes, written, read)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
-from mckibben.cli.parameters import as_command, as_flag, plainly
+from mckibben.cli.parameters import as_command, as_flag, as_note
 from mckibben.errors import MckibbenError, in_terms_of
 from mckibben.printing import printable
 from mckibben.system.atomic import to_json
@@ -53,7 +53,7 @@ _noted: set[str] = set()
 
 def note(text: str, *, error: bool = False) -> None:
     """Print a note once, with its parameters as flags."""
-    line = f"Note: {plainly(text)}"
+    line = f"Note: {as_note(text)}"
     if line not in _noted:
         _noted.add(line)
         say(line, error=error)

@@ -63,7 +63,7 @@ def as_command(name: str) -> str:
     return f"mckibben {name}" if name in COMMANDS else python_operation(name)
 
 
-def plainly(text: str) -> str:
+def as_note(text: str) -> str:
     """Return a note in one line, with parameters as flags."""
     return in_terms_of(" ".join(text.split()), as_flag, as_command)
 
@@ -80,7 +80,7 @@ def named_models(models: str | Sequence[str], quick: bool) -> str | Sequence[str
     return "quick" if quick and models == "all" else models
 
 
-def repeated() -> str:
+def typed_command() -> str:
     """Return the command line as it was typed."""
     return printing.command(["mckibben", *sys.argv[1:]])
 

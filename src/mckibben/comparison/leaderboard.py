@@ -209,11 +209,7 @@ class Row(Numbers):
     def sound(self) -> bool:
         """Whether there is a model with finite scores."""
         has_model = self.reason is None and self.block is not None
-        scores = [
-            scores_of_side.rmse
-            for scores_of_side in (self.train, self.test)
-            if scores_of_side is not None
-        ]
+        scores = [side.rmse for side in (self.train, self.test) if side is not None]
         return has_model and len(scores) == 2 and bool(np.isfinite(scores).all())
 
     @property

@@ -352,10 +352,7 @@ def ranked(
 
 
 def _add_finished(
-    table: _Table,
-    plan: Plan,
-    checkpoints: Checkpoints,
-    keys: Mapping[str, tuple[Candidate, str]],
+    table: _Table, plan: Plan, checkpoints: Checkpoints, keys: Mapping[str, tuple[Candidate, str]]
 ) -> None:
     """Add the models that are refused, and those that an earlier run has finished."""
     for name, reason in plan.refused.items():
@@ -417,7 +414,7 @@ def _row(plan: Plan, name: str, result: FitResult, table: _Table) -> Row:
         return row
     if tuple(channel.name for channel in row.block.outputs) != data.channels.outputs:
         return row
-    predictions = held(data, result.predictions, row.block)
+    predictions = held_out_runs(data, result.predictions, row.block)
     with_band = tested_band(row.block, predictions, result.outputs, data.split)
     if with_band is None:
         return row
@@ -518,7 +515,7 @@ def part_errors(data: Data, predictions: Sequence[Array]) -> list[Array]:
     ]
 
 
-def held(data: Data, predictions: Sequence[Array], block: Block) -> list[FreeRun]:
+def held_out_runs(data: Data, predictions: Sequence[Array], block: Block) -> list[FreeRun]:
     """Return the held-out predictions of every recording of the parts, as runs."""
     inputs, outputs = [channel.name for channel in block.inputs], data.channels.outputs
     parts_of_runs = zip(data.held_out, predictions, zip(*data.parts, strict=True), strict=True)

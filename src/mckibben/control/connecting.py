@@ -198,7 +198,9 @@ def rest_length_of(plant: Plant) -> float | None:
     return length
 
 
-def asked(plant: Plant, reference: Recording, compensator: Block | None = None) -> Recording:
+def reference_for(
+    plant: Plant, reference: Recording, compensator: Block | None = None
+) -> Recording:
     """Return a reference in the channels of a plant, converted by the rest length if necessary.
 
     Recorded channels that are outputs of the compensator are left out.
@@ -221,7 +223,7 @@ def channels_of(plant: Plant, names: Iterable[str]) -> tuple[Channel, ...]:
     return tuple(Channel(name, units.get(name, standard_unit(name) or "")) for name in names)
 
 
-def offered(plant: Plant, reference: Recording) -> Offer:
+def offer_of(plant: Plant, reference: Recording) -> Offer:
     """Return the signals that a loop on a plant offers to a controller, and its commands.
 
     Raises
@@ -231,7 +233,7 @@ def offered(plant: Plant, reference: Recording) -> Offer:
     """
     followed = followed_by(plant, reference)
     held = tuple(name for name in plant.inputs if name in reference)
-    driven = actuated(plant, held)
+    driven = driven_inputs(plant, held)
     reference_channels = [Channel(name, unit) for name, unit in reference.units.items()]
     for channel in channels_of(plant, (*plant.inputs, *plant.outputs)):
         if channel.name in reference:  # in its unit, or refused
@@ -273,7 +275,7 @@ def followed_by(plant: Plant, reference: Recording) -> list[str]:
     return followed
 
 
-def resting(plant: Plant, held: Mapping[str, float]) -> dict[str, float]:
+def rest_settings(plant: Plant, held: Mapping[str, float]) -> dict[str, float]:
     """Return the settings of a plant that rests at the held inputs, ignoring noise beyond its range.
 
     Raises
@@ -302,7 +304,7 @@ def resting(plant: Plant, held: Mapping[str, float]) -> dict[str, float]:
     return settings
 
 
-def actuated(plant: Plant, held: Collection[str]) -> list[str]:
+def driven_inputs(plant: Plant, held: Collection[str]) -> list[str]:
     """Return the inputs of a plant that drive its muscles, and are not held.
 
     They are pressures or voltages; those of a twin are its `driving` inputs.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Stream
 from mckibben.blocks.fields import Channel
-from mckibben.control.connecting import Offer, Plant, asked, match, offered, resting
+from mckibben.control.connecting import Offer, Plant, match, offer_of, reference_for, rest_settings
 from mckibben.control.controller import BlockController, Controller, samples_ahead
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.errors import ModelError, require
@@ -151,16 +151,18 @@ def track(
     """
     step = sample_time_of(reference, "be a reference")
     _check(approach, settle, noise, delay, slew, step)
-    reference = asked(plant, reference, controller if isinstance(controller, Block) else None)
+    reference = reference_for(
+        plant, reference, controller if isinstance(controller, Block) else None
+    )
     if isinstance(controller, Block):
         controller = BlockController(controller)
     preview = controller.preview if preview is None else preview
     # the reference of the next step is given without any preview
     preview_steps = max(samples_ahead(preview, step) - 1, 0) + controller.samples_ahead
     rng = generator(seed)
-    offer = offered(plant, reference)
+    offer = offer_of(plant, reference)
     controller.connect(offer)
-    starts = resting(plant, {name: float(reference[name][0]) for name in offer.held})
+    starts = rest_settings(plant, {name: float(reference[name][0]) for name in offer.held})
     settings: dict[str, float] = {"sample_time": step, **starts}
     plant = plant.changed(settings)
 

@@ -20,11 +20,11 @@ from mckibben.blocks.fields import COMMANDS, Channel
 from mckibben.control.connecting import (
     MOVED,
     Plant,
-    actuated,
     channels_of,
+    driven_inputs,
     match,
     rest_length_of,
-    resting,
+    rest_settings,
 )
 from mckibben.control.twin import Twin
 from mckibben.errors import ModelError
@@ -81,7 +81,7 @@ def tune_pid(
     untuned = untuned_pid(plant, scheduled, references)
     followed = [channel.name for channel in measured]
     driven = [channel.name for channel in untuned.given]
-    starts = resting(plant, scheduled)
+    starts = rest_settings(plant, scheduled)
     rig = plant.changed({"sample_time": sample_time, **starts})
     limits = {name: rig.limits(name) for name in driven}
     middle = {name: 0.5 * (limit.low + limit.high) for name, limit in limits.items()}
@@ -139,7 +139,7 @@ def untuned_pid(
     ModelError
         If a pressure has no motion of its own.
     """
-    driven = actuated(plant, scheduled)
+    driven = driven_inputs(plant, scheduled)
     followed = [_moved_by(name, plant, driven) for name in driven]
     limits, zeros = [plant.limits(name) for name in driven], [0.0] * len(driven)
     lowest, highest = min(limit.low for limit in limits), max(limit.high for limit in limits)
@@ -164,11 +164,7 @@ def _moved_by(name: str, rig: Plant, driven: Sequence[str]) -> str:
     suffix = name[name.find("_") :] if "_" in name else ""
     motions = [stem + suffix for stem in MOVED if stem + suffix in rig.outputs]
     if len(driven) == 1 and not motions and isinstance(rig, Twin):
-        motions = [
-            name_of_output
-            for name_of_output in rig.outputs
-            if not name_of_output.startswith((*COMMANDS, "force"))
-        ]
+        motions = [output for output in rig.outputs if not output.startswith((*COMMANDS, "force"))]
     if len(motions) != 1:
         raise ModelError(
             "PID follows a displacement or an angle for every pressure or voltage, each "

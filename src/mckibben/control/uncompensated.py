@@ -15,7 +15,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.control.connecting import Plant, asked, offered
+from mckibben.control.connecting import Plant, offer_of, reference_for
 from mckibben.control.controller import Ahead, Controller
 from mckibben.control.loop import Tracked, track
 from mckibben.errors import MckibbenError, ModelError
@@ -49,7 +49,7 @@ class Rule(Controller):
         return self.commands(reference)
 
 
-def straight(rest: Array, slopes: Array, low: Array, high: Array) -> Callable[[Array], Array]:
+def linear_rule(rest: Array, slopes: Array, low: Array, high: Array) -> Callable[[Array], Array]:
     """Return a piecewise-linear rule, with the smallest of all equivalent commands.
 
     At the lowest commands what is followed is at ``rest``, shape (m,), and its slopes have shape (m, n).
@@ -98,7 +98,7 @@ def slow_cycle(
     DataError, ModelError
         As of `track`.
     """
-    offer = offered(plant, reference)
+    offer = offer_of(plant, reference)
     followed, driven = ([c.name for c in channels] for channels in (offer.followed, offer.driven))
     low, high = _limits(plant, driven)
     if only is not None:
@@ -108,10 +108,10 @@ def slow_cycle(
     shares = np.maximum(0.0, 1.0 - np.abs(2.0 * np.arange(steps + 2) / steps - 1.0))
     cycle = low + shares[:, np.newaxis] * (high - low)
     rows = iter(cycle)
-    held_reference = Recording(first, reference.sample_time, {n: reference.units[n] for n in first})
+    rest = Recording(first, reference.sample_time, {n: reference.units[n] for n in first})
     ramp = Rule(lambda _: next(rows))
     response = track(
-        ramp, plant, held_reference, approach=0.0, pressure_loop=pressure_loop, seed=seed
+        ramp, plant, rest, approach=0.0, pressure_loop=pressure_loop, seed=seed
     ).recording
     channels = {name: first[name][:-1] for name in offer.held}
     channels |= dict(zip(driven, cycle[:-1].T, strict=True))
@@ -149,7 +149,7 @@ def uncompensated(
     ModelError
         If something does not move.
     """
-    offer = offered(plant, reference)
+    offer = offer_of(plant, reference)
     followed, driven = ([c.name for c in channels] for channels in (offer.followed, offer.driven))
     if len(followed) != len(driven):
         lines = []
@@ -162,7 +162,7 @@ def uncompensated(
                 np.polynomial.polynomial.polyfit(driven_by, single_cycle.matrix(followed), 1)
             )
         rests, slopes = np.transpose(lines, (1, 2, 0))
-        return Rule(straight(rests.mean(axis=1), slopes, *_limits(plant, driven)))
+        return Rule(linear_rule(rests.mean(axis=1), slopes, *_limits(plant, driven)))
     curves = [curve(cycle[u], cycle[y], y) for u, y in zip(driven, followed, strict=True)]
     return Rule(
         lambda y: np.array([np.interp(x, *knots) for x, knots in zip(y, curves, strict=True)])
@@ -229,7 +229,7 @@ def before(compensator: Block, plant: Plant, reference: Recording, **settings: A
     Settings are those of `track`; a preview is ignored, as no dead time is compensated.
     """
     settings.pop("preview", None)
-    reference = asked(plant, reference, compensator)
+    reference = reference_for(plant, reference, compensator)
     cycle_settings = {
         name: settings[name] for name in ("pressure_loop", "seed") if name in settings
     }

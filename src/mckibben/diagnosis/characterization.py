@@ -242,7 +242,7 @@ def characterize(
     """
     runs = listed(recordings)
     drive, response = loop_of(runs, input, output)
-    others = others_of(runs, drive, response, scheduling) if runs else []
+    others = other_inputs(runs, drive, response, scheduling) if runs else []
     if not others:
         return _measured(runs, drive, response)
 
@@ -320,7 +320,9 @@ def _counts(runs: Sequence[Recording], drive: str, response: str) -> dict[str, A
 def _measured(runs: Sequence[Recording], drive: str, response: str) -> Characterization:
     """Return the results of recordings in which other inputs are constant, with any zero offsets."""
     several = len(runs) > 1 and all(drive in run and response in run for run in runs)
-    scale, tracks = prepare(levelled(runs, drive, response) if several else runs, drive, response)
+    scale, tracks = prepare(
+        without_offsets(runs, drive, response) if several else runs, drive, response
+    )
     loops, branches = loops_of(tracks, scale), branches_of(tracks, scale)
 
     figures, intervals = _repeated(runs, drive, response, scale, tracks, loops, branches)
@@ -415,7 +417,7 @@ def _unit(runs: Sequence[Recording], channel: str) -> str:
     return units.pop()
 
 
-def others_of(
+def other_inputs(
     recordings: Sequence[Recording], drive: str, response: str, scheduling: Sequence[str]
 ) -> list[str]:
     """Return other inputs that vary within or between recordings.
@@ -468,7 +470,7 @@ def constant_segments(
     return groups
 
 
-def levelled(recordings: Sequence[Recording], drive: str, response: str) -> list[Recording]:
+def without_offsets(recordings: Sequence[Recording], drive: str, response: str) -> list[Recording]:
     """Return recordings whose outputs are shifted onto one curve of the input.
 
     Least squares of an offset of every recording, and a piecewise-linear curve that they share.

@@ -173,7 +173,7 @@ class Link(AbstractContextManager["Link"]):
         self._sequence = int.from_bytes(os.urandom(4), "little")  # not that of an earlier program
         self._model, self._every, self._driving, self._begun = bytes(4), 0, False, b""
         self._samples, self.statistics = deque[State](maxlen=100_000), Statistics()
-        self._port = opened(port, baud) if isinstance(port, str | Path) else port
+        self._port = open_port(port, baud) if isinstance(port, str | Path) else port
         try:
             self.device = device = self._identified()
             if fingerprint is not None and fingerprint.lower() != device.fingerprint:
@@ -280,7 +280,7 @@ class Link(AbstractContextManager["Link"]):
         try:
             return TypeAdapter(Device).validate_json(text)
         except ValidationError:
-            raise unreadable() from None
+            raise unreadable_answer() from None
 
     def _ask(self, kind: Kind, body: bytes = b"") -> bytes:
         """Send a frame until it is answered, and return the answer, without its status."""
@@ -293,7 +293,7 @@ class Link(AbstractContextManager["Link"]):
                 problem = f"nothing has answered for {self._patience:g} s"
                 remedy = "check power, port, rate, and other users of it"
                 raise LinkError(problem, parameter="patience", remedy=remedy)
-            with working():
+            with port_errors():
                 self._port.write(b"\0" + packed if sent else packed)  # a zero ends noise
             sent += 1
             while (
@@ -302,7 +302,7 @@ class Link(AbstractContextManager["Link"]):
                 answer = self._take(remaining, kind)
         self.statistics.repeated += sent - 1
         if not answer or answer[0] >= len(STATUSES):
-            raise unreadable()
+            raise unreadable_answer()
         if answer[0]:
             problem = f"the device refuses {kind.name}: {STATUSES[answer[0]]}"
             error = LinkError(problem, remedy="see docs/deploy/link.md, or open the link again")
@@ -312,7 +312,7 @@ class Link(AbstractContextManager["Link"]):
 
     def _take(self, timeout: float, kind: Kind | None = None) -> bytes | None:
         """Read once, store samples, and return the body of the expected answer if it has come."""
-        with working():
+        with port_errors():
             self._port.timeout = max(timeout, 0.0)
             received = self._port.read(max(self._port.in_waiting, 1))
         *pieces, rest = (self._begun + received).split(b"\0")
@@ -329,22 +329,22 @@ class Link(AbstractContextManager["Link"]):
 
     def _state(self, body: bytes) -> State:
         if len(body) < 5:
-            raise unreadable()
+            raise unreadable_answer()
         n = len(self.device.outputs)
         notes, steps = struct.unpack_from("<BI", body)
         numbers = self._numbers(body[5:], n + len(self.device.inputs))
         if not np.isfinite(numbers[:n]).all():
-            raise unreadable()
+            raise unreadable_answer()
         return State(Note(notes), steps, numbers[:n], numbers[n:], time.monotonic())
 
     def _numbers(self, body: bytes, n: int) -> Array:
         if len(body) != n * self._kind.itemsize:
-            raise unreadable()
+            raise unreadable_answer()
         with np.errstate(invalid="ignore"):  # of a NaN that signals
             return np.frombuffer(body, self._kind).astype(np.float64)
 
 
-def opened(name: str | Path, baud: int) -> Serial:
+def open_port(name: str | Path, baud: int) -> Serial:
     """Return a serial port, open for this program alone."""
     demand("serial", "serial", "serial ports")
     from serial import Serial
@@ -357,7 +357,7 @@ def opened(name: str | Path, baud: int) -> Serial:
 
 
 @contextmanager
-def working() -> Iterator[None]:
+def port_errors() -> Iterator[None]:
     """Turn errors of a port into `LinkError`."""
     try:
         yield
@@ -366,6 +366,6 @@ def working() -> Iterator[None]:
         raise LinkError(f"the serial port has failed ({error})", remedy=remedy) from None
 
 
-def unreadable() -> LinkError:
+def unreadable_answer() -> LinkError:
     """Return the error of an answer that does not belong to the protocol."""
     return LinkError("the device's answer cannot be read", remedy="export it by this release again")

@@ -61,15 +61,15 @@ def page(outcomes: Sequence[Outcome], command: str) -> Page:
     for place, name in enumerate(dict.fromkeys(outcome.set.name for outcome in outcomes)):
         of_set = [outcome for outcome in outcomes if outcome.set.name == name]
         about = of_set[0].set.split.about
-        items_of_set: list[Item | None] = [Text([about])] if about.strip() else []
+        set_items: list[Item | None] = [Text([about])] if about.strip() else []
         for outcome in of_set:
             if not outcome.left_out:
-                items_of_set += _section(outcome)
+                set_items += _section(outcome)
         for task in dict.fromkeys(outcome.task.name for outcome in of_set if outcome.left_out):
-            items_of_set += _in_turn(
+            set_items += _in_turn(
                 [outcome for outcome in of_set if outcome.left_out and outcome.task.name == task]
             )
-        sections.append(Section(f"set-{place}", of_set[0].set.title, items_of_set))
+        sections.append(Section(f"set-{place}", of_set[0].set.title, set_items))
     sections.append(Section("method", "How to repeat", [Code("", command)]))
     return Page("Every model on recordings", ABOUT, sections)
 
@@ -238,24 +238,18 @@ def measure(
         workers.prepare()
     inputs = [item.folder for item in sets]
     with results_in(out, FILES, inputs=inputs, force=force, kind="measured") as results:
-        outcomes_so_far: list[Outcome] = []
+        finished: list[Outcome] = []
         for item in outcomes(
-            sets,
-            models=models,
-            seed=seed,
-            jobs=jobs,
-            executor=executor,
-            folder=out,
-            tell=progress,
+            sets, models=models, seed=seed, jobs=jobs, executor=executor, folder=out, tell=progress
         ):
-            outcomes_so_far.append(item)
+            finished.append(item)
             if found is not None:
                 found(item)
         if results is not None:
-            report = page(outcomes_so_far, command)
+            report = page(finished, command)
             results.write_text("measured.html", report.html())
             results.write_text("measured.md", report.markdown())
-            results.write_text("measured.csv", table(outcomes_so_far).to_csv(index=False))
+            results.write_text("measured.csv", table(finished).to_csv(index=False))
             results.commit()
         Checkpoints(out).clear()
-    return outcomes_so_far
+    return finished

@@ -15,7 +15,7 @@ from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.ranking import Standing, compare
 from mckibben.errors import DataError, MckibbenError
-from mckibben.measured.sets import Set, Task, parted
+from mckibben.measured.sets import Set, Task, fit_and_test_data
 from mckibben.recording import Recording
 
 
@@ -117,7 +117,7 @@ def outcomes(
         try:
             if data_set.name not in recordings_of:
                 recordings_of = {data_set.name: data_set.recordings()}  # of one set at a time
-            train, test = parted(task, recordings_of[data_set.name], data_set.folder)
+            train, test = fit_and_test_data(task, recordings_of[data_set.name], data_set.folder)
             board = compare(
                 train,
                 test,

@@ -16,7 +16,7 @@ from mckibben.diagnosis.branch_gaps import gap_ratio, moving_pairs, paired_gaps
 from mckibben.errors import DataError
 from mckibben.files import write
 from mckibben.measured.running import span_of
-from mckibben.measured.sets import Set, Task, parted
+from mckibben.measured.sets import Set, Task, fit_and_test_data
 from mckibben.metrics import rmse
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
@@ -81,7 +81,7 @@ class Entry:
 def parts_of(data_set: Set, recordings: Sequence[Recording]) -> Iterator[Part]:
     """Give all tasks of a set, each as often as it leaves out in turn."""
     for task in data_set.tasks():
-        train, test = parted(task, recordings, data_set.folder)
+        train, test = fit_and_test_data(task, recordings, data_set.folder)
         channels = channels_of([*train, *test], task.inputs, task.outputs, task.load)
         split = split_of(train, test, channels)
         rows = tuple(mask & (np.arange(len(mask)) >= START_SAMPLES) for mask in split.test_rows)

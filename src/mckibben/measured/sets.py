@@ -233,7 +233,7 @@ def _set(place: Path) -> Set:
     return Set(place, content, split_of(content.split, file or NAME))
 
 
-def parted(
+def fit_and_test_data(
     task: Task, recordings: Sequence[Recording], folder: Path
 ) -> tuple[list[Recording], list[Recording]]:
     """Return the fit and test data of a task; no test data for the default split.

@@ -85,7 +85,7 @@ def limits_of_recordings(excitation: Excitation) -> Limits:
     return limits
 
 
-def narrowed(limits: Limits, wanted_limits: Mapping[str, Iterable[float | None]]) -> Limits:
+def limits_as_wanted(limits: Limits, wanted_limits: Mapping[str, Iterable[float | None]]) -> Limits:
     """Return limits with some replaced: by channel low, high and optionally rate."""
     result = dict(limits)
     for name, ends in wanted_limits.items():

@@ -18,9 +18,9 @@ from mckibben.errors import DataError, require
 from mckibben.planning.limits import (
     Limits,
     check_possible,
+    limits_as_wanted,
     limits_of_recordings,
     limits_of_rig,
-    narrowed,
 )
 from mckibben.planning.motion import motion
 from mckibben.recording import Recording, listed, sample_time_of
@@ -115,20 +115,20 @@ def plan(
     require(possible, "minutes", minutes, f"3, or up to {MOST_MINUTES:g}", DataError)
     generator(seed)  # raises an error for an invalid seed
     plant = rig if isinstance(rig, Rig) or rig is None else load_rig(rig)
-    limits_of_channels = {} if plant is None else limits_of_rig(plant)
+    channel_limits = {} if plant is None else limits_of_rig(plant)
     recorded_limits: Limits = {}
     gaps: tuple[Gap, ...] = ()
     holds = True
     step = 0.0 if plant is None else plant.sample_time
     if recorded:
-        excitation_of = _excitation_of(recorded, plant)
-        gaps, recorded_limits = gaps_of(excitation_of), limits_of_recordings(excitation_of)
-        limits_of_channels, holds = (
-            recorded_limits | limits_of_channels,
+        measured = _excitation_of(recorded, plant)
+        gaps, recorded_limits = gaps_of(measured), limits_of_recordings(measured)
+        channel_limits, holds = (
+            recorded_limits | channel_limits,
             any(gap.run == "holds" for gap in gaps),
         )
         step = max(step, min(recording.sample_time or math.inf for recording in recorded))
-    allowed = narrowed(limits_of_channels, limits or {})
+    allowed = limits_as_wanted(channel_limits, limits or {})
     check_possible(allowed, seconds, plant)
     parts = motion(allowed, seconds, step, holds, np.random.default_rng(seed))
     commands = np.concatenate([part for _, part in parts])

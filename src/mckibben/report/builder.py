@@ -179,12 +179,12 @@ class Page:
 
     def html(self) -> str:
         """Return the page as HTML."""
-        figures_of_sections = [
+        figures_drawn = [
             item for section in self.sections for item in section.items if isinstance(item, Figure)
         ]
         figures = {
             section.name: section.plots
-            for section in (*([self.lead] if self.lead else []), *figures_of_sections)
+            for section in (*([self.lead] if self.lead else []), *figures_drawn)
         }
         scripts = _scripts() if figures else ()
         return template("page.html.j2").render(

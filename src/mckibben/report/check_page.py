@@ -105,12 +105,12 @@ def _output(check: OutputCheck, place: int, runs: list[FreeRun]) -> list[Item]:
     for kind, label in labels.items():
         plots = [interactive.plots(run_drawn.draw(kind)) for run_drawn in runs_drawn]
         figures.append(Figure(f"{kind}-{place}", plots, label, columns=len(plots[0])))
-    plots_of_autocorrelation = [interactive.plots(model_subjects.autocorrelation(check))]
+    whiteness = [interactive.plots(model_subjects.autocorrelation(check))]
     label = "Autocorrelation of the residual"
     figures.append(
         Figure(
             f"autocorrelation-{place}",
-            plots_of_autocorrelation,
+            whiteness,
             label,
             f"{label}; band: white noise.",
         )

@@ -159,7 +159,7 @@ def save(drawing: Drawing, path: str | Path, columns: Literal[1, 2] | None = Non
 
     figure = io.BytesIO()
     with rc_context(style):
-        canvas = drawn(drawing, columns)
+        canvas = draw_figure(drawing, columns)
         canvas.savefig(figure, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
     with replacing(path) as new:
         new.write_bytes(figure.getvalue())
@@ -178,7 +178,7 @@ def format_of(path: Path) -> str:
     return kind
 
 
-def drawn(drawing: Drawing, columns: Literal[1, 2] | None = None) -> Figure:
+def draw_figure(drawing: Drawing, columns: Literal[1, 2] | None = None) -> Figure:
     """Return a drawing as a matplotlib figure; `save` adds the style of this module."""
     demand("matplotlib", "figures", "figures for print")
     from matplotlib.figure import Figure
@@ -247,14 +247,12 @@ def _legends(figure: Figure, axes: Sequence[Axes]) -> None:
 
     The figure becomes as high as the legends need at most.
     """
-    entries_of_axes = [_entries(axis) for axis in axes]
+    by_axes = [_entries(axis) for axis in axes]
     unique = list(
-        {
-            (entry.name, entry.look): entry for entries in entries_of_axes for entry in entries
-        }.values()
+        {(entry.name, entry.look): entry for entries in by_axes for entry in entries}.values()
     )
     width, height = figure.get_size_inches()
-    figure.set_size_inches(width, height + sum(map(len, entries_of_axes)))
+    figure.set_size_inches(width, height + sum(map(len, by_axes)))
     if len({entry.look for entry in unique}) == len(unique):
         _legend(figure, unique, _POINTS * width, loc="outside upper left")
     else:

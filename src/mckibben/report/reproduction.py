@@ -101,14 +101,14 @@ def items(result: Reproduction) -> list[Item]:
 
 def tables(paper_tables: Sequence[Table], quick: bool = False) -> list[Item]:
     """Return every table under its heading, with its note."""
-    items_of_tables: list[Item] = []
+    items: list[Item] = []
     for table in paper_tables:
-        items_of_tables += [
+        items += [
             Text([heading(table, quick=quick)], "lead"),
             builder.Table(table.columns, table.rows),
         ]
-        items_of_tables.append(Text([table.text.note], "muted") if table.text.note else None)
-    return items_of_tables
+        items.append(Text([table.text.note], "muted") if table.text.note else None)
+    return items
 
 
 def chart(
@@ -278,8 +278,8 @@ def _lines(result: Reproduction, date: str, pictures: str) -> Iterator[str]:
         "What differs from the paper": [Text(result.notes, listed=True)],
         "Tables": tables(result.tables, result.quick),
     }
-    for title, items_of_part in parts.items():
-        yield f"\n## {title}\n\n{builder.markdown(items_of_part)}"
+    for title, items in parts.items():
+        yield f"\n## {title}\n\n{builder.markdown(items)}"
     yield "\n## Figures\n"
     for figure in result.figures:
         yield f"### {heading(figure, quick=result.quick)}\n"
@@ -295,13 +295,9 @@ def _lines(result: Reproduction, date: str, pictures: str) -> Iterator[str]:
 def _indexed(item: Indexed, result: Reproduction) -> str:
     """Return the line of an equation, table or figure in the index."""
     kind, _, key = item.here.partition(":")
-    results_of_kind: tuple[Table | Figure, ...] = (
-        result.tables if kind == "table" else result.figures
-    )
+    candidates: tuple[Table | Figure, ...] = result.tables if kind == "table" else result.figures
     titles = [
-        heading(item_of_kind, quick=result.quick)
-        for item_of_kind in results_of_kind
-        if item_of_kind.key == key
+        heading(candidate, quick=result.quick) for candidate in candidates if candidate.key == key
     ]
     place = f'`printed("{key}")`' if kind == "model" else f"`{item.here}`" if item.here else "–"
     place = f"[{key}](#{_anchor(titles[0])})" if titles else place

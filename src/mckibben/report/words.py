@@ -236,12 +236,12 @@ def quantities(measures: Characterization) -> Iterator[Quantity]:
     slope = unit_of("{y}/{u}")
     for level in measures.levels:
         at = " and ".join(f"{name} at {size(unit, x)}" for name, x, unit in level.held)
-        measures_there = level.found
+        local = level.found
         for name, field, unit in (("loop width", "loop_width", "%"), ("gain", "gain", slope)):
-            limits = measures_there.intervals.get(field)
+            limits = local.intervals.get(field)
             yield Quantity(
                 f"{name} with {at}",
-                getattr(measures_there, field),
+                getattr(local, field),
                 limits,
                 unit,
                 "at mid input there",

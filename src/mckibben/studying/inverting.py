@@ -329,10 +329,8 @@ def static_map(inputs: Sequence[Array], outputs: Sequence[Array]) -> Map:
         tables = [np.hstack([terms(part), y]) for part, y in zip(inputs, outputs, strict=True)]
         width = tables[0].shape[1] - outputs[0].shape[1]
         products = np.array([table.T @ table for table in tables])
-        products_of_others = sums_of_others(products, np.arange(len(tables)))
-        error = float(
-            squared_errors(products, solve_products(products_of_others, width, RIDGE)).sum()
-        )
+        others = sums_of_others(products, np.arange(len(tables)))
+        error = float(squared_errors(products, solve_products(others, width, RIDGE)).sum())
         if error < least:
             least = error
             weights = solve_products(products.sum(axis=0, keepdims=True), width, RIDGE)[0]

@@ -19,7 +19,7 @@ from mckibben.simulation import Simulation
 from mckibben.studying.recorded_inputs import beyond_known
 
 
-def simulated(
+def simulate_recording(
     model: Block,
     read: Callable[[list[str]], list[Recording]],
     *,

@@ -180,7 +180,7 @@ def track(
     from mckibben.blocks.base import Block
     from mckibben.control import BlockController, before
     from mckibben.control import track as close_loop
-    from mckibben.control.connecting import asked, flatters_feedback, kind_of, offered
+    from mckibben.control.connecting import flatters_feedback, kind_of, offer_of, reference_for
     from mckibben.files import write
     from mckibben.studying.recorded_inputs import beyond_known
 
@@ -191,8 +191,8 @@ def track(
 
     block, plant = load_model(compensator, options.fields), _plant(options, reading)
     _require_compensator(block)
-    desired = asked(plant, only(read_files(reference, None, reading)), block)
-    BlockController(block).connect(offered(plant, desired))  # before anything is tuned
+    desired = reference_for(plant, only(read_files(reference, None, reading)), block)
+    BlockController(block).connect(offer_of(plant, desired))  # before anything is tuned
     make_law, settings = _law_of(block, plant, desired, options), _loop_settings(block, options)
 
     with telling(progress, f"{options.controller} on {plant.name}") as tell:

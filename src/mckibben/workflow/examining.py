@@ -254,11 +254,11 @@ def simulate(
         See `mckibben.workflow`; options are those of `mckibben.options.SimulateOptions`.
     """
     from mckibben.files import write
-    from mckibben.studying.simulating import simulated
+    from mckibben.studying.simulating import simulate_recording
 
     options, reading = options_of(SimulateOptions, options, reading, keywords)
     file = claim_output(out, [*paths(model), *files_of(data)], force, recording=True)
-    simulation = simulated(
+    simulation = simulate_recording(
         load_model(model, options.fields),
         lambda names: read_files(data, names, reading),
         initial=None if options.initial == "measured" else options.initial,

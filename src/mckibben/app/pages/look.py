@@ -122,7 +122,7 @@ def _recordings(state: State, used: dict[str, Recording], shown: list[str]) -> N
     widgets.table(["Shown", "Role", "Length"], rows)
 
 
-def _coupling(state: State, effects_of: Coupling, pair: Pair) -> None:
+def _coupling(state: State, coupled: Coupling, pair: Pair) -> None:
     """Show how far every input moves every output; a click shows their loop."""
 
     def cell(driving: str, driven: str, effect: float, unit: str) -> None:
@@ -133,20 +133,20 @@ def _coupling(state: State, effects_of: Coupling, pair: Pair) -> None:
         mark(button, f"pair-{driving}-{driven}")
 
     rows: list[list[Any]] = []
-    rows_of_effects = zip(
-        effects_of.outputs,
-        effects_of.effects.tolist(),
-        effects_of.units,
-        effects_of.explained,
+    effect_rows = zip(
+        coupled.outputs,
+        coupled.effects.tolist(),
+        coupled.units,
+        coupled.explained,
         strict=True,
     )
-    for driven, effects, unit, share in rows_of_effects:
+    for driven, effects, unit, share in effect_rows:
         cells = [
             partial(cell, driving, driven, effect, unit)
-            for driving, effect in zip(effects_of.inputs, effects, strict=True)
+            for driving, effect in zip(coupled.inputs, effects, strict=True)
         ]
         rows.append([driven, *cells, f"{100 * max(share, 0):.0f} %"])
-    mark(widgets.table(["", *effects_of.inputs, "Explained"], rows), "coupling")
+    mark(widgets.table(["", *coupled.inputs, "Explained"], rows), "coupling")
     ui.label(
         "Effect of each input over its whole range on an output, by linear regression on all inputs. "
         "The rest, up to 100 %, is nonlinear, hysteretic or dynamic. Choose a cell to see its loop."

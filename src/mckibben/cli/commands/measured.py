@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from mckibben.cli.output import say, show
-from mckibben.cli.parameters import Force, Json, Quick, command, named_models, repeated
+from mckibben.cli.parameters import Force, Json, Quick, command, named_models, typed_command
 from mckibben.cli.stopping import stoppable
 from mckibben.options import Argument, Jobs, Option, Seed
 from mckibben.parsers import names
@@ -78,7 +78,7 @@ def measured(
             seed=seed,
             jobs=jobs,
             force=force,
-            command=repeated(),
+            command=typed_command(),
             progress=progress,
             found=report,
         )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 from mckibben.cli.output import say, show
-from mckibben.cli.parameters import Force, Json, command, repeated
+from mckibben.cli.parameters import Force, Json, command, typed_command
 from mckibben.cli.stopping import stoppable
 from mckibben.options import Argument, Option, ReadOptions, ReproduceOptions
 
@@ -45,7 +45,7 @@ def reproduce(
     with stoppable(out):
         result = workflow.reproduce(
             name, options, data=data, reading=reading, out=out, force=force, progress=True,
-            command=repeated(),
+            command=typed_command(),
             recognised=lambda table: say("\n".join(text.lines(tables([table]))), error=True),
         )  # fmt: skip
     written = [out / "report.html", out / "tables.json"] if out else []

@@ -107,7 +107,7 @@ def run(
         if others:
             raise DataError("there are several recordings in it", file=inputs, remedy="give one")
         command_recording = command_recording.select(
-            [name_of_input for name_of_input in rig.inputs if name_of_input in command_recording]
+            [channel for channel in rig.inputs if channel in command_recording]
         )
     recording = at_first_commands(rig, command_recording).run(command_recording, seed, ideal=ideal)
     write(recording.with_meta(name=out.stem), out)

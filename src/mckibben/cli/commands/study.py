@@ -23,7 +23,7 @@ from mckibben.cli.parameters import (
     Json,
     Test,
     command,
-    repeated,
+    typed_command,
 )
 from mckibben.cli.stopping import stop_short, stoppable
 from mckibben.options import Option, ReadOptions, StudyOptions
@@ -64,7 +64,7 @@ def study(
             reading=reading,
             out=out,
             force=force,
-            command=repeated(),
+            command=typed_command(),
             progress=True,
             found=on_update,
         )

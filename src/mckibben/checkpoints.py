@@ -79,11 +79,11 @@ class Checkpoints:
         self, name: str, kind: type[Result], compute: Callable[[], Result], *depends: object
     ) -> Result:
         """Return a part, computed if it is not stored yet."""
-        found = self.get(name, kind, *depends)
-        if found is None:
-            found = compute()
-            self.put(name, found, *depends)
-        return found
+        result = self.get(name, kind, *depends)
+        if result is None:
+            result = compute()
+            self.put(name, result, *depends)
+        return result
 
     def inside(self, name: str) -> Path | None:
         """Return a folder for nested parts, or None without checkpoints."""
@@ -93,12 +93,12 @@ class Checkpoints:
         """Remove all parts, but no other files."""
         if self._folder is None or self._folder.is_symlink():
             return
-        for place, _, names in os.walk(self._folder, topdown=False):
+        for folder, _, names in os.walk(self._folder, topdown=False):
             for name in filter(_NAMES.search, names):
                 with suppress(OSError):
-                    Path(place, name).unlink()
+                    Path(folder, name).unlink()
             with suppress(OSError):  # not empty
-                Path(place).rmdir()
+                Path(folder).rmdir()
 
     def _path(self, name: str, depends: object) -> Path | None:
         if self._folder is None:
@@ -120,8 +120,8 @@ def digest(*what: object) -> str:
             hashed.update(f"{value.dtype}{value.shape}".encode())
             hashed.update(np.ascontiguousarray(value).tobytes())
         elif isinstance(value, Recording):  # wherever it was read from
-            known = {key: what for key, what in value.meta.items() if key not in PROVENANCE}
-            take((dict(value.channels), value.sample_time, value.start_time, value.units, known))
+            meta = {key: what for key, what in value.meta.items() if key not in PROVENANCE}
+            take((dict(value.channels), value.sample_time, value.start_time, value.units, meta))
         elif is_dataclass(value) and not isinstance(value, type):
             hashed.update(type(value).__qualname__.encode())
             take({f.name: getattr(value, f.name) for f in fields(value) if f.compare})

@@ -120,8 +120,8 @@ def in_terms_of(
     "give gaps='split', or use track()"
     """
 
-    def render(found: re.Match[str]) -> str:
-        name, call, key, value = found.groups()
+    def render(match: re.Match[str]) -> str:
+        name, call, key, value = match.groups()
         return operation(name) if call == "()" else parameter(name, key, value)
 
     return _NAMED.sub(render, text)
@@ -140,11 +140,11 @@ def rendered(
         where.append(f"channel {_short(error.channel, 100)!r}")
     if error.row is not None:
         where.append(f"row {error.row}")
-    place = f"{', '.join(where)}: " if where else ""
+    location = f"{', '.join(where)}: " if where else ""
     remedy = in_terms_of(_short(error.remedy), parameter, operation)
     problem = in_terms_of(_short(error.problem), parameter, operation)
     stop = "" if problem.endswith("?") else "."
-    return f"{place}{problem}" + (f"{stop} Remedy: {remedy}." if remedy else "")
+    return f"{location}{problem}" + (f"{stop} Remedy: {remedy}." if remedy else "")
 
 
 def argument_words(options: Mapping[str, Any]) -> str:
@@ -154,17 +154,17 @@ def argument_words(options: Mapping[str, Any]) -> str:
     '`units[time]=ms` with `gaps=split` with `raw` without `rate`'
     """
     words = []
-    for name, given in options.items():
-        for key, value in given.items() if isinstance(given, Mapping) else [("", given)]:
+    for name, value_ in options.items():
+        for key, value in value_.items() if isinstance(value_, Mapping) else [("", value_)]:
             argument = f"{name}[{key}]" if key else name
-            shown = argument if value in (None, True) else f"{argument}={value}"
-            words.append(f"{'without' if value is None else 'with'} `{shown}`")
+            word = argument if value in (None, True) else f"{argument}={value}"
+            words.append(f"{'without' if value is None else 'with'} `{word}`")
     return " ".join(words).removeprefix("with ")
 
 
-def _short(given: object, most: int = 1000) -> str:
+def _short(value: object, most: int = 1000) -> str:
     """Return a long text with its middle left out."""
-    text = str(given)
+    text = str(value)
     half = most // 2
     return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
 
@@ -222,7 +222,7 @@ def require(
     holds: bool,
     parameter: str,
     value: object,
-    wanted: str,
+    expectation: str,
     kind: Callable[..., MckibbenError] = ModelError,
 ) -> None:
     """Raise an error for a parameter unless a condition holds.
@@ -239,8 +239,8 @@ def require(
     mckibben.errors.ModelError: delay: it is -1. Remedy: give 0 or more.
     """
     if not holds:
-        shown = f"{value:g}" if isinstance(value, float) else f"{value!r:.60}"
-        raise kind(f"it is {shown}", parameter=parameter, remedy=f"give {wanted}")
+        text = f"{value:g}" if isinstance(value, float) else f"{value!r:.60}"
+        raise kind(f"it is {text}", parameter=parameter, remedy=f"give {expectation}")
 
 
 def unforeseen(error: Exception) -> MckibbenError:

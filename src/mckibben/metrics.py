@@ -73,13 +73,13 @@ def score(measured: ArrayLike, modelled: ArrayLike) -> Scores:
     )
 
 
-def mean_scores(found: Sequence[Scores]) -> Scores:
+def mean_scores(scores: Sequence[Scores]) -> Scores:
     """Return the combined errors of several outputs: means, and the overall largest error."""
     means = {
-        name: float(np.mean([getattr(one, name) for one in found]))
+        name: float(np.mean([getattr(one, name) for one in scores]))
         for name in ("rmse", "mae", "r2", "nrmse", "err")
     }
-    return Scores(**means, max_error=max(one.max_error for one in found))
+    return Scores(**means, max_error=max(one.max_error for one in scores))
 
 
 def rmse(measured: ArrayLike, modelled: ArrayLike) -> float:

@@ -244,5 +244,5 @@ def load(group: str, name: str) -> Any:
 def _locations(group: str) -> dict[str, str]:
     outside = {entry.name: entry.value for entry in entry_points(group=f"mckibben.{group}")}
     models = _locations("models") if group in OF_MODEL else {}
-    both = {name: f"{place}{OF_MODEL[group]}" for name, place in models.items()}
-    return both | outside | PLUGINS[group]
+    locations = {name: f"{module}{OF_MODEL[group]}" for name, module in models.items()}
+    return locations | outside | PLUGINS[group]

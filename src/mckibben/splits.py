@@ -92,28 +92,28 @@ def held_out(recordings: Sequence[Recording], channels: Channels) -> Split:
     if channels.single and len(recordings) > 1:
         groups = _repeats(recordings, channels.inputs[0], EVERY)
         if len(groups) > 1:
-            tested = [place in groups[-1] for place in range(len(recordings))]
+            tested = [k in groups[-1] for k in range(len(recordings))]
             return _parted(recordings, tested, f"the last run at each {channels.inputs[0]}")
-    given = channels.inputs if channels.single else channels.scheduling
+    levelled = channels.inputs if channels.single else channels.scheduling
     for name in channels.held if len(recordings) > 1 else ():
         means = [float(f"{recording[name].mean():.3g}") for recording in recordings]
         unseen = sorted(set(means))[1:-1][::EVERY]
-        if unseen and name in given:
+        if unseen and name in levelled:
             levels = f"{', '.join(f'{level:g}' for level in unseen)} {recordings[0].units[name]}"
             return _parted(
                 recordings, [mean in unseen for mean in means], f"runs at {name} {levels}"
             )
     if len(recordings) >= EVERY and not channels.single:
-        tested = [place % EVERY == EVERY - 1 for place in range(len(recordings))]
+        tested = [k % EVERY == EVERY - 1 for k in range(len(recordings))]
         return _parted(recordings, tested, "every third run")
     return held_out_part(recordings, channels, HELD_OUT)
 
 
-def _parted(recordings: Sequence[Recording], tested: Sequence[bool], which: str) -> Split:
+def _parted(recordings: Sequence[Recording], tested: Sequence[bool], kind: str) -> Split:
     train = [run for run, is_test in zip(recordings, tested, strict=True) if not is_test]
     test = [run for run, is_test in zip(recordings, tested, strict=True) if is_test]
     split = given_split(train, test)
-    return replace(split, described=f"{split.described}: {which} held out")
+    return replace(split, described=f"{split.described}: {kind} held out")
 
 
 def held_out_part(recordings: Sequence[Recording], channels: Channels, share: float) -> Split:
@@ -145,10 +145,10 @@ def held_out_part(recordings: Sequence[Recording], channels: Channels, share: fl
         return bool((scored.std(axis=0) >= HARDLY * deviation).any())
 
     split = last = _tail(recordings, channel, travel, "all before")
-    for place in range(1, int(1 / share)):
+    for k in range(1, int(1 / share)):
         if moves(split):
             return split
-        before, partly, after = _cut(recordings, channel, place * travel)
+        before, partly, after = _cut(recordings, channel, k * travel)
         if partly is not None:
             run, start = partly
             before, after = [*before, run.slice(0, start)], [run.slice(start, len(run)), *after]
@@ -158,9 +158,9 @@ def held_out_part(recordings: Sequence[Recording], channels: Channels, share: fl
     return split if moves(split) else last
 
 
-def _tail(recordings: Sequence[Recording], channel: str, travel: float, rest: str) -> Split:
+def _tail(recordings: Sequence[Recording], channel: str, travel: float, kind: str) -> Split:
     """Hold out the last part of the input's travel."""
-    train, partly, whole = _cut(recordings, channel, travel)
+    train, partly, test_whole = _cut(recordings, channel, travel)
     described, tests, rows = [], [], []
     if partly is not None:
         run, start = partly
@@ -168,18 +168,18 @@ def _tail(recordings: Sequence[Recording], channel: str, travel: float, rest: st
         tests.append(run)
         rows.append((np.arange(len(run)) >= start) & ~run.bridged)
         described.append(f"last {len(run) - start} samples of {run.name}")
-    elif not whole:
+    elif not test_whole:
         raise DataError(
             f"{len(recordings[-1])} samples are too few to hold out a part for it",
             file=recordings[-1].source,
             parameter="test",
             remedy="give a longer recording, or a separate test recording with `test`",
         )
-    if whole:
-        given = given_split(train, whole)
-        tests, rows = [*tests, *given.test], [*rows, *given.test_rows]
-        described.append(f"the last {counted(len(whole), 'recording')}")
-    words = f"{' and '.join(described)} to test, {rest} to fit"
+    if test_whole:
+        split = given_split(train, test_whole)
+        tests, rows = [*tests, *split.test], [*rows, *split.test_rows]
+        described.append(f"the last {counted(len(test_whole), 'recording')}")
+    words = f"{' and '.join(described)} to test, {kind} to fit"
     return Split(tuple(train), tuple(tests), tuple(rows), words)
 
 
@@ -192,8 +192,8 @@ def _cut(
     while len(before) > 1 and travels[-1][-1] <= travel:
         travel -= float(travels.pop()[-1])
         after.insert(0, before.pop())
-    run, gone = before[-1], travels[-1]
-    start = int(np.searchsorted(gone, gone[-1] - travel))
+    run, travelled = before[-1], travels[-1]
+    start = int(np.searchsorted(travelled, travelled[-1] - travel))
     if start < FEWEST_SAMPLES and len(before) > 1:  # nearly all, as of recordings equally long
         return before[:-1], None, [run, *after]
     if min(start, len(run) - start) < FEWEST_SAMPLES:
@@ -204,10 +204,10 @@ def _cut(
 def _travel(u: Array) -> Array:
     """Return the cumulative travel of the input at every sample, without noise."""
     turns = reversals(u)
-    gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(u[turns])))])
+    path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(u[turns])))])
     branch = np.clip(np.searchsorted(turns, np.arange(u.size), side="right") - 1, 0, turns.size - 2)
-    own = np.abs(u - u[turns[branch]])
-    return np.minimum(gone[branch] + own, gone[branch + 1])
+    branch_travel = np.abs(u - u[turns[branch]])
+    return np.minimum(path[branch] + branch_travel, path[branch + 1])
 
 
 def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]]:
@@ -215,8 +215,10 @@ def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]
     if any(np.ptp(recording[channel]) > 0 for recording in train):
         return []
     levels = [float(recording[channel][0]) for recording in train]
-    repeat = [levels[:place].count(level) for place, level in enumerate(levels)]
-    groups = [[place for place, k in enumerate(repeat) if k % n == one] for one in range(n)]
+    repeat = [levels[:index].count(level) for index, level in enumerate(levels)]
+    groups = [
+        [index for index, k in enumerate(repeat) if k % n == remainder] for remainder in range(n)
+    ]
     return [group for group in groups if group] if min(map(levels.count, levels)) > 1 else []
 
 
@@ -232,11 +234,11 @@ def parts_of(recordings: Sequence[Recording], channels: Channels) -> tuple[Part,
     """
     each = -(-N_PARTS // len(recordings))
     pieces = [
-        (place, piece)
-        for place in _by_level(recordings, channels)
+        (index, piece)
+        for index in _by_level(recordings, channels)
         for piece in np.array_split(
-            np.arange(len(recordings[place])),
-            np.clip(len(recordings[place]) // FEWEST_SAMPLES, 1, each),
+            np.arange(len(recordings[index])),
+            np.clip(len(recordings[index]) // FEWEST_SAMPLES, 1, each),
         )
     ]
     count = len(pieces) if each > 1 else N_PARTS
@@ -244,24 +246,24 @@ def parts_of(recordings: Sequence[Recording], channels: Channels) -> tuple[Part,
     parts = []
     for first in range(count if count > 1 else 0):
         rows = [np.zeros(len(recording), dtype=bool) for recording in recordings]
-        for place, piece in pieces[first::count]:
-            rows[place][piece] = measured[place][piece]
-        if any(kept.any() for kept in rows):
+        for index, piece in pieces[first::count]:
+            rows[index][piece] = measured[index][piece]
+        if any(mask.any() for mask in rows):
             parts.append(tuple(rows))
     return tuple(parts)
 
 
 def spans_of(part: Part, recordings: Sequence[Recording]) -> tuple[Span, ...]:
     """Return what a part has of each recording."""
-    found = []
+    spans = []
     for recording, rows in zip(recordings, part, strict=True):
         times, unit = recording.time[rows], "" if recording.sample_time is None else "s"
         if times.size:
-            found.append(Span(recording.name, float(times[0]), float(times[-1]), unit))
-    return tuple(found)
+            spans.append(Span(recording.name, float(times[0]), float(times[-1]), unit))
+    return tuple(spans)
 
 
 def _by_level(recordings: Sequence[Recording], channels: Channels) -> list[int]:
     """Return the indices of recordings, in the order of the channels that each of them holds."""
     levels = [tuple(float(f"{r[name].mean():.3g}") for name in channels.held) for r in recordings]
-    return sorted(range(len(recordings)), key=lambda place: levels[place])
+    return sorted(range(len(recordings)), key=lambda k: levels[k])

@@ -158,8 +158,8 @@ def require_exportable(model: Block) -> Balance:
         TABLE[name].label: bool(np.any(getattr(balance, name) or 0.0))
         for name in ("relaxation", "walls", "lines", "mass", "pushes")
     }
-    if found := [what for what, there in lacking.items() if there]:
-        raise ModelError(f"MJCF does not carry {', '.join(found)}", remedy=again)
+    if obstacles := [part for part, is_there in lacking.items() if is_there]:
+        raise ModelError(f"MJCF does not carry {', '.join(obstacles)}", remedy=again)
     LoadEstimate(balance)  # refuses a balance without a force, or from what is no pressure
     return balance
 
@@ -207,16 +207,16 @@ def _tendons(
         for site in sites:
             ET.SubElement(tendon, "site", site=site)
 
-    def beyond(side: float, place: float) -> str:
+    def beyond(side: float, start: float) -> str:
         """Return the dead band of a spring met by shortening, or by lengthening, past a place [mm]."""
-        edge = rest - place / MM
+        edge = rest - start / MM
         return _row(edge, 1e3) if side > 0 else _row(0.0, edge)
 
     square, cube = [*muscle.elasticity[0], 0.0, 0.0][:2]  # by how much shorter it is
-    own = muscle.bladders[0] if muscle.bladders else 0.0
+    bladder = muscle.bladders[0] if muscle.bladders else 0.0
     add(
         "",
-        MM * (muscle.springs[0][1] + own),
+        MM * (muscle.springs[0][1] + bladder),
         -square * (MM / muscle.scale) ** 2,
         cube * (MM / muscle.scale) ** 3,
         damping=_row(MM * muscle.damping[0]),
@@ -229,15 +229,15 @@ def _tendons(
             add(f"_stop_{number}", MM * stiffness, springyield=_row(limit / MM))
     # beyond the shortenings known elasticity goes on straight: what bends there is taken away again
     ends = [(f"_{end}", side, muscle.hull[0][side > 0]) for end, side in (("low", -1), ("high", 1))]
-    for suffix, side, place in ends:
-        bend = square + 3.0 * cube * place / muscle.scale
-        taken = bend * (MM / muscle.scale) ** 2, -cube * (MM / muscle.scale) ** 3
-        if any(taken):
-            add(suffix, 0.0, *taken, springlength=beyond(side, place))
+    for suffix, side, start in ends:
+        bend = square + 3.0 * cube * start / muscle.scale
+        spring = bend * (MM / muscle.scale) ** 2, -cube * (MM / muscle.scale) ** 3
+        if any(spring):
+            add(suffix, 0.0, *spring, springlength=beyond(side, start))
     met = np.reshape(muscle.obstacles, (-1, 3)).tolist()
-    for number, (side, place, stiffness) in enumerate(met, start=1):
+    for number, (side, start, stiffness) in enumerate(met, start=1):
         if stiffness > 0:
-            add(f"_obstacle_{number}", MM * stiffness, springlength=beyond(side, place))
+            add(f"_obstacle_{number}", MM * stiffness, springlength=beyond(side, start))
 
 
 def _row(*numbers: float) -> str:

@@ -24,8 +24,8 @@ FLAGS = (
 
 def own_compiler() -> str | None:
     """Return the C compiler of this machine, $CC, cc, gcc or clang, or None."""
-    wanted = [name for name in (os.environ.get("CC"), "cc", "gcc", "clang") if name]
-    return next((path for path in map(shutil.which, wanted) if path), None)
+    names = [name for name in (os.environ.get("CC"), "cc", "gcc", "clang") if name]
+    return next((path for path in map(shutil.which, names) if path), None)
 
 
 def run(command: Sequence[str], failed: str, *, folder: Path | None = None) -> str:
@@ -44,13 +44,13 @@ def run(command: Sequence[str], failed: str, *, folder: Path | None = None) -> s
     ModelError
         If it does not succeed.
     """
-    found = subprocess.run(
+    result = subprocess.run(
         command, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT, check=False
     )
-    if found.returncode != 0:
-        complaint = found.stderr.strip() or found.stdout.strip()
+    if result.returncode != 0:
+        complaint = result.stderr.strip() or result.stdout.strip()
         raise ModelError(f"{failed}: {complaint[:500]}", remedy="report it, with the model")
-    return found.stdout
+    return result.stdout
 
 
 def compile_c(sources: Sequence[Path], out: Path, *, options: Sequence[str] = ()) -> None:
@@ -79,8 +79,8 @@ def self_test(folder: Path, name: str) -> str:
     ModelError
         If it does not compile, or its results are not those of Python.
     """
-    with tempfile.TemporaryDirectory() as place:
-        program = Path(place) / "selftest"
+    with tempfile.TemporaryDirectory() as folder_:
+        program = Path(folder_) / "selftest"
         sources = sorted((folder / "src").glob("*.c"))
         test = folder / "test" / f"{name}_selftest.c"
         compile_c([*sources, test], program, options=[f"-I{folder / 'src'}"])

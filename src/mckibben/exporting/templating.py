@@ -72,7 +72,7 @@ def rows(values: Iterable[float], *, single: bool = False) -> list[str]:
 
 def wrapped(line: str) -> list[str]:
     """Return a line of C wrapped to the line length; types stay with their names."""
-    rest = " " * (len(line) - len(line.lstrip()) + 8)
+    indent = " " * (len(line) - len(line.lstrip()) + 8)
     line = re.sub(r"(const|mck_real|int) (?=\*?\w)", "\\1\u00a0", line)
-    lines = textwrap.wrap(line, CODE_WIDTH, subsequent_indent=rest, break_on_hyphens=False)
+    lines = textwrap.wrap(line, CODE_WIDTH, subsequent_indent=indent, break_on_hyphens=False)
     return [each.replace("\u00a0", " ") for each in lines]

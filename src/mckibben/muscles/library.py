@@ -60,11 +60,11 @@ class _File(BaseModel):
 
     @field_validator("uncertainty")
     @classmethod
-    def _is_whole(cls, given: dict[str, tuple[float, ...]]) -> dict[str, tuple[float, ...]]:
-        if {name: len(values) for name, values in given.items()} != GROUPS:
-            wanted = ", ".join(f"{name} ({count})" for name, count in GROUPS.items())
-            raise ValueError(f"it has to hold {wanted}")
-        return given
+    def _is_whole(cls, groups: dict[str, tuple[float, ...]]) -> dict[str, tuple[float, ...]]:
+        if {name: len(values) for name, values in groups.items()} != GROUPS:
+            expected = ", ".join(f"{name} ({count})" for name, count in GROUPS.items())
+            raise ValueError(f"it has to hold {expected}")
+        return groups
 
 
 @dataclass(frozen=True)
@@ -98,8 +98,8 @@ class Muscle:
 
     def summary(self) -> dict[str, Any]:
         """Return its description and its data sheet, for JSON."""
-        named = {key: getattr(self, key) for key in ("title", "virtual", "source", "licence")}
-        return named | {"sheet": self.sheet.model_dump(exclude_none=True)}
+        fields_ = {key: getattr(self, key) for key in ("title", "virtual", "source", "licence")}
+        return fields_ | {"sheet": self.sheet.model_dump(exclude_none=True)}
 
     def to_dict(self) -> dict[str, Any]:
         """Return it with its conditions and its balance, for JSON."""
@@ -110,8 +110,8 @@ class Muscle:
     @property
     def traits(self) -> Array:
         """Traits determined by its recordings, others NaN."""
-        found = traits(self.balance, self.sheet)
-        return np.where(self.errors < UNSURE, found, np.nan)
+        result = traits(self.balance, self.sheet)
+        return np.where(self.errors < UNSURE, result, np.nan)
 
 
 @cache
@@ -156,8 +156,8 @@ def _load(path: Path) -> Muscle:
             remedy=f"give a muscle's file, or one of {', '.join(names())}",
         )
     try:
-        found = _File.model_validate(content)
-        balance = part_from_dict(found.balance | {"kind": Balance.kind})
+        file = _File.model_validate(content)
+        balance = part_from_dict(file.balance | {"kind": Balance.kind})
     except ValidationError as error:
         raise invalid(error, path, "correct it, as files of the library have it") from None
     except ModelError as error:
@@ -165,11 +165,9 @@ def _load(path: Path) -> Muscle:
         where = "balance" if error.parameter is None else f"balance.{error.parameter}"
         raise DataError(error.problem, file=path, parameter=where, remedy=remedy) from None
     assert isinstance(balance, Balance)
-    errors = np.concatenate(
-        [np.array(found.uncertainty[name], dtype=np.float64) for name in GROUPS]
-    )
-    fields = found.model_dump(include={"title", "source", "licence", "virtual"})
-    muscle = Muscle(path.stem, **fields, sheet=found.sheet, conditions=found.conditions,
+    errors = np.concatenate([np.array(file.uncertainty[name], dtype=np.float64) for name in GROUPS])
+    fields = file.model_dump(include={"title", "source", "licence", "virtual"})
+    muscle = Muscle(path.stem, **fields, sheet=file.sheet, conditions=file.conditions,
                     balance=balance, errors=errors)  # fmt: skip
     try:
         sound = bool(np.isfinite(muscle.traits[errors < UNSURE]).all())
@@ -203,8 +201,8 @@ def described(muscle: Muscle) -> str:
     """Return a muscle as the text of its file."""
     block = muscle.balance.to_dict()
     channels = {"driven", "scheduled", "given"}
-    left = {"format", "version", "kind", "pressure_range", *channels}
-    left |= {
+    known_keys = {"format", "version", "kind", "pressure_range", *channels}
+    known_keys |= {
         each.name for each in fields(Balance) if getattr(muscle.balance, each.name) == each.default
     }
     text = [f'format = "{FORMAT}"', f"version = {VERSION}"]
@@ -213,8 +211,8 @@ def described(muscle: Muscle) -> str:
     text += _pairs(muscle.sheet.model_dump(exclude_none=True))
     text += ["", "[conditions]", *_pairs(muscle.conditions.model_dump(exclude_none=True))]
     text += ["", "[uncertainty]  # standard errors of the logarithms of its traits; inf: unknown"]
-    text += [f"{name} = {_toml(muscle.errors[place].tolist())}" for name, place in PLACES.items()]
-    text += ["", "[balance]", *_pairs({k: v for k, v in block.items() if k not in left})]
+    text += [f"{name} = {_toml(muscle.errors[index].tolist())}" for name, index in PLACES.items()]
+    text += ["", "[balance]", *_pairs({k: v for k, v in block.items() if k not in known_keys})]
     text += _pairs({k: block[k] for k in block if k in channels})
     return "\n".join(text) + "\n"
 

@@ -79,10 +79,10 @@ class Prior:
         """
         rows = []
         for name, columns in PLACES.items():
-            known = np.flatnonzero(np.isfinite(self.mean[columns]))
-            factor = np.linalg.cholesky(self.covariance(name)[np.ix_(known, known)])
-            part = np.zeros((known.size, COUNT))
-            part[:, known + columns.start] = np.linalg.inv(factor)
+            finite = np.flatnonzero(np.isfinite(self.mean[columns]))
+            factor = np.linalg.cholesky(self.covariance(name)[np.ix_(finite, finite)])
+            part = np.zeros((finite.size, COUNT))
+            part[:, finite + columns.start] = np.linalg.inv(factor)
             rows.append(part)
         return np.concatenate(rows)
 
@@ -140,9 +140,9 @@ def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = No
         raise DataError("there are no muscles to derive a prior from", remedy="leave fewer out")
     muscles = sorted(muscles, key=lambda muscle: muscle.name)
     table = np.array([muscle.traits for muscle in muscles])
-    known = np.isfinite(table)
+    is_known = np.isfinite(table)
     similarity = np.array([muscle.sheet.shape for muscle in muscles])
-    wanted = sheet.shape if like is None else like.sheet.shape
+    shape = sheet.shape if like is None else like.sheet.shape
 
     mean = np.full(COUNT, np.nan)
     levels, shapes = {}, {}
@@ -150,19 +150,19 @@ def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = No
         level_std, shape_std = _spreads(table[:, columns])
         spread = float(np.hypot(level_std, shape_std))
         for trait in range(columns.start, columns.stop):
-            which = known[:, trait]
-            if which.any():
-                average = float(table[which, trait].mean())
-                weights, _ = _kriging_weights(similarity[which], wanted, spread)
-                mean[trait] = average + weights @ (table[which, trait] - average)
-        informed = known[:, columns].any(axis=1)
-        remaining = _kriging_weights(similarity[informed], wanted, spread)[1]
+            rows = is_known[:, trait]
+            if rows.any():
+                average = float(table[rows, trait].mean())
+                weights, _ = _kriging_weights(similarity[rows], shape, spread)
+                mean[trait] = average + weights @ (table[rows, trait] - average)
+        informed = is_known[:, columns].any(axis=1)
+        remaining = _kriging_weights(similarity[informed], shape, spread)[1]
         levels[name] = float(np.hypot(remaining * level_std, ALIKE))
         shapes[name] = float(np.hypot(remaining * shape_std, ALIKE))
     return Prior(sheet, mean, levels, shapes, ZERO * sheet.rest_length_mm)
 
 
-def _kriging_weights(similarity: Array, wanted: Array, spread: float) -> tuple[Array, float]:
+def _kriging_weights(similarity: Array, target: Array, spread: float) -> tuple[Array, float]:
     """Return the weight of each muscle's deviation from the mean, and the remaining share of the spread.
 
     Parameters
@@ -177,11 +177,11 @@ def _kriging_weights(similarity: Array, wanted: Array, spread: float) -> tuple[A
     if not len(similarity):
         return np.zeros(0), 1.0
 
-    def correlation(some: Array, others: Array) -> Array:
-        distances = (some[:, np.newaxis] - others) / NEAR
+    def correlation(some: Array, points: Array) -> Array:
+        distances = (some[:, np.newaxis] - points) / NEAR
         return np.asarray(np.exp(-0.5 * (distances**2).sum(axis=2)))
 
-    to_wanted = correlation(similarity, wanted[np.newaxis])[:, 0]
+    to_wanted = correlation(similarity, target[np.newaxis])[:, 0]
     independent = (ALIKE / spread) ** 2 * np.eye(len(similarity))
     among = correlation(similarity, similarity) + independent
     weights: Array = np.asarray(np.linalg.solve(among, to_wanted), dtype=np.float64)
@@ -199,21 +199,21 @@ def _spreads(table: Array) -> tuple[float, float]:
     table : array, shape (muscles, traits)
         Traits of one name; NaN where a muscle does not have it.
     """
-    known = np.isfinite(table)
-    has_any = known.any(axis=1)
+    is_known = np.isfinite(table)
+    has_any = is_known.any(axis=1)
     n = int(has_any.sum())
     if n < FEWEST_MUSCLES:
         return DEFAULT_SPREAD, DEFAULT_SPREAD
-    table, known = table[has_any], known[has_any]
+    table, is_known = table[has_any], is_known[has_any]
 
     # deviations from the mean over muscles, 0 where unknown
-    deviations = np.where(known, table, 0.0)
-    means = deviations.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    deviations = np.where(known, deviations - means, 0.0)
+    deviations = np.where(is_known, table, 0.0)
+    means = deviations.sum(axis=0) / np.maximum(is_known.sum(axis=0), 1)
+    deviations = np.where(is_known, deviations - means, 0.0)
 
     # a muscle's mean deviation is its level, the rest its shape
-    level = deviations.sum(axis=1) / known.sum(axis=1)
-    shape = np.where(known, deviations - level[:, np.newaxis], 0.0)
+    level = deviations.sum(axis=1) / is_known.sum(axis=1)
+    shape = np.where(is_known, deviations - level[:, np.newaxis], 0.0)
 
     # variance of the prediction for a new muscle, relative to that of the sample
     freedom = n - 1

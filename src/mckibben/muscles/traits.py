@@ -91,12 +91,13 @@ def traits(balance: Balance, sheet: Sheet, zero: float = 0.0) -> Array:
     area = np.array(balance.areas[0])
     ends = sheet.stroke * ALONG - zero
     at_rest = np.array([-zero])
-    rest = max(float(_straight(area, balance, at_rest)[0]), 0.1 * float(area[0]))
-    force = rest * sheet.max_pressure_bar  # in the model's own unit of force
+    rest_force = max(float(_straight(area, balance, at_rest)[0]), 0.1 * float(area[0]))
+    force = rest_force * sheet.max_pressure_bar  # in the model's own unit of force
     newtons = bool(balance.n_loads)
-    found = {
-        "area": [_log(rest / (balance.loads[0][0] * sheet.area)) if newtons else np.nan],
-        "loss": _log(_straight(area, balance, ends) / rest, 0.01) - np.log(sheet.narrowed(ALONG)),
+    values = {
+        "area": [_log(rest_force / (balance.loads[0][0] * sheet.area)) if newtons else np.nan],
+        "loss": _log(_straight(area, balance, ends) / rest_force, 0.01)
+        - np.log(sheet.narrowed(ALONG)),
     }
     h, limits = np.array(balance.friction[0]), np.array(balance.limits)
 
@@ -104,28 +105,28 @@ def traits(balance: Balance, sheet: Sheet, zero: float = 0.0) -> Array:
         grown = 1.0 + balance.friction_growth * (p / balance.highest_pressure - 1.0)
         return np.minimum(travels[:, np.newaxis], limits * grown) @ h
 
-    own = balance.springs[0][1] + sum(balance.bladders)
-    powers = np.array([balance.springs[0][0], own * balance.scale, *balance.elasticity[0]])
+    elastance = balance.springs[0][1] + sum(balance.bladders)
+    powers = np.array([balance.springs[0][0], elastance * balance.scale, *balance.elasticity[0]])
     at_zero = _straight(powers, balance, at_rest)
     elastic = _straight(powers, balance, ends) - at_zero
     furthest = min(sheet.stroke, float(balance.hull[0][1]) + zero)  # areas beyond are guesses
     share = np.array([furthest / sheet.stroke, 1.0])
-    kept = _straight(area, balance, np.array([furthest - zero]))[0] / rest
-    held = force * max(kept, 0.02) * np.divide(*sheet.narrowed(share)[::-1])
-    found["elasticity"] = _log(elastic / held + LEAST["elasticity"], 0.01)
+    share_left = _straight(area, balance, np.array([furthest - zero]))[0] / rest_force
+    held_force = force * max(share_left, 0.02) * np.divide(*sheet.narrowed(share)[::-1])
+    values["elasticity"] = _log(elastic / held_force + LEAST["elasticity"], 0.01)
     pressures = sheet.max_pressure_bar * PRESSURES
-    shares = [rubbed(p, sheet.stroke * TRAVELS) / (p * rest) for p in pressures.tolist()]
-    found["friction"] = _log(np.concatenate(shares) + LEAST["friction"])
-    left = np.exp(-TIMES[:, np.newaxis] / np.array([*balance.lags, 1.0]))
-    relaxing = left @ np.array([*balance.relaxation[0], 0.0])
-    stiffness = max(float(elastic[-1]), 0.05 * held) / sheet.stroke
-    found["relaxation"] = _log(relaxing / stiffness + LEAST["relaxation"])
+    shares = [rubbed(p, sheet.stroke * TRAVELS) / (p * rest_force) for p in pressures.tolist()]
+    values["friction"] = _log(np.concatenate(shares) + LEAST["friction"])
+    fading = np.exp(-TIMES[:, np.newaxis] / np.array([*balance.lags, 1.0]))
+    relaxing = fading @ np.array([*balance.relaxation[0], 0.0])
+    stiffness = max(float(elastic[-1]), 0.05 * held_force) / sheet.stroke
+    values["relaxation"] = _log(relaxing / stiffness + LEAST["relaxation"])
     damping = balance.damping[0] + sum(balance.lines)
-    found["damping"] = _log([damping * sheet.stroke / force + LEAST["damping"]])
+    values["damping"] = _log([damping * sheet.stroke / force + LEAST["damping"]])
     stretch = balance.walls[0] * sheet.max_pressure_bar / sheet.stroke
-    found["wall"] = _log([stretch + LEAST["wall"]])
-    found["offset"] = [at_zero[0] / force if newtons else np.nan]
-    return np.concatenate([np.ravel(found[name]) for name in GROUPS])
+    values["wall"] = _log([stretch + LEAST["wall"]])
+    values["offset"] = [at_zero[0] / force if newtons else np.nan]
+    return np.concatenate([np.ravel(values[name]) for name in GROUPS])
 
 
 def _log(values: object, least: float = 1e-6) -> Array:

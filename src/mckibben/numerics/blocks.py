@@ -46,8 +46,8 @@ def squared_errors(products: Array, weights: Array) -> Array:
     """
     m = weights.shape[2]
     targets = np.broadcast_to(-np.eye(m), (len(weights), m, m))
-    whole = np.concatenate([weights, targets], axis=1)
-    return np.asarray((whole * (products @ whole)).sum(axis=1))
+    columns = np.concatenate([weights, targets], axis=1)
+    return np.asarray((columns * (products @ columns)).sum(axis=1))
 
 
 def block_length(n: int, correlation: float = 1.0) -> int:
@@ -100,17 +100,17 @@ class BlockBootstrap:
             Errors of one model at all scored samples.
         """
         if errors.ndim == 2:
-            found: Array = np.mean([self.rmse(column) for column in errors.T], axis=0)
-            return found
+            result: Array = np.mean([self.rmse(column) for column in errors.T], axis=0)
+            return result
         total, count = np.zeros(RESAMPLES), 0
         for offset, n, block, starts in self._parts:
             around = np.resize(errors[offset : offset + n] ** 2, n + block)
             squares = np.concatenate([[0.0], np.cumsum(around)])
             total += n * (squares[starts + block] - squares[starts]).mean(axis=1) / block
             count += n
-        found = np.sqrt(total / count)
-        middle = found.mean()
-        return np.maximum(middle + self._wider * (found - middle), 0.0)
+        result = np.sqrt(total / count)
+        middle = result.mean()
+        return np.maximum(middle + self._wider * (result - middle), 0.0)
 
 
 def interval(samples: Array) -> tuple[float, float]:
@@ -133,13 +133,13 @@ def difference_intervals(samples: Array, values: Array, chosen: int) -> list[tup
     chosen : int
         Index of the model that all are compared with; its own interval is 0 to 0.
     """
-    apart, found = samples - samples[chosen], values - values[chosen]
-    deviation = apart.std(axis=1)
+    differences, best_differences = samples - samples[chosen], values - values[chosen]
+    deviation = differences.std(axis=1)
     varies = deviation > 1e-12 * np.abs(values)
     multiple = 0.0
     if varies.any():
-        strayed = np.abs(apart[varies] - apart[varies].mean(axis=1, keepdims=True))
+        strayed = np.abs(differences[varies] - differences[varies].mean(axis=1, keepdims=True))
         largest = (strayed / deviation[varies, np.newaxis]).max(axis=0)
         multiple = float(np.quantile(largest, 0.95))
     half = multiple * deviation
-    return [(float(d - h), float(d + h)) for d, h in zip(found, half, strict=True)]
+    return [(float(d - h), float(d + h)) for d, h in zip(best_differences, half, strict=True)]

@@ -79,14 +79,14 @@ def trust_region(
     first = float(last[0] @ last[0])
     if not 0.0 < first < np.inf:
         return [(start, first)]
-    unit, known = np.sqrt(first / last[0].size), True
+    unit, is_current = np.sqrt(first / last[0].size), True
     path: list[tuple[Array, float]] = []
 
     def errors_at(z: Array) -> Array:
-        nonlocal last, known
-        if not known:
+        nonlocal last, is_current
+        if not is_current:
             last = errors(origin + sizes * z)
-        known = False
+        is_current = False
         return last[0] / unit
 
     def slopes_at(z: Array) -> Array:  # called at the start and after every step that is taken
@@ -112,7 +112,7 @@ def differences(
     at: Array,
     steps: Array,
     places: Sequence[int] | None = None,
-    here: Array | None = None,
+    value: Array | None = None,
 ) -> Array:
     """Return the differences of a function's values by each of k arguments, shape (..., k).
 
@@ -127,30 +127,30 @@ def differences(
     here : array, optional
         Values at the arguments, if known.
     """
-    here, found = function(at) if here is None else here, []
-    for place in range(at.size) if places is None else places:
-        moved = at.copy()
-        moved[place] += steps[place]
-        away = moved[place] - at[place] or steps[place]  # one lost in rounding moves nothing
-        found.append((function(moved) - here) / away)
-    return np.stack(found, axis=-1) if found else np.zeros((*here.shape, 0))
+    value, columns = function(at) if value is None else value, []
+    for k in range(at.size) if places is None else places:
+        shifted = at.copy()
+        shifted[k] += steps[k]
+        away = shifted[k] - at[k] or steps[k]  # one lost in rounding moves nothing
+        columns.append((function(shifted) - value) / away)
+    return np.stack(columns, axis=-1) if columns else np.zeros((*value.shape, 0))
 
 
 def by_differences(errors: Callable[[Array], Array], steps: Array) -> Errors:
     """Return errors with derivatives by finite differences of so large steps, shape (p,)."""
 
     def sloped(point: Array) -> tuple[Array, Callable[[], Array]]:
-        here = errors(point)
-        return here, lambda: differences(errors, point, steps, here=here)
+        at_point = errors(point)
+        return at_point, lambda: differences(errors, point, steps, value=at_point)
 
     return sloped
 
 
 def triangle_of(slopes: Array, errors: Array) -> Array:
     """Return the triangle, (p + 1, p + 1), of derivatives, (n, p), and errors; rows not finite are 0."""
-    both = np.column_stack([slopes, errors])
-    both[~np.isfinite(both).all(axis=1)] = 0.0
-    triangle: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
+    columns = np.column_stack([slopes, errors])
+    columns[~np.isfinite(columns).all(axis=1)] = 0.0
+    triangle: Array = np.linalg.qr(columns, mode="r")  # type: ignore[assignment]
     return triangle
 
 
@@ -179,19 +179,19 @@ def levenberg_marquardt(
         Called with every better point, and its root mean square error.
     """
     damping, slow, point = FIRST_DAMPING, 0, start
-    found, slopes = errors(point, True)
-    cost = rms(found)
+    errors_now, slopes = errors(point, True)
+    cost = rms(errors_now)
     improved(point, cost)
     for number in range(steps):
         if not len(slopes):
-            found, slopes = errors(point, True)
-        triangle = triangle_of(slopes, found)
+            errors_now, slopes = errors(point, True)
+        triangle = triangle_of(slopes, errors_now)
         for turn in range(MOST_TRIES):
             try:
-                tried = step(triangle, point, damping)
+                trial = step(triangle, point, damping)
                 # most others are accepted, so that their slopes are needed
-                found, slopes = errors(tried, turn == 0 and number < steps - 1)
-                size = rms(found)
+                errors_now, slopes = errors(trial, turn == 0 and number < steps - 1)
+                size = rms(errors_now)
             except ModelError:
                 size = np.inf
             if size < cost:
@@ -200,7 +200,7 @@ def levenberg_marquardt(
         else:
             return point
         slow = slow + 1 if size > (1.0 - SLOW) * cost else 0
-        point, cost = tried, size
+        point, cost = trial, size
         improved(point, cost)
         if slow >= SLOWEST:
             return point

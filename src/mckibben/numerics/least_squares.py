@@ -57,10 +57,10 @@ def solve_bounded(
     else:
         either = np.isneginf(least)  # of either sign: the difference of two that are not negative
         floor = np.where(either, 0.0, least)
-        both = np.hstack([scaled, -scaled[:, either]])
-        found = nnls(both, right - triangle[:, :m] @ floor, maxiter=30 * both.shape[1])[0]
-        found[:m][either] -= found[m:]
-        x = floor + found[:m] / scale
+        signed = np.hstack([scaled, -scaled[:, either]])
+        solution = nnls(signed, right - triangle[:, :m] @ floor, maxiter=30 * signed.shape[1])[0]
+        solution[:m][either] -= solution[m:]
+        x = floor + solution[:m] / scale
     return x, mean - float(means @ x)
 
 
@@ -98,9 +98,9 @@ def solve_products(
 
     bounded = np.zeros(width, dtype=bool) if bounded is None else bounded
     order, first = np.argsort(bounded, kind="stable"), width - np.count_nonzero(bounded)
-    own = np.diagonal(products, axis1=1, axis2=2)[:, :width] if effects is None else effects
-    own = np.maximum(np.broadcast_to(own, (len(products), width)), 0.0)
-    size = np.sqrt(own[:, order, np.newaxis])
+    effects_ = np.diagonal(products, axis1=1, axis2=2)[:, :width] if effects is None else effects
+    effects_ = np.maximum(np.broadcast_to(effects_, (len(products), width)), 0.0)
+    size = np.sqrt(effects_[:, order, np.newaxis])
     size = np.maximum(size, LEAST_EFFECT * size.max(axis=0))
     size[~(size > 0.0)] = 1.0
     damping = np.broadcast_to(ridge, width)[order]
@@ -110,13 +110,13 @@ def solve_products(
         return np.asarray(np.linalg.solve(a, b) / size)
     lower = np.linalg.cholesky(a)
     upper = lower.transpose(0, 2, 1)
-    found = np.linalg.solve(lower, b)
-    for one, root in zip(found, upper, strict=True):
+    solution = np.linalg.solve(lower, b)
+    for one, root in zip(solution, upper, strict=True):
         for x in one.T:
             x[first:] = nnls(root[first:, first:], x[first:], maxiter=100 * width)[0]
-    rest = found[:, :first] - upper[:, :first, first:] @ found[:, first:]
-    found[:, :first] = np.linalg.solve(upper[:, :first, :first], rest)
-    return np.asarray((found / size)[:, np.argsort(order)])
+    back = solution[:, :first] - upper[:, :first, first:] @ solution[:, first:]
+    solution[:, :first] = np.linalg.solve(upper[:, :first, :first], back)
+    return np.asarray((solution / size)[:, np.argsort(order)])
 
 
 def solve_constrained(
@@ -174,9 +174,9 @@ def solve_constrained(
     dual = np.vstack([turned.T, lacking / unit])
     goal = np.zeros(p + 1)
     goal[p] = 1.0
-    pressed, rest = nnls(dual, goal, maxiter=100 * len(sides))
+    pressed, distance = nnls(dual, goal, maxiter=100 * len(sides))
     residual = goal - dual @ pressed
-    if rest < FEASIBLE or not residual[p] > 0:
+    if distance < FEASIBLE or not residual[p] > 0:
         raise ModelError(
             "no parameters satisfy all that physics asks of them",
             remedy="give recordings of a wider range",

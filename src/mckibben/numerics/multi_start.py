@@ -58,11 +58,11 @@ def multi_start(
     for _ in range(EXCHANGES if choices else 0):
         least = tracker.best_cost
         for choice in choices:
-            held = tracker.found
+            best_point = tracker.found
             for values in choice.values:
-                tried = held.copy()
-                tried[choice.places] = values
-                tracked(tried)
+                trial = best_point.copy()
+                trial[choice.places] = values
+                tracked(trial)
         if not tracker.best_cost < least:
             break
         refine(tracker.found)
@@ -81,9 +81,9 @@ def follow_best(
     ``first_steps`` leads from a start to a place not far from it, and the cost there. Starts whose costs
     differ by up to ``same``, relatively, have come to one place, which is followed once.
     """
-    tried = sorted((first_steps(start) for start in starts), key=lambda found: found[1])
+    ranked = sorted((first_steps(start) for start in starts), key=lambda pair: pair[1])
     costs: list[float] = []
-    for place, cost in tried:
+    for point, cost in ranked:
         if len(costs) < most and all(abs(cost - other) > same * cost for other in costs):
             costs.append(cost)
-            refine(place)
+            refine(point)

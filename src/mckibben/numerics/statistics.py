@@ -84,10 +84,10 @@ class Autoregression:
 
     def whitened(self, series: Array) -> Array:
         """Return the innovations of a series (n, ...)."""
-        found = np.array(series, dtype=np.float64)
+        white = np.array(series, dtype=np.float64)
         for lag, coefficient in enumerate(self.coefficients.tolist(), start=1):
-            found[lag:] -= coefficient * series[:-lag]
-        return found
+            white[lag:] -= coefficient * series[:-lag]
+        return white
 
     def coloured(self, slopes: Array) -> Array:
         """Return L' J, shape (n, k), whose product with itself is J' R J, R the covariance."""
@@ -112,7 +112,7 @@ def autoregression(series: Sequence[Array]) -> Autoregression:
     variance = float(np.mean(np.concatenate(series) ** 2)) if n else 0.0
     forward: list[NDArray[np.float64]] = [np.asarray(piece, dtype=np.float64) for piece in series]
     backward = list(forward)
-    best, chosen, power_of_best = n * np.log(max(variance, 1e-300)), np.zeros(0), variance
+    best, best_a, power_of_best = n * np.log(max(variance, 1e-300)), np.zeros(0), variance
     a, power = np.zeros(0), variance
     for order in range(1, min(MOST_TERMS, n // 10) + 1):
         ahead = [f[1:] for f in forward]
@@ -129,8 +129,8 @@ def autoregression(series: Sequence[Array]) -> Autoregression:
             break
         cost = n * np.log(power) + order * np.log(n)
         if cost < best:
-            best, chosen, power_of_best = cost, a, power
-    return Autoregression(chosen, float(np.sqrt(max(power_of_best, 0.0))), variance)
+            best, best_a, power_of_best = cost, a, power
+    return Autoregression(best_a, float(np.sqrt(max(power_of_best, 0.0))), variance)
 
 
 def hats(x: Array, n_knots: int) -> Array:

@@ -63,20 +63,20 @@ def particle_swarm(
     shape = (swarm.particles, lower.size)
     span = upper - lower
     position, velocity = start, np.zeros(shape)
-    own, own_cost = position.copy(), np.full(swarm.particles, np.inf)
+    best, best_cost = position.copy(), np.full(swarm.particles, np.inf)
     first, last = swarm.inertia
     for iteration in range(swarm.iterations + 1):
         cost = np.nan_to_num(costs(position), nan=WORST, posinf=WORST)
-        better = cost < own_cost
-        own[better], own_cost[better] = position[better], cost[better]
+        better = cost < best_cost
+        best[better], best_cost[better] = position[better], cost[better]
         for point, value in zip(position, cost, strict=True):
             tracker.update(point, float(value))
-        leader = own[np.argmin(own_cost)]
+        leader = best[np.argmin(best_cost)]
         weight = first + (last - first) * iteration / max(swarm.iterations, 1)
         pulls = rng.random((2, *shape))
         velocity = (
             weight * velocity
-            + swarm.c1 * pulls[0] * (own - position)
+            + swarm.c1 * pulls[0] * (best - position)
             + swarm.c2 * pulls[1] * (leader - position)
         )
         velocity = np.clip(velocity, -swarm.fastest * span, swarm.fastest * span)

@@ -62,9 +62,9 @@ class Tracker:
         """Return the same function, which registers every evaluation, its errors in a unit."""
 
         def watched(point: Array) -> tuple[Array, Callable[[], Array]]:
-            found = errors(point)
-            self.update(point, unit * rms(found[0]))
-            return found
+            result = errors(point)
+            self.update(point, unit * rms(result[0]))
+            return result
 
         return watched
 

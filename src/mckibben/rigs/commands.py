@@ -57,14 +57,14 @@ class Commands:
                 file=inputs.source,
                 remedy=f"give {', '.join(self.ranges)} and no others",
             )
-        asked = np.column_stack(
+        commands = np.column_stack(
             [
-                inputs[name] if name in inputs else np.full(len(inputs), rest)
-                for name, rest in zip(self.ranges, self.rest, strict=True)
+                inputs[name] if name in inputs else np.full(len(inputs), rest_level)
+                for name, rest_level in zip(self.ranges, self.rest, strict=True)
             ]
         )
-        given = self.limited(asked)
-        counts = np.count_nonzero(given != asked, axis=0)
+        applied = self.limited(commands)
+        counts = np.count_nonzero(applied != commands, axis=0)
         saturated = {name: int(n) for name, n in zip(self.ranges, counts, strict=True) if n}
         for name, count in saturated.items():
             limits = self.ranges[name]
@@ -75,7 +75,7 @@ class Commands:
                 ),
                 stacklevel=3,
             )
-        return given, saturated
+        return applied, saturated
 
     def of_action(self, action: ArrayLike | Mapping[str, float]) -> Array:
         """Return an action as one command per input, shape (inputs,), not yet limited.
@@ -90,18 +90,18 @@ class Commands:
             if unknown := sorted(set(action) - set(self.ranges)):
                 problem = f"the rig {self.rig!r} has no such input"
                 raise DataError(problem, channel=unknown[0], remedy=f"give {names}")
-            rest = dict(zip(self.ranges, self.rest, strict=True))
-            action = list((rest | dict(action)).values())
-        asked = np.asarray(action, dtype=float)
-        if asked.shape != (len(self.ranges),) or not np.isfinite(asked).all():
-            problem = f"the rig {self.rig!r} cannot take the commands {asked.tolist()}"
+            levels = dict(zip(self.ranges, self.rest, strict=True))
+            action = list((levels | dict(action)).values())
+        commands = np.asarray(action, dtype=float)
+        if commands.shape != (len(self.ranges),) or not np.isfinite(commands).all():
+            problem = f"the rig {self.rig!r} cannot take the commands {commands.tolist()}"
             wrong = None
-            if asked.shape == (len(self.ranges),):
-                wrong = [*self.ranges][int(np.argmin(np.isfinite(asked)))]
+            if commands.shape == (len(self.ranges),):
+                wrong = [*self.ranges][int(np.argmin(np.isfinite(commands)))]
             remedy = f"give a finite number each for {names}"
             raise DataError(problem, channel=wrong, remedy=remedy)
-        return asked
+        return commands
 
-    def limited(self, asked: Array) -> Array:
+    def limited(self, commands: Array) -> Array:
         """Return commands limited to the hardware's range."""
-        return np.clip(asked, self.low, self.high)
+        return np.clip(commands, self.low, self.high)

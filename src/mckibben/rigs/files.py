@@ -55,9 +55,9 @@ def _write_section(section: BaseModel, path: str, lines: list[str]) -> None:
             comment = f"  # [{unit}] {words}" if unit else f"  # {words}" * bool(words)
             lines.append(f"{name} = {_toml(value)}{comment}")
     for name, inner in later:
-        whole = f"{path}.{name}" if path else name
-        lines += ["", f"[{whole}]"]
-        _write_section(inner, whole, lines)
+        full_name = f"{path}.{name}" if path else name
+        lines += ["", f"[{full_name}]"]
+        _write_section(inner, full_name, lines)
 
 
 def _limits(field: FieldInfo) -> str:

@@ -56,9 +56,9 @@ def record(
     """
     plan = protocol(what, rig) if isinstance(what, str) else what
     plant = load_rig(plan.rig) if rig is None else rig
-    wanted = plan.runs if runs is None else tuple(plan[name] for name in runs)
+    planned = plan.runs if runs is None else tuple(plan[name] for name in runs)
     generator(seed)  # refuses what is none
-    places = {run.name: place for place, run in enumerate(plan.runs)}
+    places = {run.name: index for index, run in enumerate(plan.runs)}
 
     def recorded(run: PlannedRun) -> Recording:
         own_seed = int(np.random.SeedSequence((seed, places[run.name])).generate_state(1)[0])
@@ -71,9 +71,9 @@ def record(
 
     n_threads = cores() if jobs is None else jobs
     with ThreadPoolExecutor(max_workers=n_threads) as pool:
-        pending = [pool.submit(recorded, run) for run in wanted]
+        pending = [pool.submit(recorded, run) for run in planned]
         try:
-            for run, result in zip(wanted, pending, strict=True):
+            for run, result in zip(planned, pending, strict=True):
                 yield run, result.result()
         finally:
             for result in pending:

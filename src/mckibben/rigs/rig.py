@@ -75,11 +75,13 @@ class Rig(DrawsItself, Section, ABC):
         for name in self.inputs:
             if not {name, base_name(name)} & set(self.range):
                 raise ValueError(f"range: there is none for the input {name!r}")
-        known = {*self.inputs, *map(base_name, self.inputs)}
-        for section, given in (("range", self.range), ("start", self.start)):
-            for name in given:
-                if name not in known:
-                    raise ValueError(f"{section}: {name!r} is no input; there are {sorted(known)}")
+        channels = {*self.inputs, *map(base_name, self.inputs)}
+        for section, ranges in (("range", self.range), ("start", self.start)):
+            for name in ranges:
+                if name not in channels:
+                    raise ValueError(
+                        f"{section}: {name!r} is no input; there are {sorted(channels)}"
+                    )
         for name in self.sensor:
             if name not in self.measurable:
                 raise ValueError(f"sensor: {name!r} cannot be measured; {self.measurable} can")
@@ -95,8 +97,8 @@ class Rig(DrawsItself, Section, ABC):
         return self
 
     def __repr__(self) -> str:
-        given, measured = ", ".join(self.inputs), ", ".join(self.outputs)
-        return f"{type(self).__name__}({self.name}: {given} to {measured})"
+        inputs, measured = ", ".join(self.inputs), ", ".join(self.outputs)
+        return f"{type(self).__name__}({self.name}: {inputs} to {measured})"
 
     # --- what a set-up says
 
@@ -154,18 +156,18 @@ class Rig(DrawsItself, Section, ABC):
         """
         fields = self.model_dump()
         for path, value in settings.items():
-            place = fields
+            part = fields
             *sections, last = path.split(".")
             for section in sections:
-                place = place.get(section) if isinstance(place, dict) else None  # type: ignore[assignment]
-            if not isinstance(place, dict) or (last not in place and sections != ["start"]):
-                known = place if isinstance(place, dict) else fields
+                part = part.get(section) if isinstance(part, dict) else None  # type: ignore[assignment]
+            if not isinstance(part, dict) or (last not in part and sections != ["start"]):
+                names = part if isinstance(part, dict) else fields
                 raise DataError(
                     f"the rig {self.name!r} has no such parameter",
                     parameter=path,
-                    remedy=f"use one of {', '.join(known)}",
+                    remedy=f"use one of {', '.join(names)}",
                 )
-            place[last] = value
+            part[last] = value
         try:
             return type(self).model_validate(fields)
         except ValidationError as error:
@@ -233,11 +235,11 @@ class Rig(DrawsItself, Section, ABC):
             On missing or unknown channels, or a recording without time.
         """
         changed = changes(self)
-        given, saturated = self._commanded().of_recording(inputs)
+        commands, saturated = self._commanded().of_recording(inputs)
         step = float(inputs.sample_time or 0.0)  # one without is refused above
-        traces = self._march(self._at_rest().copy(), given, step, held)
+        traces = self._march(self._at_rest().copy(), commands, step, held)
         # A held command is seen from the next sample on.
-        seen = np.vstack([self.resting, given[:-1]]) if held else given
+        seen = np.vstack([self.resting, commands[:-1]]) if held else commands
         readings = self._readings(traces, seen)
         self._refuse_divergence(readings)
         if ideal:
@@ -249,7 +251,9 @@ class Rig(DrawsItself, Section, ABC):
                 name: self._sensed(name, samples, noise[:, i])
                 for i, (name, samples) in enumerate(readings.items())
             }
-        applied = {name: given[:, i] for i, name in enumerate(self.inputs) if name not in readings}
+        applied = {
+            name: commands[:, i] for i, name in enumerate(self.inputs) if name not in readings
+        }
         return Recording(
             {**applied, **readings},
             inputs.sample_time,
@@ -314,14 +318,14 @@ class Rig(DrawsItself, Section, ABC):
         running = self._running
         if running is None:
             raise DataError("the rig is not running", remedy="call reset() first")
-        asked = self._commanded().of_action(action)
-        given = self._commanded().limited(asked)
-        for name, beyond in zip(self.inputs, given != asked, strict=True):
+        action_commands = self._commanded().of_action(action)
+        commands = self._commanded().limited(action_commands)
+        for name, beyond in zip(self.inputs, commands != action_commands, strict=True):
             if beyond:
                 running.saturated[name] = running.saturated.get(name, 0) + 1
-        both = np.vstack([given, given])
-        traces = self._march(running.state, both, self.sample_time, held=True)
-        return self._measured(self._readings(traces, both), running)
+        rows = np.vstack([commands, commands])
+        traces = self._march(running.state, rows, self.sample_time, held=True)
+        return self._measured(self._readings(traces, rows), running)
 
     def limits(self, name: str) -> Range:
         """Return the hardware limits of an input channel."""
@@ -356,10 +360,10 @@ class Rig(DrawsItself, Section, ABC):
 
     def _sensed(self, name: str, true: Array, noise: Array | float) -> Array:
         sensor = self.sensor[base_name(name)]
-        shown = true + sensor.offset + sensor.noise * noise
+        reading = true + sensor.offset + sensor.noise * noise
         if sensor.resolution:
-            shown = np.round(np.round(shown / sensor.resolution) * sensor.resolution, 12)
-        return np.asarray(shown)
+            reading = np.round(np.round(reading / sensor.resolution) * sensor.resolution, 12)
+        return np.asarray(reading)
 
     def _built(self) -> System:
         if self._system is None:
@@ -381,8 +385,8 @@ class Rig(DrawsItself, Section, ABC):
         zero = np.zeros(traces.place.shape[1])
         if self.tare:
             zero = self._at_rest().motion["place"][0, : zero.size]
-        found = self.readings(traces, inputs, zero)
-        return {name: found[name] for name in self.outputs}
+        readings = self.readings(traces, inputs, zero)
+        return {name: readings[name] for name in self.outputs}
 
     def _at_rest(self) -> State:
         """Return the state after switching on."""
@@ -396,8 +400,8 @@ class Rig(DrawsItself, Section, ABC):
         return self._rest
 
     def _start(self, name: str) -> float:
-        rest = self.start.get(name, self.start.get(base_name(name)))
-        return self.limits(name).low if rest is None else rest
+        level = self.start.get(name, self.start.get(base_name(name)))
+        return self.limits(name).low if level is None else level
 
 
 class _Running:
@@ -472,22 +476,22 @@ def recorded_on(recording: Recording) -> Rig | None:
     DataError
         If that was another version, or what was changed is not known or makes no rig.
     """
-    named = str(recording.meta.get("rig", ""))
-    name, given = named.partition(" ")[0], recording.meta.get(CHANGES)
+    rig_name = str(recording.meta.get("rig", ""))
+    name, changes = rig_name.partition(" ")[0], recording.meta.get(CHANGES)
     if name not in rig_names():
         return None
     rig = load_rig(name)
-    if named != rig.signature:
+    if rig_name != rig.signature:
         raise DataError(
-            f"{recording.name} is of {named[:60]}, not of {rig.signature}",
+            f"{recording.name} is of {rig_name[:60]}, not of {rig.signature}",
             remedy="record it again, or name the rig",
         )
-    if not isinstance(given, dict):
+    if not isinstance(changes, dict):
         raise DataError(
             f"{recording.name} does not record whether its rig {name} was changed",
             remedy="record it again, or name the rig",
         )
-    return rig.changed(given)
+    return rig.changed(changes)
 
 
 def _fields(rig: Rig) -> dict[str, Any]:
@@ -495,23 +499,25 @@ def _fields(rig: Rig) -> dict[str, Any]:
     return rig.model_dump(mode="json", exclude={"title", "source"})
 
 
-def _differing(known: dict[str, Any], own: dict[str, Any], path: str = "") -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for name, value in own.items():
-        before = known.get(name)
+def _differing(
+    reference: dict[str, Any], fields_: dict[str, Any], path: str = ""
+) -> dict[str, Any]:
+    changes: dict[str, Any] = {}
+    for name, value in fields_.items():
+        before = reference.get(name)
         if isinstance(before, dict) and isinstance(value, dict) and value.keys() == before.keys():
-            found |= _differing(before, value, f"{path}{name}.")
+            changes |= _differing(before, value, f"{path}{name}.")
         elif value != before:
-            found[path + name] = value
-    return found
+            changes[path + name] = value
+    return changes
 
 
 def _from_fields(fields: dict[str, Any], path: Path) -> Rig:
-    known = registry.names("setups")
+    setups = registry.names("setups")
     setup = fields.get("setup")
-    if setup not in known:
+    if setup not in setups:
         raise DataError(
-            f"setup is {setup!r:.60}", file=path, remedy=f"give one of {', '.join(known)}"
+            f"setup is {setup!r:.60}", file=path, remedy=f"give one of {', '.join(setups)}"
         )
     model: type[Rig] = registry.load("setups", str(setup))
     try:

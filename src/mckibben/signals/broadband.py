@@ -148,16 +148,16 @@ def chirp(
     require_positive("end_frequency", end_frequency)
     require_order(low, high)
     require(law in ("linear", "logarithmic"), "law", law, "linear or logarithmic", DataError)
-    whole = float(t[-1] - t[0])
-    if not whole > 0:
+    duration = float(t[-1] - t[0])
+    if not duration > 0:
         raise DataError("one instant makes no sweep", remedy="give more than one time")
-    share = (t - t[0]) / whole
+    share = (t - t[0]) / duration
     growth = np.log(end_frequency / start_frequency)
     if law == "linear" or abs(growth) < 1e-9:
         turns = start_frequency * share + 0.5 * (end_frequency - start_frequency) * share**2
     else:
         turns = start_frequency * np.expm1(growth * share) / growth
-    return np.asarray(low + (high - low) * (0.5 - 0.5 * np.cos(2 * np.pi * whole * turns)))
+    return np.asarray(low + (high - low) * (0.5 - 0.5 * np.cos(2 * np.pi * duration * turns)))
 
 
 def _between(wave: Array, low: float, high: float) -> Array:

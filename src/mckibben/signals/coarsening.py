@@ -57,12 +57,14 @@ def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
     turns = reversals(u)[1:-1]
     turns = np.append(turns, u.size - 1) if _beyond(u) else turns
     turns = turns[np.argsort(np.abs(u[turns] - 0.5 * (u.max() + u.min())), kind="stable")]
-    taken = starts.copy()
-    taken[np.maximum(turns // factor, 1)] = turns  # of several the last one stays, the outermost
+    kept_rows = starts.copy()
+    kept_rows[np.maximum(turns // factor, 1)] = (
+        turns  # of several the last one stays, the outermost
+    )
     step = recording.sample_time
     return replace(
         recording,
-        channels={name: recording[name][taken] for name in recording.channels},
+        channels={name: recording[name][kept_rows] for name in recording.channels},
         sample_time=None if step is None else step * factor,
     )
 

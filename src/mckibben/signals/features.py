@@ -81,15 +81,15 @@ class Features:
         """Return the highest frequency with power beyond noise, of a random wave [Hz]."""
         x = self.recording[channel]
         power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size))) ** 2
-        place = int(np.flatnonzero(power >= NOISE * power.max())[-1]) if np.ptp(x) > 0 else 0
-        return place / (x.size * self.recording.step)
+        last = int(np.flatnonzero(power >= NOISE * power.max())[-1]) if np.ptp(x) > 0 else 0
+        return last / (x.size * self.recording.step)
 
     @cached_property
     def hint(self) -> Role | None:
         """Role by the name of its file."""
         name = str(self.recording.name)
-        found = [r for r, words in HINTS.items() if re.search(rf"(?<![a-z])({words})", name, re.I)]
-        return found[0] if len(found) == 1 else None
+        roles = [r for r, words in HINTS.items() if re.search(rf"(?<![a-z])({words})", name, re.I)]
+        return roles[0] if len(roles) == 1 else None
 
     def _durations(self, channel: str) -> Array:
         """Return the times between cycles, in the middle of their rise, where they are sharp [s]."""
@@ -134,17 +134,19 @@ def grouped(values: Sequence[float], width: float) -> list[float]:
         return [*values]
     groups = _split(np.sort(np.asarray(values, dtype=np.float64)), width, width)
     means = np.array([group.mean() for group, _ in groups])
-    digits = [-int(np.floor(np.log10(apart))) for _, apart in groups]
+    digits = [-int(np.floor(np.log10(distance))) for _, distance in groups]
     levels = [round(float(mean), n) + 0.0 for mean, n in zip(means, digits, strict=True)]
     return [levels[np.argmin(np.abs(means - value))] for value in values]
 
 
-def _split(ordered: Array, apart: float, width: float) -> list[tuple[Array, float]]:
+def _split(ordered: Array, distance: float, width: float) -> list[tuple[Array, float]]:
     """Return sorted values, split where neighbours are further apart, until none is too wide."""
-    found: list[tuple[Array, float]] = []
-    for group in np.split(ordered, np.flatnonzero(np.diff(ordered) > apart) + 1):
-        found += [(group, apart)] if np.ptp(group) <= width else _split(group, apart / 2, width)
-    return found
+    groups: list[tuple[Array, float]] = []
+    for group in np.split(ordered, np.flatnonzero(np.diff(ordered) > distance) + 1):
+        groups += (
+            [(group, distance)] if np.ptp(group) <= width else _split(group, distance / 2, width)
+        )
+    return groups
 
 
 def _cycles(samples: Array) -> list[slice]:

@@ -68,9 +68,9 @@ def detrend(recording: Recording, channels: Sequence[str] | None = None) -> Reco
     DataError
         If there is no such channel.
     """
-    place = np.linspace(-1.0, 1.0, len(recording))
+    grid = np.linspace(-1.0, 1.0, len(recording))
     level = {
-        name: recording[name] - place * (place @ recording[name]) / (place @ place)
+        name: recording[name] - grid * (grid @ recording[name]) / (grid @ grid)
         for name in _chosen(recording, channels)
     }
     return replace(recording, channels={**recording.channels, **level})

@@ -64,14 +64,14 @@ def holds(columns: Array, spans: Sequence[float] | None = None, shortest: int = 
             (length, slice(start, stop - 1 + length)) for start, stop in true_runs(quiet).tolist()
         ]
         length *= 2
-    found: list[slice] = []
-    taken = np.zeros(n, dtype=bool)
+    result: list[slice] = []
+    is_taken = np.zeros(n, dtype=bool)
     for length, stretch in reversed(stretches):
         lasts = stretch.stop - stretch.start
-        if lasts < 2 * length + shortest and not taken[stretch].any():
-            found.append(stretch)
-            taken[stretch] = True
-    return sorted(found, key=lambda stretch: int(stretch.start))
+        if lasts < 2 * length + shortest and not is_taken[stretch].any():
+            result.append(stretch)
+            is_taken[stretch] = True
+    return sorted(result, key=lambda stretch: int(stretch.start))
 
 
 def shortest_hold(x: Array, span: float) -> int:

@@ -105,8 +105,8 @@ def _refinement(values: Array, peak: int) -> float:
     """Return how far the vertex of the parabola through a peak and its neighbours is from the peak."""
     if not 0 < peak < values.size - 1:
         return 0.0
-    before, here, after = values[peak - 1 : peak + 2]
-    bend = before - 2 * here + after
+    before, peak_value, after = values[peak - 1 : peak + 2]
+    bend = before - 2 * peak_value + after
     return float(0.5 * (before - after) / bend) if bend < 0 else 0.0
 
 
@@ -120,8 +120,8 @@ def lags(recording: Recording) -> dict[str, Lag]:
     by_motion = {}
     for name, samples in varying.items():
         quantity, _, number = name.partition("_")
-        own = [drive for drive in drives if drive.partition("_")[2] == number]
-        drive = next(iter(own if number else drives if len(drives) == 1 else ()), None)
+        of_output = [drive for drive in drives if drive.partition("_")[2] == number]
+        drive = next(iter(of_output if number else drives if len(drives) == 1 else ()), None)
         if drive is not None and name not in drives and quantity in FORWARD:
             by_motion[name] = lag(varying[drive], samples, FORWARD[quantity])
     return by_motion

@@ -26,10 +26,10 @@ def band_limited(samples: Array, ratio: int) -> Array:
     array([ 0.   ,  0.707,  1.   ,  0.707,  0.   , -0.707, -1.   , -0.707])
     """
     n = samples.size
-    given = np.fft.rfft(samples)
+    spectrum = np.fft.rfft(samples)
     wide = np.zeros(ratio * n // 2 + 1, dtype=complex)
-    wide[: given.size] = given
+    wide[: spectrum.size] = spectrum
     if n % 2 == 0 and ratio > 1:  # the highest frequency is shared by its two signs
         wide[n // 2] *= 0.5
-    found: Array = np.fft.irfft(wide, ratio * n) * ratio
-    return found
+    dense: Array = np.fft.irfft(wide, ratio * n) * ratio
+    return dense

@@ -126,19 +126,23 @@ class Scaled(NamedTuple):
 
 def scaling(name: str, rig: object) -> list[Scaled]:
     """Return how the commands of a protocol, loads and times are scaled for a rig."""
-    printed, own = (_extents(protocol(name, one)) for one in (None, rig))
+    printed, scaled = (_extents(protocol(name, one)) for one in (None, rig))
     return [
-        Scaled(what, *both, both[1][1] / both[0][1] if both[0][1] else 1.0)
-        for what, both in zip(own, zip(printed.values(), own.values(), strict=True), strict=True)
+        Scaled(command, *extents, extents[1][1] / extents[0][1] if extents[0][1] else 1.0)
+        for command, extents in zip(
+            scaled, zip(printed.values(), scaled.values(), strict=True), strict=True
+        )
     ]
 
 
 def _extents(plan: Protocol) -> dict[str, Extent]:
-    every: dict[str, list[float]] = {}
+    by_channel: dict[str, list[float]] = {}
     for run in plan.runs:
         for channel, extent in run.inputs.ranges.items():
-            every.setdefault(f"{channel} [{run.inputs.units.get(channel, '')}]", []).extend(extent)
+            by_channel.setdefault(f"{channel} [{run.inputs.units.get(channel, '')}]", []).extend(
+                extent
+            )
         if "payload" in run.settings:
-            every.setdefault("payload [kg]", []).append(run.settings["payload"])
-        every.setdefault("time [s]", []).append(len(run.inputs) * run.inputs.step)
-    return {what: (min(values), max(values)) for what, values in every.items()}
+            by_channel.setdefault("payload [kg]", []).append(run.settings["payload"])
+        by_channel.setdefault("time [s]", []).append(len(run.inputs) * run.inputs.step)
+    return {what: (min(values), max(values)) for what, values in by_channel.items()}

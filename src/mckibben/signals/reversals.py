@@ -130,8 +130,8 @@ def reversals(x: ArrayLike, threshold: float | None = None) -> Indices:
     if threshold is None:
         threshold = swing_threshold(noise_level(values), float(np.ptp(values)), values.size)
     require(threshold >= 0, "threshold", threshold, "0 or more", DataError)
-    found = np.empty(values.size, dtype=np.int64)
-    return found[: _turns(values, float(threshold), found)]
+    indices = np.empty(values.size, dtype=np.int64)
+    return indices[: _turns(values, float(threshold), indices)]
 
 
 def branches(x: ArrayLike, threshold: float | None = None) -> list[tuple[int, int, int]]:
@@ -197,21 +197,21 @@ def whole_cycles(x: Array, turns: Indices, whole: float = WHOLE) -> list[slice]:
     # A minimum, a maximum and a minimum in a row, wherever the first two rise.
     first = 0 if heights[1] > heights[0] else 1
     last = turns.size - 3
-    found = []
+    result = []
     for i in range(first, last + 1, 2):
         rise, fall = heights[i + 1] - heights[i], heights[i + 1] - heights[i + 2]
-        begun = i > 0 or rise >= whole * fall
+        is_whole = i > 0 or rise >= whole * fall
         ended = i < last or fall >= whole * rise
-        if begun and ended:
-            found.append(slice(int(turns[i]), int(turns[i + 2]) + 1))
-    return found
+        if is_whole and ended:
+            result.append(slice(int(turns[i]), int(turns[i + 2]) + 1))
+    return result
 
 
 @deferred
-def _turns(x: Array, threshold: float, found: Indices) -> int:
+def _turns(x: Array, threshold: float, indices: Indices) -> int:
     """Write the turning points into ``found``; return how many there are."""
     n, count, way = x.size, 1, 0
-    found[0] = 0
+    indices[0] = 0
     low = high = 0
     for i in range(1, n):
         if way <= 0 and x[i] <= x[low]:
@@ -220,15 +220,15 @@ def _turns(x: Array, threshold: float, found: Indices) -> int:
             high = i
         if way >= 0 and x[high] - x[i] > threshold:
             if way > 0:
-                found[count] = high
+                indices[count] = high
                 count += 1
             way, low = -1, i
         elif way <= 0 and x[i] - x[low] > threshold:
             if way < 0:
-                found[count] = low
+                indices[count] = low
                 count += 1
             way, high = 1, i
-    found[count] = n - 1
+    indices[count] = n - 1
     return count + 1
 
 

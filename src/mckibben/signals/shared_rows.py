@@ -91,10 +91,10 @@ def shared_rows(
         # where the common windows lie, and what share of the motion they cover
         for first, second in np.argwhere(window_share >= GRAVE).tolist():
             one, other = windows[first], windows[second]
-            both = [np.isin(one, other), np.isin(other, one)]
-            covered = [np.mean(np.convolve(same, np.ones(length)) > 0.5) for same in both]
+            masks = [np.isin(one, other), np.isin(other, one)]
+            covered = [np.mean(np.convolve(same, np.ones(length)) > 0.5) for same in masks]
             motion_share = float(max(covered))
-            same = np.flatnonzero(both[1])
+            same = np.flatnonzero(masks[1])
             start, stop = moves[second][0][[same[0], same[-1] + length - 1]].tolist()
             start_in_first = float(moves[first][0][np.argmax(one == other[same[0]])])
             shared.append(Shared(first, second, start, stop, start_in_first, motion_share))
@@ -123,16 +123,16 @@ def check_shared(
         If they share data, and that is not allowed.
     """
     listed = [(role, recording) for role, some in roles.items() for recording in some]
-    found = shared_rows([recording for _, recording in listed], inputs, outputs)
-    sentences = tuple(_sentence(shared, listed) for shared in found)
-    if found and not allow:
+    shares = shared_rows([recording for _, recording in listed], inputs, outputs)
+    sentences = tuple(_sentence(shared, listed) for shared in shares)
+    if shares and not allow:
         remedy = "drop the copy, or cut the stretch out of one of them"
         if allow is not None:
             remedy += (
                 "; or, if the runs are distinct (a coarse sensor may read the same in both), give "
                 "`allow_shared`: every result states it"
             )
-        raise DataError(sentences[0], file=listed[found[0].second][1].source, remedy=remedy)
+        raise DataError(sentences[0], file=listed[shares[0].second][1].source, remedy=remedy)
     return tuple(f"{sentence}." for sentence in sentences)
 
 
@@ -140,9 +140,9 @@ def without_copies(
     recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
 ) -> list[Recording]:
     """Return recordings without those that are nearly contained in an earlier one."""
-    found = shared_rows(recordings, inputs, outputs)
-    copies = {shared.second for shared in found if shared.share > COPY_SHARE}
-    return [one for place, one in enumerate(recordings) if place not in copies]
+    shares = shared_rows(recordings, inputs, outputs)
+    copies = {shared.second for shared in shares if shared.share > COPY_SHARE}
+    return [recording for k, recording in enumerate(recordings) if k not in copies]
 
 
 def _sentence(shared: Shared, listed: Sequence[tuple[str, Recording]]) -> str:
@@ -168,14 +168,16 @@ def _movements(
     recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
 ) -> list[tuple[Array, NDArray[np.uint64]]]:
     """Return the times of output changes in each, and hashes of the rows there and before."""
-    every = [recording.matrix([*outputs, *inputs]) for recording in recordings]
-    largest = np.max([abs(one).max(axis=0) for one in every], axis=0, initial=np.finfo(float).tiny)
-    found = []
-    for recording, samples in zip(recordings, every, strict=True):
+    columns = [recording.matrix([*outputs, *inputs]) for recording in recordings]
+    largest = np.max(
+        [abs(one).max(axis=0) for one in columns], axis=0, initial=np.finfo(float).tiny
+    )
+    result = []
+    for recording, samples in zip(recordings, columns, strict=True):
         # the offset is irrational, so that round decimals are no ties
         rounded = np.floor(samples / largest / ROUNDING + 0.5**0.5).astype(np.int64)
-        moved = (np.diff(rounded[:, : len(outputs)], axis=0) != 0).any(axis=1)
-        rows = np.flatnonzero(moved) + 1
+        moves = (np.diff(rounded[:, : len(outputs)], axis=0) != 0).any(axis=1)
+        rows = np.flatnonzero(moves) + 1
         hashed = np.column_stack([np.diff(rows), rounded[rows[1:]]]).astype(np.uint64)
-        found.append((recording.time[rows[1:]], hashed @ _WEIGHTS[-hashed.shape[1] :]))
-    return found
+        result.append((recording.time[rows[1:]], hashed @ _WEIGHTS[-hashed.shape[1] :]))
+    return result

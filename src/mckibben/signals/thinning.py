@@ -57,18 +57,18 @@ def decimate_minmax(t: ArrayLike, *series: ArrayLike, max_points: int) -> tuple[
         return tuple(columns)
     with_ends = max_points >= per_bin + 2
     size = -(-n // ((max_points - 2 * with_ends) // per_bin))
-    kept = [extreme for column in columns[1:] for extreme in _extremes(column, size)]
+    extremes = [extreme for column in columns[1:] for extreme in _extremes(column, size)]
     if with_ends:
-        kept.append(np.array([0, n - 1]))
-    places = np.unique(np.concatenate(kept))
+        extremes.append(np.array([0, n - 1]))
+    places = np.unique(np.concatenate(extremes))
     return tuple(column[places] for column in columns)
 
 
 def _extremes(y: Array, size: int) -> list[NDArray[np.intp]]:
-    whole = y.size // size * size
-    bins, rest = y[:whole].reshape(-1, size), y[whole:]
-    starts = np.arange(0, whole, size)
-    found = [starts + bins.argmin(axis=1), starts + bins.argmax(axis=1)]
-    if rest.size:
-        found.append(whole + np.array([rest.argmin(), rest.argmax()]))
-    return found
+    n_full = y.size // size * size
+    bins, tail = y[:n_full].reshape(-1, size), y[n_full:]
+    starts = np.arange(0, n_full, size)
+    extremes = [starts + bins.argmin(axis=1), starts + bins.argmax(axis=1)]
+    if tail.size:
+        extremes.append(n_full + np.array([tail.argmin(), tail.argmax()]))
+    return extremes

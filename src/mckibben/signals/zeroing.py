@@ -41,18 +41,20 @@ def rest(recording: Recording, channel: str, over: str) -> float | None:
                 remedy="name one of them",
             )
     quantities = {*LOADS, quantity(over)}
-    others = [
+    still = [
         name
         for name in recording.channels
         if quantity(name) in quantities and name not in (over, channel) and moves([recording[name]])
     ]
-    columns = recording.matrix([over, *others])
+    columns = recording.matrix([over, *still])
     spans = np.ptp(columns, axis=0)
     within = 2 * STILL * spans
-    found = holds(columns, spans.tolist(), shortest_hold(columns[:, 0], float(spans[0])))
-    if not found:
+    candidates = holds(columns, spans.tolist(), shortest_hold(columns[:, 0], float(spans[0])))
+    if not candidates:
         return None
-    levels = [(columns[hold].mean(axis=0), np.median(recording[channel][hold])) for hold in found]
+    levels = [
+        (columns[hold].mean(axis=0), np.median(recording[channel][hold])) for hold in candidates
+    ]
     lowest = min((at for at, _ in levels), key=lambda at: float(at[0]))
     if lowest[0] > np.quantile(columns[:, 0], 0.01) + within[0]:
         return None  # the input is lower while it moves

@@ -78,7 +78,7 @@ def _temporary(path: Path) -> Path:
 def _replaceable(path: Path) -> os.stat_result | None:
     """Return an existing file of that name, if any; raise an error for folders, pipes and devices."""
     try:
-        found = path.lstat()
+        status = path.lstat()
     except (FileNotFoundError, NotADirectoryError):
         if path.parent.is_dir():
             return None
@@ -88,9 +88,9 @@ def _replaceable(path: Path) -> os.stat_result | None:
         raise DataError(f"no file has that name ({error})", file=path, remedy="rename it") from None
     if path.is_dir():
         raise DataError("there is a folder of that name", file=path, remedy="name a file")
-    if not (stat.S_ISREG(found.st_mode) or stat.S_ISLNK(found.st_mode)):
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISLNK(status.st_mode)):
         raise DataError("there is a device or a pipe of that name", file=path, remedy="name a file")
-    return found
+    return status
 
 
 def digest(content: bytes) -> str:

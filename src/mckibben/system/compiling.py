@@ -106,11 +106,11 @@ class Deferred:
         One that another function made stays in its process.
         """
         module, name = self.py_func.__module__, self.py_func.__qualname__
-        found = getattr(import_module(module), name, None)
-        if found is self:
+        attribute = getattr(import_module(module), name, None)
+        if attribute is self:
             return _named, (module, name, made_of(self))
-        if found is self.py_func:
-            return _again, (found, self.targetoptions, made_of(self))
+        if attribute is self.py_func:
+            return _again, (attribute, self.targetoptions, made_of(self))
         return str, (made_of(self),)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -136,18 +136,18 @@ def deferred(function: Function, **options: Any) -> Function:
     return cast("Function", Deferred(function, _OPTIONS | options))
 
 
-def _with_digest(given: Any, digest: str) -> Callable[..., Any]:
+def _with_digest(function: Any, digest: str) -> Callable[..., Any]:
     """Return a function with a digest of its content in its name.
 
     Numba calls compiled code by name. Two functions of one name, such as those that one function makes,
     would be mixed up if they come from files that two processes wrote.
     """
-    code, known, closure = given.__code__, given.__globals__, given.__closure__
-    own = FunctionType(code, known, given.__name__, given.__defaults__, closure)
-    update_wrapper(own, given)
-    own.__kwdefaults__ = given.__kwdefaults__
-    own.__qualname__ = f"{given.__qualname__}_{digest[:32]}"
-    return own
+    code, names, closure = function.__code__, function.__globals__, function.__closure__
+    copy = FunctionType(code, names, function.__name__, function.__defaults__, closure)
+    update_wrapper(copy, function)
+    copy.__kwdefaults__ = function.__kwdefaults__
+    copy.__qualname__ = f"{function.__qualname__}_{digest[:32]}"
+    return copy
 
 
 def _compile_alike(compiled: Any) -> None:
@@ -250,7 +250,7 @@ def _parts(value: Any, seen: dict[int, int]) -> Iterator[str]:
         yield repr(value)
 
 
-def _code_parts(code: CodeType, known: dict[str, Any], seen: dict[int, int]) -> Iterator[str]:
+def _code_parts(code: CodeType, names: dict[str, Any], numbers: dict[int, int]) -> Iterator[str]:
     """Yield the parts of a function's code: instructions, constants, and what its names refer to.
 
     ``known`` are the names of its module; a name may be a member of any module that it reaches.
@@ -258,11 +258,11 @@ def _code_parts(code: CodeType, known: dict[str, Any], seen: dict[int, int]) -> 
     yield code.co_code.hex()
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
-            yield from _code_parts(constant, known, seen)
+            yield from _code_parts(constant, names, numbers)
         else:
-            yield from _parts(constant, seen)
+            yield from _parts(constant, numbers)
     modules: list[ModuleType] = []
-    reached = [known]
+    reached = [names]
     while reached:  # a.b.f: modules in modules
         members = reached.pop()
         deeper = [members[n] for n in code.co_names if isinstance(members.get(n), ModuleType)]
@@ -270,8 +270,8 @@ def _code_parts(code: CodeType, known: dict[str, Any], seen: dict[int, int]) -> 
         modules += deeper
     for name in code.co_names:
         yield name
-        for members in (known, *map(vars, modules)):
-            yield from _parts(members.get(name), seen)
+        for members in (names, *map(vars, modules)):
+            yield from _parts(members.get(name), numbers)
 
 
 def resolved(function: Function) -> Function:

@@ -29,6 +29,9 @@ def reason(error: Exception) -> str:
     text = str(error)
     if isinstance(error, ValidationError):
         first = error.errors()[0]
-        place, text = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
-        text = f"{place[:100]}: {text}".removeprefix(": ")
+        location, text = (
+            ".".join(map(str, first["loc"])),
+            first["msg"].removeprefix("Value error, "),
+        )
+        text = f"{location[:100]}: {text}".removeprefix(": ")
     return " ".join(text.split())[:300] or type(error).__name__

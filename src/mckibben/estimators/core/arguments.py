@@ -34,9 +34,9 @@ class Outputs(Sequence[Array]):
     def __len__(self) -> int:
         return len(self.every)
 
-    def __getitem__(self, which: Any) -> Any:
+    def __getitem__(self, index: Any) -> Any:
         """Return the outputs of one recording, or of those that a slice or an array selects."""
-        first = which[0] if isinstance(which, tuple) else which  # (selected, ...) of scikit-learn
+        first = index[0] if isinstance(index, tuple) else index  # (selected, ...) of scikit-learn
         places = np.arange(len(self))[first]
         return Outputs(tuple(self.every[k] for k in places)) if places.ndim else self.every[places]
 
@@ -48,13 +48,13 @@ class Outputs(Sequence[Array]):
         function: Callable[..., Any],
         types: Any,
         args: Sequence[Any],
-        named: Mapping[str, Any],
+        keywords: Mapping[str, Any],
     ) -> Any:
         if function is np.concatenate and all(isinstance(one, Outputs) for one in args[0]):
             return Outputs(tuple(chain.from_iterable(args[0])))
         if not any(isinstance(one, Outputs) for one in args):  # but inside one, or by name
             return NotImplemented
-        return function(*(np.asarray(a) if isinstance(a, Outputs) else a for a in args), **named)
+        return function(*(np.asarray(a) if isinstance(a, Outputs) else a for a in args), **keywords)
 
 
 def squeezed(outputs: Array) -> Array:
@@ -62,24 +62,24 @@ def squeezed(outputs: Array) -> Array:
     return outputs[:, 0] if outputs.shape[1] == 1 else outputs
 
 
-def is_array(given: object) -> bool:
+def is_array(data: object) -> bool:
     """Return whether this is a table of numbers whose columns have no names."""
-    if isinstance(given, Recording):
+    if isinstance(data, Recording):
         return False
-    if is_frame(given):
-        return not is_named(given)
-    if isinstance(given, list | tuple):
-        return len(given) > 0 and isinstance(given[0], Real | list | tuple)
-    return hasattr(given, "__array__") or hasattr(given, "toarray")
+    if is_frame(data):
+        return not is_named(data)
+    if isinstance(data, list | tuple):
+        return len(data) > 0 and isinstance(data[0], Real | list | tuple)
+    return hasattr(data, "__array__") or hasattr(data, "toarray")
 
 
-def is_named(given: object) -> bool:
+def is_named(data: object) -> bool:
     """Return whether this is a data frame whose columns have names."""
-    return is_frame(given) and all(isinstance(name, str) for name in getattr(given, "columns", ()))
+    return is_frame(data) and all(isinstance(name, str) for name in getattr(data, "columns", ()))
 
 
 def recorded(
-    given: Any,
+    data: Any,
     inputs: Sequence[str] | None,
     y: Any,
     outputs: Sequence[str] | None,
@@ -105,29 +105,29 @@ def recorded(
     DataError
         On arrays that are not of these channels, or not of these recordings.
     """
-    if is_array(given):
-        columns = by_channel(given, inputs, "X", owner)
+    if is_array(data):
+        columns = by_channel(data, inputs, "X", owner)
         if y is not None:
             columns |= by_channel(y, outputs, "y", owner)
         return [Recording(columns, sample_time)]
-    every = [timed(one, sample_time) for one in listed(given)]
+    runs = [timed(one, sample_time) for one in listed(data)]
     if y is None:
-        return every
-    parts = [y] if isinstance(given, Recording) or is_frame(given) else list(y)
-    if len(parts) != len(every):
+        return runs
+    parts = [y] if isinstance(data, Recording) or is_frame(data) else list(y)
+    if len(parts) != len(runs):
         raise DataError(
-            f"there are {len(every)} recordings and outputs of {len(parts)}",
+            f"there are {len(runs)} recordings and outputs of {len(parts)}",
             remedy="give one array a recording",
         )
     return [
         one.with_channels(**by_channel(part, outputs, "y", owner))
-        for one, part in zip(every, parts, strict=True)
+        for one, part in zip(runs, parts, strict=True)
     ]
 
 
-def require_outputs(given: Any, y: Any, owner: str) -> None:
+def require_outputs(data: Any, y: Any, owner: str) -> None:
     """Raise a `DataError` if inputs are an array, and there are no outputs."""
-    if y is None and is_array(given):
+    if y is None and is_array(data):
         raise DataError(
             f"{owner} of an array requires y to be passed, but the target y is None",
             remedy="give the outputs as the second argument, or make a recording of both by "
@@ -150,7 +150,7 @@ def timed(recording: Recording, sample_time: float | None) -> Recording:
 
 
 def by_channel(
-    given: Any, names: Sequence[str] | None, side: Literal["X", "y"], owner: str
+    data: Any, names: Sequence[str] | None, side: Literal["X", "y"], owner: str
 ) -> dict[str, Array]:
     """Return an array or a frame of one side of the data by channel.
 
@@ -172,12 +172,12 @@ def by_channel(
     TypeError, ValueError
         On objects and texts that are no numbers.
     """
-    if is_named(given):
-        frame = Recording.from_frame(given)
+    if is_named(data):
+        frame = Recording.from_frame(data)
         return {name: frame[name] for name in names or frame.channels}
-    if hasattr(given, "toarray"):
+    if hasattr(data, "toarray"):
         raise DataError("sparse data were passed", remedy="give a dense array: X.toarray()")
-    table = given if isinstance(given, np.ndarray) else np.asarray(given)
+    table = data if isinstance(data, np.ndarray) else np.asarray(data)
     if table.dtype.kind in "cmM":
         kind = "Complex" if table.dtype.kind == "c" else table.dtype.name
         raise DataError(f"{kind} data not supported", remedy="give real numbers")

@@ -48,11 +48,11 @@ class TrainingData:
 
         For what all runs share at a point of a search.
         """
-        known = self._latest.get(key)
-        if known is None or not np.array_equal(known[0], theta):
-            known = self._latest[key] = (theta.copy(), compute())
-        found: Made = known[1]
-        return found
+        cached = self._latest.get(key)
+        if cached is None or not np.array_equal(cached[0], theta):
+            cached = self._latest[key] = (theta.copy(), compute())
+        value: Made = cached[1]
+        return value
 
     @cached_property
     def lowest(self) -> Array:
@@ -134,8 +134,8 @@ class TrainingData:
 
     def stretches(self, shortest: int) -> TrainingData:
         """Return the same data as runs of scored samples; see `Run.stretches`."""
-        found = [part for run in self.runs for part in run.stretches(shortest)]
-        runs = tuple(replace(run, place=place) for place, run in enumerate(found))
+        parts = [part for run in self.runs for part in run.stretches(shortest)]
+        runs = tuple(replace(run, place=k) for k, run in enumerate(parts))
         return replace(self, runs=runs)
 
     def stacked(self, what: str) -> Array:
@@ -163,8 +163,8 @@ class TrainingData:
         def thinner(run: Run) -> Run:
             counting = np.flatnonzero(run.counts)
             share = max(round(most * counting.size / total), min(2, counting.size))
-            chosen = counting[np.linspace(0, counting.size - 1, share).round().astype(int)]
-            return replace(run, counts=np.isin(np.arange(run.counts.size), chosen))
+            kept = counting[np.linspace(0, counting.size - 1, share).round().astype(int)]
+            return replace(run, counts=np.isin(np.arange(run.counts.size), kept))
 
         return self.changed(thinner)
 
@@ -203,30 +203,32 @@ def training_data(
         On no recordings, absent channels, too few samples, a constant input or output, or sample
         times that differ.
     """
-    driven, given = (
+    input_names, output_names = (
         (names,) if isinstance(names, str) else tuple(names) for names in (inputs, outputs)
     )
-    every = [one.with_derived([*driven, *given, *scheduling]) for one in listed(recordings)]
-    if not every:
+    recorded_runs = [
+        one.with_derived([*input_names, *output_names, *scheduling]) for one in listed(recordings)
+    ]
+    if not recorded_runs:
         raise DataError("there are none to fit", parameter="recordings", remedy="give at least one")
-    if same := set(driven) & set(given):
+    if same := set(input_names) & set(output_names):
         raise DataError(
             "input and output are the same channel",
             channel=min(same),
             remedy="choose two channels with `input` and `output`",
         )
-    masks = [np.ones(len(r), dtype=bool) for r in every] if rows is None else list(rows)
-    if [np.shape(mask) for mask in masks] != [(len(r),) for r in every]:
+    masks = [np.ones(len(r), dtype=bool) for r in recorded_runs] if rows is None else list(rows)
+    if [np.shape(mask) for mask in masks] != [(len(r),) for r in recorded_runs]:
         raise DataError(
             "rows do not match the recordings", remedy="give one mask a recording, one value a row"
         )
-    first = every[0]
-    for recording in every:
-        _check(recording, first, (*driven, *given, *scheduling))
-    check_sample_times(every, equal=one_rate)
+    first = recorded_runs[0]
+    for recording in recorded_runs:
+        _check(recording, first, (*input_names, *output_names, *scheduling))
+    check_sample_times(recorded_runs, equal=one_rate)
     runs = tuple(
-        run_of(r, driven, given, scheduling, np.asarray(mask, dtype=bool), index=index)
-        for index, (r, mask) in enumerate(zip(every, masks, strict=True))
+        run_of(r, input_names, output_names, scheduling, np.asarray(mask, dtype=bool), index=index)
+        for index, (r, mask) in enumerate(zip(recorded_runs, masks, strict=True))
     )
 
     def channels(names: Sequence[str]) -> tuple[Channel, ...]:
@@ -234,8 +236,8 @@ def training_data(
 
     data = TrainingData(
         runs,
-        channels(driven),
-        channels(given),
+        channels(input_names),
+        channels(output_names),
         channels(scheduling),
         spans=spans,
         n_recordings=len(runs),
@@ -247,8 +249,11 @@ def training_data(
             file=first.source,
             remedy=f"give at least {FEWEST_SAMPLES}",
         )
-    moving = () if spans else given
-    for names, values in ((driven, data.stacked("driven")), (moving, counting[:, : len(moving)])):
+    moving = () if spans else output_names
+    for names, values in (
+        (input_names, data.stacked("driven")),
+        (moving, counting[:, : len(moving)]),
+    ):
         for name, column in zip(names, values.T, strict=True):
             if np.ptp(column) == 0:
                 raise DataError(

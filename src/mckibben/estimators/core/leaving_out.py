@@ -65,25 +65,25 @@ def outputs_without_parts(
     parameters, m = runs.block.pack(), len(runs.names)
     n_samples = runs.residual.size // m
     samples = np.linspace(0, n_samples - 1, min(n_samples, max(MOST_ROWS // m, 1)))
-    kept = (m * samples.round().astype(np.intp)[:, np.newaxis] + np.arange(m)).ravel()
+    rows = (m * samples.round().astype(np.intp)[:, np.newaxis] + np.arange(m)).ravel()
     with np.errstate(over="ignore", invalid="ignore"):
-        slopes = runs.slopes(free, kept)
+        slopes = runs.slopes(free, rows)
         largest = np.abs(slopes).max(axis=0, initial=0.0)
-        known = np.isfinite(largest) & (largest < LARGEST) & (largest > 0)
-    slopes, places = slopes[:, known], np.array(free, dtype=np.intp)[known]
+        is_usable = np.isfinite(largest) & (largest < LARGEST) & (largest > 0)
+    slopes, places = slopes[:, is_usable], np.array(free, dtype=np.intp)[is_usable]
     effects = np.sqrt((slopes**2).sum(axis=0))
     slopes, units = slopes / effects, relative_sizes(parameters)[places] / effects
-    residual, target = runs.residual[kept], runs.scored(runs.modelled) + runs.residual
+    residual, target = runs.residual[rows], runs.scored(runs.modelled) + runs.residual
     gram, slope = slopes.T @ slopes, slopes.T @ residual
     kept_share = residual.size / max(target.size, 1)
 
     def outputs_after(step: Array) -> list[Array] | None:
         """Return the outputs of the model moved by a step; None where it has none."""
-        there = parameters.copy()
-        there[places] += step * units
+        moved = parameters.copy()
+        moved[places] += step * units
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                tables = runs.simulated(runs.block.unpack(there))
+                tables = runs.simulated(runs.block.unpack(moved))
         except MckibbenError:
             return None
         return tables if all(np.isfinite(table).all() for table in tables) else None
@@ -93,18 +93,21 @@ def outputs_without_parts(
         error = (target - runs.scored(tables))[~part]
         return 0.5 * kept_share * float(error @ error)
 
-    found = []
+    result = []
     for part in parts:
-        left_out = part[kept]
-        own = slopes[left_out]
-        rest, uphill = gram - own.T @ own, own.T @ residual[left_out]
+        left_out = part[rows]
+        slopes_of_part = slopes[left_out]
+        gram_without, uphill = (
+            gram - slopes_of_part.T @ slopes_of_part,
+            slopes_of_part.T @ residual[left_out],
+        )
         best, before = runs.modelled, cost(runs.modelled, part)
         for damping in DAMPINGS:
-            damped = rest + (damping + penalty) * np.eye(len(rest))
+            damped = gram_without + (damping + penalty) * np.eye(len(gram_without))
             step = np.linalg.lstsq(damped, -uphill, rcond=1e-14)[0]
             tables = outputs_after(step)
             if tables is not None and cost(tables, part) + float(slope @ step) < before:
                 best = tables
                 break
-        found.append(best)
-    return found
+        result.append(best)
+    return result

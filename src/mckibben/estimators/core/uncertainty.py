@@ -69,29 +69,29 @@ def covariance_by_runs(slopes: Array, residual: Array, runs: FreeRuns) -> tuple[
         return np.inf, np.full(2 * slopes.shape[1:], np.nan)
     m = len(runs.names)
     ends = np.cumsum([m * int(rows.sum()) for rows in runs.rows])[:-1]
-    moves, left = [], []
+    moves, residuals = [], []
     for rows, by_run, own in zip(
         runs.rows, np.split(slopes, ends), np.split(residual, ends), strict=True
     ):
         moves.append(np.zeros((rows.size, m, slopes.shape[1])))
         moves[-1][rows] = by_run.reshape(-1, *moves[-1].shape[1:])
-        left.append(np.full((rows.size, m), np.nan))
-        left[-1][rows] = own.reshape(-1, m)
-    models = autoregressions(left)
-    condition, covariance, determined = sandwich(moves, left, models)
+        residuals.append(np.full((rows.size, m), np.nan))
+        residuals[-1][rows] = own.reshape(-1, m)
+    models = autoregressions(residuals)
+    condition, covariance, determined = sandwich(moves, residuals, models)
     return condition, blanked(covariance, determined)
 
 
-def autoregressions(left: Sequence[Array]) -> list[Autoregression]:
+def autoregressions(residuals: Sequence[Array]) -> list[Autoregression]:
     """Return the autoregression of every output's residuals, (n, m); NaN at unscored samples."""
     return [
-        autoregression([part for e in left for part in _pieces(e[:, j])])
-        for j in range(left[0].shape[1])
+        autoregression([part for e in residuals for part in _pieces(e[:, j])])
+        for j in range(residuals[0].shape[1])
     ]
 
 
 def sandwich(
-    moves: Sequence[Array], left: Sequence[Array], models: Sequence[Autoregression]
+    moves: Sequence[Array], residuals: Sequence[Array], models: Sequence[Autoregression]
 ) -> tuple[float, Array, NDArray[np.bool_]]:
     """Return condition, covariance, and which parameters are determined.
 
@@ -109,9 +109,11 @@ def sandwich(
     n_outputs, k = moves[0].shape[1:]
     scale = np.array([np.sqrt(model.variance) or 1.0 for model in models])
     weighed = [slopes / scale[:, np.newaxis] for slopes in moves]
-    condition, own, determined = pseudo_inverse(np.concatenate([w.reshape(-1, k) for w in weighed]))
+    condition, inverse, determined = pseudo_inverse(
+        np.concatenate([w.reshape(-1, k) for w in weighed])
+    )
     innovations = [
-        np.concatenate([m.whitened(np.nan_to_num(e[:, j])) for e in left])
+        np.concatenate([m.whitened(np.nan_to_num(e[:, j])) for e in residuals])
         for j, m in enumerate(models)
     ]
     together = np.nan_to_num(np.corrcoef(innovations)) if n_outputs > 1 else np.ones((1, 1))
@@ -122,8 +124,8 @@ def sandwich(
             for j in range(n_outputs):
                 middle += together[i, j] * (coloured[i].T @ coloured[j])
     # what the fit has taken out of the residuals, of all that was in them
-    taken = float(np.sum(own * middle)) / sum(int(np.isfinite(e).sum()) for e in left)
-    return condition, own @ middle @ own / max(1.0 - taken, 0.1), determined
+    effect = float(np.sum(inverse * middle)) / sum(int(np.isfinite(e).sum()) for e in residuals)
+    return condition, inverse @ middle @ inverse / max(1.0 - effect, 0.1), determined
 
 
 def _pieces(series: Array) -> list[Array]:
@@ -140,9 +142,9 @@ def pseudo_inverse(slopes: Array) -> tuple[float, Array, NDArray[np.bool_]]:
     """Return condition, pseudo-inverse of the products, and which parameters are determined."""
     singular, right = np.linalg.svd(np.linalg.qr(slopes, mode="r"), full_matrices=False)[1:]
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
-    kept = singular > LEAST * singular[0]
-    inverse = (right[kept].T / singular[kept] ** 2) @ right[kept]
-    return condition, inverse, 1 - (right[~kept] ** 2).sum(axis=0) > DETERMINED
+    is_kept = singular > LEAST * singular[0]
+    inverse = (right[is_kept].T / singular[is_kept] ** 2) @ right[is_kept]
+    return condition, inverse, 1 - (right[~is_kept] ** 2).sum(axis=0) > DETERMINED
 
 
 def blanked(covariance: Array, determined: NDArray[np.bool_]) -> Array:

@@ -90,9 +90,9 @@ def emulate(block: Block, *, sample_time: float | None = None) -> Emulation:
     content = described(block, name="model", sample_time=sample_time, single=True)
     content |= vectors(block, content["sample_time"], single=True)
     texts = source_files(content) | {"main.c": render("emulated.c.j2", content)}
-    with tempfile.TemporaryDirectory() as place:
-        write_texts(Path(place), texts)
-        program, flash = built(Path(place))
+    with tempfile.TemporaryDirectory() as folder:
+        write_texts(Path(folder), texts)
+        program, flash = built(Path(folder))
         output = _run(
             *(EMULATOR, *EMULATED, "-icount", "shift=6"),
             *("-serial", "none", "-kernel", str(program)),
@@ -124,11 +124,11 @@ def built(folder: Path) -> tuple[Path, int]:
         objects.append(source.with_suffix(".o"))
         sections = ("-ffunction-sections", "-fdata-sections")
         _run(COMPILER, *MACHINE, *FLAGS, *sections, "-c", str(source), "-o", str(objects[-1]))
-    rest = [str(folder / "main.c"), str(BOARD / "startup.c")]
+    sources = [str(folder / "main.c"), str(BOARD / "startup.c")]
     link = ["--specs=rdimon.specs", "-Wl,--gc-sections", "-T", str(BOARD / "memory.ld")]
     _run(
         *(COMPILER, *MACHINE, "-O2", "-ffp-contract=off", f"-I{folder / 'src'}"),
-        *(*rest, *map(str, objects), *link, "-lm", "-o", str(program)),
+        *(*sources, *map(str, objects), *link, "-lm", "-o", str(program)),
     )
     table = _run(SIZE, *map(str, objects)).splitlines()[1:]
     return program, sum(int(line.split()[0]) for line in table)
@@ -166,8 +166,8 @@ def serial_device(
     import tty
 
     serving, single = serving or Serving(), single or emulated
-    ours, theirs = os.openpty()  # the process is at our end, the host at the other
-    tty.setraw(theirs)
+    device_end, host_end = os.openpty()  # the process is at our end, the host at the other
+    tty.setraw(host_end)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         files = c_files(block, sample_time=sample_time, single=single, serving=serving)
@@ -182,19 +182,19 @@ def serial_device(
             compile_c(sources, Path(command[0]), options=options)
         process = subprocess.Popen(
             command,
-            stdin=subprocess.DEVNULL if emulated else ours,
-            stdout=subprocess.PIPE if emulated else ours,
+            stdin=subprocess.DEVNULL if emulated else device_end,
+            stdout=subprocess.PIPE if emulated else device_end,
             stderr=subprocess.STDOUT if emulated else subprocess.DEVNULL,
             start_new_session=True,  # Ctrl-C is the host's
         )
         try:
-            found = re.search(rb"/dev/\S+", process.stdout.readline()) if process.stdout else None
-            yield found[0].decode() if found else os.ttyname(theirs)
+            match = re.search(rb"/dev/\S+", process.stdout.readline()) if process.stdout else None
+            yield match[0].decode() if match else os.ttyname(host_end)
         finally:
             process.kill()
             process.communicate()
-            os.close(ours)
-            os.close(theirs)
+            os.close(device_end)
+            os.close(host_end)
 
 
 def _run(*command: str) -> str:

@@ -64,10 +64,16 @@ class Source:
 
     def annotations(self) -> Iterator[tuple[ast.arg, str]]:
         """Yield the parameters and their types as written."""
-        given = self.tree.args
-        if given.vararg or given.kwarg or given.kwonlyargs or given.defaults or given.posonlyargs:
+        arguments = self.tree.args
+        if (
+            arguments.vararg
+            or arguments.kwarg
+            or arguments.kwonlyargs
+            or arguments.defaults
+            or arguments.posonlyargs
+        ):
             raise self.refusal(self.tree, "default or variable arguments", "name every argument")
-        for arg in given.args:
+        for arg in arguments.args:
             yield arg, ast.unparse(arg.annotation) if arg.annotation else "without a type"
 
     @cached_property
@@ -85,13 +91,13 @@ class Source:
     @cached_property
     def matrices(self) -> set[str]:
         """Names of arrays with two dimensions: those reshaped, or indexed with two places."""
-        found = set()
+        names = set()
         for node in ast.walk(self.tree):
             if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Tuple):
-                found.add(ast.unparse(node.value))
+                names.add(ast.unparse(node.value))
             elif isinstance(node, ast.Assign) and ".reshape(" in ast.unparse(node.value):
-                found |= {ast.unparse(target) for target in node.targets}
-        return found
+                names |= {ast.unparse(target) for target in node.targets}
+        return names
 
     def number(self, node: ast.expr) -> int | float | None:
         """Return the value of a literal or a constant; None for anything else."""
@@ -108,9 +114,9 @@ class Source:
     def single(self, name: str) -> float | None:
         """Return a constant's value in single precision, from ``SINGLE`` of its or a kernel's module."""
         kernels = [each.py_func for each in self.globals.values() if hasattr(each, "py_func")]
-        for known in (self.globals, *(kernel.__globals__ for kernel in kernels)):
-            table = known.get("SINGLE", SINGLE)
-            if name in table and known.get(name) == self.globals[name]:
+        for names in (self.globals, *(kernel.__globals__ for kernel in kernels)):
+            table = names.get("SINGLE", SINGLE)
+            if name in table and names.get(name) == self.globals[name]:
                 return float(table[name])
         return SINGLE.get(name)
 

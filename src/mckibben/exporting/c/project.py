@@ -194,8 +194,8 @@ def described(
     if single:
         for call in wiring.calls:
             check_single(call.block, step)
-    own = (f"{name}_{end}" for end in ("init", "reset", "step", "model"))
-    translation, index = Translation(single=single, taken=own), count()
+    names = (f"{name}_{end}" for end in ("init", "reset", "step", "model"))
+    translation, index = Translation(single=single, taken=names), count()
     steps = [
         _call(each, next(index), translation) if isinstance(each, Call) else each
         for each in wiring.steps
@@ -223,7 +223,7 @@ def described(
         "bound_rows": [literals(ends, single=single) for ends in block.input_bounds],
         "bounds": [[f"{end:.6g}" for end in ends] for ends in block.input_bounds],
         "clip_places": wiring.clip_counts,
-        "clip_counts": [f"numbers[{place}]" for place in wiring.clip_counts],
+        "clip_counts": [f"numbers[{i}]" for i in wiring.clip_counts],
         "n_signals": wiring.n_signals,
         "n_numbers": n_numbers,
         "n_memory": wiring.memory_size,
@@ -318,11 +318,11 @@ def _call(call: Call, index: int, translation: Translation) -> dict[str, Any]:
         scratch = [(f"state + {block.n_states}", block.n_scratch)] * in_scratch(kernel)
         end = (str(int(block.start == "virgin")), 0) if texts else outputs
         texts.append(translation.add(kernel).call(numbers, state, *scratch, sample, end))
-    given = ", ".join(said(channel.name) for channel in block.inputs)
+    arguments = ", ".join(said(channel.name) for channel in block.inputs)
     gives = ", ".join(said(channel.name) for channel in block.outputs)
     return {
         "index": index,
-        "words": f"{block.title}: {given} to {gives}",
+        "words": f"{block.title}: {arguments} to {gives}",
         "step": texts[0],
         "start": texts[-1],
         "reads": any(name in text for text in texts),
@@ -364,7 +364,6 @@ def _macros(
     for way, channels in (("IN", inputs), ("OUT", outputs)):
         endings = macros([channel["name"] for channel in channels])
         entries += [
-            (f"{way}_{ending}", str(place), channels[place]["unit"])
-            for place, ending in enumerate(endings)
+            (f"{way}_{ending}", str(k), channels[k]["unit"]) for k, ending in enumerate(endings)
         ]
     return [*entries, ("SAMPLE_TIME", repr(step), "s")] if step else entries

@@ -64,8 +64,8 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
     """
     names = [channel.name for channel in (*block.inputs, *block.outputs)]
     n_in = len(block.inputs)
-    for given, allowed in ((serving.limits, names), (serving.safe, names[n_in:])):
-        if strange := sorted(set(given) - set(allowed)):
+    for bounds, allowed in ((serving.limits, names), (serving.safe, names[n_in:])):
+        if strange := sorted(set(bounds) - set(allowed)):
             raise ModelError(
                 "the model has no such channel",
                 channel=strange[0],
@@ -75,9 +75,9 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
     low[:n_in], high[:n_in] = block.known_inputs.T
     low[n_in:], high[n_in:] = block.reachable()
-    for place, name in enumerate(names):
+    for k, name in enumerate(names):
         if name in serving.limits:
-            low[place], high[place] = serving.limits[name]
+            low[k], high[k] = serving.limits[name]
     unknown = [n for n, a, b in zip(names, low, high, strict=True) if not np.isfinite(b - a)]
     if unknown:
         raise ModelError(
@@ -92,12 +92,11 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
             )
 
     safe = low.copy()
-    for place, name in enumerate(names[n_in:], start=n_in):
-        safe[place] = serving.safe.get(name, low[place])
-        if not low[place] <= safe[place] <= high[place]:
+    for k, name in enumerate(names[n_in:], start=n_in):
+        safe[k] = serving.safe.get(name, low[k])
+        if not low[k] <= safe[k] <= high[k]:
             raise ModelError(
-                f"its safe value is {safe[place]:g}, beyond its limits "
-                f"{low[place]:g} to {high[place]:g}",
+                f"its safe value is {safe[k]:g}, beyond its limits {low[k]:g} to {high[k]:g}",
                 channel=name,
                 remedy="give one within",
             )

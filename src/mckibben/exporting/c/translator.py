@@ -129,8 +129,8 @@ class Function:
 
     def call(self, *arguments: tuple[str, int]) -> str:
         """Return a call with arguments in Python's order, each as text with the size of arrays."""
-        given = [str(arguments[each.place][each.asks == "size"]) for each in self.parameters]
-        return f"{self.name}({', '.join(given)})"
+        texts = [str(arguments[each.place][each.asks == "size"]) for each in self.parameters]
+        return f"{self.name}({', '.join(texts)})"
 
 
 class Translation:
@@ -166,11 +166,11 @@ class Translation:
 
     def free_name(self, source: Source) -> str:
         """Return a name not used by a function, nor by a local of an earlier one."""
-        taken = {*self.constants, *TAKEN, *self.names, *self._locals}
+        reserved = {*self.constants, *TAKEN, *self.names, *self._locals}
         self._locals |= {*source.locals, *(f"{name}_size" for name in source.given)}
         plain, module = source.tree.name.strip("_"), source.function.__module__.rpartition(".")[2]
         choices = [plain, f"{module}_{plain}", *(f"{module}_{plain}_{k}" for k in range(2, 100))]
-        self.names.add(free := next(each for each in choices if each not in taken))
+        self.names.add(free := next(each for each in choices if each not in reserved))
         return free
 
     def constant(self, name: str, text: str) -> str:
@@ -193,11 +193,11 @@ class _Translator:
     before has found, until its text stays the same.
     """
 
-    def __init__(self, whole: Translation, source: Source, bound: dict[str, Any]) -> None:
-        self.whole, self.source, self.bound = whole, source, bound
+    def __init__(self, translation: Translation, source: Source, bound: dict[str, Any]) -> None:
+        self.translation, self.source, self.bound = translation, source, bound
         self.refusal = source.refusal
-        self.function = Function(whole.free_name(source), source.returns)
-        self.results = [self._made(f"result_{k}") for k in range(2, len(source.returns) + 1)]
+        self.function = Function(translation.free_name(source), source.returns)
+        self.results = [self._unused_name(f"result_{k}") for k in range(2, len(source.returns) + 1)]
         self.types: dict[str, str] = {}
         self.arrays: dict[str, View | list[View]] = {}
         self.given: list[Parameter] = []
@@ -206,64 +206,64 @@ class _Translator:
         self.lines: list[str] = []
         self.breaks: list[set[str]] = []
         self.nowhere = {*source.locals, "return"}  # known where no way leads on
-        given = {*source.given, *self.arrays}
+        known_at_start = {*source.given, *self.arrays}
         before: list[str] | None = None
         while before != self.lines:
             before, self.lines = self.lines, []
             self.pending: list[str] = []
             self.comments, self.comment = dict(source.comments), ""
             self.spares = self.depth = 0
-            taken = {*self.arrays, *(each.name for each in self.given), *source.counters, "_"}
+            parameters = {*self.arrays, *(each.name for each in self.given), *source.counters, "_"}
             self.declared: dict[int, list[str]] = {}
-            for name in sorted(source.stored.keys() - taken):
+            for name in sorted(source.stored.keys() - parameters):
                 self.declared.setdefault(id(_declaring(self.body, name)), []).append(name)
-            self.known = {*given}
+            self.known = {*known_at_start}
             self._block(self.body)
         if source.returns and "return" not in self.known:
             raise self.refusal(source.tree, "a way through without a result", "end with return")
         self._finish()
 
     def _parameters(self) -> None:
-        for place, (arg, kind) in enumerate(self.source.annotations()):
-            known = self.bound.get(arg.arg)
-            if isinstance(known, int):
-                names = [self._made(f"{arg.arg}_{k + 1}") for k in range(known)]
-                names = self._unpacked(arg.arg, known) or names
-                views = [self._array(name, place, k) for k, name in enumerate(names)]
+        for index, (arg, kind) in enumerate(self.source.annotations()):
+            bound = self.bound.get(arg.arg)
+            if isinstance(bound, int):
+                names = [self._unused_name(f"{arg.arg}_{k + 1}") for k in range(bound)]
+                names = self._unpacked(arg.arg, bound) or names
+                views = [self._array(name, index, k) for k, name in enumerate(names)]
                 self.arrays |= {arg.arg: views, **dict(zip(names, views, strict=True))}
             elif kind == "Array":
-                self.arrays[arg.arg] = self._array(arg.arg, place, 0)
+                self.arrays[arg.arg] = self._array(arg.arg, index, 0)
             elif kind in TYPES:
                 self.types[arg.arg] = kind
-                self.given.append(Parameter(arg.arg, kind, place))
-            elif known is None:
+                self.given.append(Parameter(arg.arg, kind, index))
+            elif bound is None:
                 what = f"the argument {arg.arg}: {kind}"
                 raise self.refusal(arg, what, "use float, int, bool, Array or kernels")
 
-    def _unpacked(self, name: str, known: int) -> list[str]:
+    def _unpacked(self, name: str, count: int) -> list[str]:
         """Return the names of an unpacked tuple's arrays, and drop that line."""
         for statement in self.body:
             if isinstance(statement, ast.Assign) and ast.unparse(statement.value) == name:
                 names = [ast.unparse(n) for n in getattr(statement.targets[0], "elts", [])]
-                if len(names) == known:
+                if len(names) == count:
                     self.body.remove(statement)
                     return names
         return []
 
-    def _array(self, name: str, place: int, item: int) -> View:
-        self.given.append(Parameter(name, REAL, place, item, "itself"))
+    def _array(self, name: str, k: int, item: int) -> View:
+        self.given.append(Parameter(name, REAL, k, item, "itself"))
         for asks in ("size", "columns"):
-            self.given.append(Parameter(self._made(f"{name}_{asks}"), INT, place, item, asks))
+            self.given.append(Parameter(self._unused_name(f"{name}_{asks}"), INT, k, item, asks))
         pointer, size, columns = (self._safe(each.name) for each in self.given[-3:])
         rows = Value(columns) if name in self.source.matrices else None
         return View(pointer, Whole([size]), (name,), columns=rows)
 
     def _safe(self, name: str) -> str:
         """Return a local name that is not reserved in C; macros have capitals."""
-        free = not (name.isupper() or name in TAKEN or name in self.whole.names)
-        return name if free else self._made(f"{name.lower()}_")
+        free = not (name.isupper() or name in TAKEN or name in self.translation.names)
+        return name if free else self._unused_name(f"{name.lower()}_")
 
-    def _made(self, name: str) -> str:
+    def _unused_name(self, name: str) -> str:
         """Return a name that is not among the kernel's own."""
         while name in self.source.locals:
             name += "_"
@@ -271,7 +271,7 @@ class _Translator:
 
     def _spare(self, name: str) -> str:
         self.spares += 1
-        return self._made(f"{name}_{self.spares}")
+        return self._unused_name(f"{name}_{self.spares}")
 
     def _emit(self, text: str) -> None:
         """Append a line of C with the statement's comment, after pending lines."""
@@ -306,10 +306,10 @@ class _Translator:
                 self._assign(target, node.value)
                 self.known |= used(target, how=ast.Store).keys()
             case ast.AugAssign() if not self._is_array(node.target):
-                place, value = self.value(node.target), self.value(node.value)
-                self._learn(node.target, kind := self._arithmetic(node, place, value).type)
+                assigned, value = self.value(node.target), self.value(node.value)
+                self._register(node.target, kind := self._arithmetic(node, assigned, value).type)
                 word = ARITHMETIC[type(node.op)]
-                self._emit(f"{place.text} {word}= {value.to(kind).text};")
+                self._emit(f"{assigned.text} {word}= {value.to(kind).text};")
             case ast.If():
                 self._emit(f"if ({self.value(node.test).text}) {{")
                 self._branches(node)
@@ -340,23 +340,23 @@ class _Translator:
             self.pending.append(f"{TYPES[self.types.get(name, BOOL)]} {self._safe(name)};")
 
     def _branches(self, node: ast.If) -> None:
-        before = {*self.known}
+        known_before = {*self.known}
         self._block(node.body)
-        one, self.known = self.known, before
+        known_in_body, self.known = self.known, known_before
         match node.orelse:
-            case [ast.If() as other] if id(other) not in self.declared:
-                self.alone = _alone(other)
-                test = self.value(other.test).text
+            case [ast.If() as elif_] if id(elif_) not in self.declared:
+                self.alone = _alone(elif_)
+                test = self.value(elif_.test).text
                 if self.pending:
-                    raise self.refusal(other, "this condition", "call the kernel before it")
+                    raise self.refusal(elif_, "this condition", "call the kernel before it")
                 self._emit(f"}} else if ({test}) {{")
-                self._branches(other)
+                self._branches(elif_)
             case orelse:
                 if orelse:
                     self._emit("} else {")
                 self._block(orelse)
                 self._emit("}")
-        self.known &= one
+        self.known &= known_in_body
 
     def _loop(self, body: Sequence[ast.stmt], counter: str = "_", *, endless: bool = False) -> None:
         """Write the body of a loop, and update known values after it."""
@@ -364,8 +364,8 @@ class _Translator:
         self.breaks.append({*self.nowhere})
         self._block(body)
         self._emit("}")
-        left = self.breaks.pop()
-        self.known = left if endless else before
+        at_breaks = self.breaks.pop()
+        self.known = at_breaks if endless else before
 
     def _for(self, node: ast.For, counter: str, arguments: list[ast.expr]) -> None:
         assigned = self.types.keys() | used(*node.body, how=ast.Store).keys()
@@ -373,18 +373,18 @@ class _Translator:
             raise self.refusal(node, f"{counter!r} counted and assigned", "use two names")
         self.types[counter] = INT
         low, high = [Value("0"), *(self._as(each, INT) for each in arguments[:2])][-2:]
-        by = arguments[2] if len(arguments) == 3 else ast.Constant(1)
-        step, stride = self._as(by, INT).text, self.source.number(by)
+        step_node = arguments[2] if len(arguments) == 3 else ast.Constant(1)
+        step, stride = self._as(step_node, INT).text, self.source.number(step_node)
         if not stride:
-            raise self.refusal(node, f"the step {ast.unparse(by)!r}", "write a number")
+            raise self.refusal(node, f"the step {ast.unparse(step_node)!r}", "write a number")
         if "(" in high.text or self._changes(high.text, node):
             end = self._spare("end")
             self._emit(f"const int {end} = {high.text};")
             high = Value(end)
         name = self._safe(counter) if counter != "_" else self._spare("k")
         test = f"{name} {'>' if stride < 0 else '<'} {high.within(RELATION + 1)}"
-        moved = name + {"1": "++", "-1": "--"}.get(step, f" += {step}")
-        self._emit(f"for (int {name} = {low.text}; {test}; {moved}) {{")
+        advance = name + {"1": "++", "-1": "--"}.get(step, f" += {step}")
+        self._emit(f"for (int {name} = {low.text}; {test}; {advance}) {{")
         self._loop(node.body, counter)
         self.types.pop(counter, None)
 
@@ -405,14 +405,14 @@ class _Translator:
                 self._assign_several(names, values)
             case ast.Tuple(names), ast.Call() if len(names) == len(self._callee(value).returns):
                 pairs = zip(names[1:], self._callee(value).returns[1:], strict=True)
-                others = [self._pointer(each, kind) for each, kind in pairs]
-                self._set(names[0], self._call(value, others))
+                pointers = [self._pointer(each, kind) for each, kind in pairs]
+                self._set(names[0], self._call(value, pointers))
             case ast.Tuple(), _:
                 raise self.refusal(target, "this assignment", "assign one name at a time")
             case ast.Name(), _ if self._is_array(value):
                 self._name_view(target, self.view(value))
             case _ if self._is_array(target):
-                self._fill(target, value)
+                self._fill_array(target, value)
             case _:
                 self._set(target, self.value(value))
 
@@ -423,22 +423,22 @@ class _Translator:
             for target, value in zip(targets, values, strict=True):
                 self._assign(target, value)
             return
-        held = [(self._spare("held"), self.value(each)) for each in values]  # as in a swap
-        for name, one in held:
+        copies = [(self._spare("held"), self.value(each)) for each in values]  # as in a swap
+        for name, one in copies:
             self._emit(f"const {TYPES[one.type]} {name} = {one.text};")
         self._declare(*self.fresh)
-        for target, (name, one) in zip(targets, held, strict=True):
+        for target, (name, one) in zip(targets, copies, strict=True):
             self._set(target, Value(name, ATOM, one.type))
 
     def _roots(self, names: Iterable[str]) -> set[str]:
         """Return the pointers to where arrays of some names are."""
-        found = [self.arrays[name] for name in names if name in self.arrays]
-        views = (view for each in found for view in (each if isinstance(each, list) else [each]))
+        arrays = [self.arrays[name] for name in names if name in self.arrays]
+        views = (view for each in arrays for view in (each if isinstance(each, list) else [each]))
         return {root for view in views for root in view.roots}
 
     def _set(self, target: ast.expr, value: Value) -> None:
         opening = ""
-        self._learn(target, value.type)
+        self._register(target, value.type)
         if isinstance(target, ast.Name):
             self.known.add(target.id)
             if target.id == "_":
@@ -448,10 +448,10 @@ class _Translator:
                 self.fresh.discard(target.id)
                 const = "const " * (target.id not in self.source.changing)
                 opening = f"{const}{TYPES[self.types[target.id]]} "
-        place = self.value(target)
-        self._emit(f"{opening}{place.text} = {value.to(place.type).text};")
+        destination = self.value(target)
+        self._emit(f"{opening}{destination.text} = {value.to(destination.type).text};")
 
-    def _learn(self, target: ast.expr, kind: str) -> None:
+    def _register(self, target: ast.expr, kind: str) -> None:
         """Register the assignment of a type to a name, or of an array element."""
         if isinstance(target, ast.Name):
             before = self.types.get(target.id, BOOL)
@@ -467,7 +467,7 @@ class _Translator:
             name = self._spare("unused")
             self.pending.append(f"{TYPES[kind]} {name};")
             return f"&{name}"
-        self._learn(target, kind)
+        self._register(target, kind)
         if not isinstance(target, ast.Name) or self.types[target.id] != kind:
             raise self.refusal(target, f"a result in {ast.unparse(target)!r}", "name it anew")
         if target.id in self.fresh:
@@ -482,9 +482,9 @@ class _Translator:
         self._emit(f"{const}mck_real *{name} = {view.place()};")
         size, columns = view.size, view.columns
         if self._changes(size.value().text):
-            held = self._made(f"{name}_size")
-            self._emit(f"const int {held} = {size.value().text};")  # as it is now
-            size = Whole([held])
+            size_name = self._unused_name(f"{name}_size")
+            self._emit(f"const int {size_name} = {size.value().text};")  # as it is now
+            size = Whole([size_name])
         if columns and self._changes(columns.text):
             raise self.refusal(target, "rows of a length that changes", "assign the length once")
         self.arrays[target.id] = View(name, size, (target.id, *view.roots), columns=columns)
@@ -496,17 +496,17 @@ class _Translator:
         read = self._roots(name for name in self.arrays if self._safe(name) in words)
         return bool(words & {*map(self._safe, stored)} or read & self.function.written)
 
-    def _fill(self, target: ast.expr, value: ast.expr) -> None:
+    def _fill_array(self, target: ast.expr, value: ast.expr) -> None:
         if self._is_array(value):
             raise self.refusal(value, f"a copy of {ast.unparse(value)!r}", "call fill(to, numbers)")
-        view, k, given = self.view(target), self._spare("k"), self.value(value).to(REAL).text
+        view, k, number = self.view(target), self._spare("k"), self.value(value).to(REAL).text
         self.function.written |= {*view.roots}
         if not isinstance(value, ast.Constant | ast.Name):  # computed once, as in Python
-            self._emit(f"const mck_real {(same := self._spare('same'))} = {given};")
-            given = same
+            self._emit(f"const mck_real {(same := self._spare('same'))} = {number};")
+            number = same
         size = view.size.value().within(RELATION + 1)
         self._emit(f"for (int {k} = 0; {k} < {size}; {k}++) {{")
-        self._emit(f"    {view.element(Whole([k])).text} = {given};")
+        self._emit(f"    {view.element(Whole([k])).text} = {number};")
         self._emit("}")
 
     def _is_array(self, node: ast.expr) -> bool:
@@ -540,12 +540,12 @@ class _Translator:
         instead = "use arrays that are passed in, their rows, and parts without a step"
         raise self.refusal(node, f"{ast.unparse(node)!r} for an array", instead)
 
-    def _at(self, place: ast.expr, size: Whole, row: Value | None = None) -> Whole:
+    def _at(self, index: ast.expr, size: Whole, row: Value | None = None) -> Whole:
         """Return the position of a number or a row; negative literals count from the end."""
-        number = self.source.number(place)
-        if number is None and isinstance(place, ast.UnaryOp):
-            raise self.refusal(place, f"a place {ast.unparse(place)!r}", "count from a.size")
-        at = self._product(place, row) if row else self._whole(place)
+        number = self.source.number(index)
+        if number is None and isinstance(index, ast.UnaryOp):
+            raise self.refusal(index, f"a place {ast.unparse(index)!r}", "count from a.size")
+        at = self._product(index, row) if row else self._whole(index)
         return size.plus(at) if (number or 0) < 0 else at
 
     def _whole(self, node: ast.expr) -> Whole:
@@ -565,10 +565,10 @@ class _Translator:
         return Whole({"": int(value.text)} if value.text.isdigit() else [value.within(TIMES)])
 
     def _product(self, times: ast.expr, value: Value) -> Whole:
-        one = self._whole(times)
-        if one.keys() <= {""}:
-            return Whole().plus(self._terms(value), one[""])
-        return self._terms(Value(f"{one.value().within(TIMES)} * {value.within(UNARY)}", TIMES))
+        factor = self._whole(times)
+        if factor.keys() <= {""}:
+            return Whole().plus(self._terms(value), factor[""])
+        return self._terms(Value(f"{factor.value().within(TIMES)} * {value.within(UNARY)}", TIMES))
 
     def _item(self, node: ast.Subscript) -> Value:
         if isinstance(node.value, ast.Call) and not self._is_array(node.value):
@@ -604,22 +604,22 @@ class _Translator:
                 return self._compare(node)
             case ast.IfExp():
                 test = self.value(node.test).within(AND)
-                one, other, kind = _alike(self.value(node.body), self.value(node.orelse), BOOL)
-                texts = one.within(CHOICE + 1), other.within(CHOICE + 1)
+                left, right, kind = _alike(self.value(node.body), self.value(node.orelse), BOOL)
+                texts = left.within(CHOICE + 1), right.within(CHOICE + 1)
                 return Value(f"{test} ? {texts[0]} : {texts[1]}", CHOICE, kind)
             case ast.Attribute(value=ast.Name(id="np" | "math"), attr="inf" | "nan" | "pi" as name):
                 return self._written(getattr(math, name), node)
             case ast.Attribute(attr=name) if self.source.number(node) is not None:
                 text = self._written(self.source.number(node) or 0, node).text
-                return Value(self.whole.constant(name, text))
+                return Value(self.translation.constant(name, text))
             case ast.Attribute(attr="size"):
                 return self.view(node.value).size.value()
             case ast.Subscript():
                 return self._item(node)
             case ast.Call():
-                found = self._function(node)
-                if found.type:
-                    return found
+                call = self._function(node)
+                if call.type:
+                    return call
         instead = "compute it from numbers, places in arrays and calls of kernels"
         raise self.refusal(node, f"{ast.unparse(node)!r} for a number", instead)
 
@@ -636,15 +636,17 @@ class _Translator:
         if name in self.source.locals - self.arrays.keys():
             self._assigned(node)
             return Value(self._safe(name), ATOM, self.types.get(name, BOOL))
-        known = self.source.number(node)
-        if known is None:
+        number = self.source.number(node)
+        if number is None:
             raise self.refusal(node, f"the name {name!r}", "use arguments and constants")
-        single = self.source.single(name) if self.whole.single else None
+        single = self.source.single(name) if self.translation.single else None
         if single is None:
-            found = self._written(known, node)
+            constant = self._written(number, node)
         else:
-            found = Value(literal(single, single=True), ATOM, REAL)
-        return found._replace(text=self.whole.constant(name.strip("_").upper(), found.text))
+            constant = Value(literal(single, single=True), ATOM, REAL)
+        return constant._replace(
+            text=self.translation.constant(name.strip("_").upper(), constant.text)
+        )
 
     def _assigned(self, node: ast.Name) -> None:
         """Raise an error for a name that may be unassigned here."""
@@ -658,41 +660,41 @@ class _Translator:
             if abs(number) > WHOLE:
                 raise self.refusal(node, f"the whole number {number}", f"write {number}.0")
             return Value(str(int(number)), ATOM, BOOL if isinstance(number, bool) else INT)
-        kept = self.whole.single or isinstance(node, ast.Constant)
-        if kept and number and math.isfinite(number) and not LEAST < abs(number) < MOST:
+        is_literal = self.translation.single or isinstance(node, ast.Constant)
+        if is_literal and number and math.isfinite(number) and not LEAST < abs(number) < MOST:
             what = f"the number {number!r}, which single precision has no room for, or rounds away"
             raise self.refusal(node, what, "name it, and add it to the table SINGLE of the module")
-        text = literal(number, single=self.whole.single)
+        text = literal(number, single=self.translation.single)
         return Value("((mck_real)NAN)" if math.isnan(number) else text, ATOM, REAL)
 
-    def _arithmetic(self, node: ast.BinOp | ast.AugAssign, one: Value, other: Value) -> Value:
+    def _arithmetic(self, node: ast.BinOp | ast.AugAssign, left: Value, right: Value) -> Value:
         squared = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)
-        if squared and other.text == "2" and "(" not in one.text:
-            return Value(f"{one.within(UNARY)} * {one.within(UNARY)}", TIMES, one.type)
+        if squared and right.text == "2" and "(" not in left.text:
+            return Value(f"{left.within(UNARY)} * {left.within(UNARY)}", TIMES, left.type)
         if type(node.op) not in ARITHMETIC:
             raise self.refusal(node, "this operator", "use + - * / // %, ** 2 of a name, math.pow")
-        one, other, kind = _alike(one, other, REAL if isinstance(node.op, ast.Div) else INT)
+        left, right, kind = _alike(left, right, REAL if isinstance(node.op, ast.Div) else INT)
         if kind == REAL and isinstance(node.op, ast.FloorDiv | ast.Mod):
             raise self.refusal(node, "// or % of real numbers", "use math.floor(x / y)")
         word = ARITHMETIC[type(node.op)]
         binds = PLUS if word in "+-" else TIMES
-        return Value(f"{one.within(binds)} {word} {other.within(binds + 1)}", binds, kind)
+        return Value(f"{left.within(binds)} {word} {right.within(binds + 1)}", binds, kind)
 
     def _compare(self, node: ast.Compare) -> Value:
         lefts = [node.left, *node.comparators]
         links = [*zip(lefts, node.ops, node.comparators, strict=False)]
-        left, op, right = links[0]
-        within = isinstance(op, ast.In) and isinstance(right, ast.Tuple) and len(links) == 1
+        left_node, op, right_node = links[0]
+        within = isinstance(op, ast.In) and isinstance(right_node, ast.Tuple) and len(links) == 1
         if within:
-            links = [(left, ast.Eq(), each) for each in getattr(right, "elts", ())]
+            links = [(left_node, ast.Eq(), each) for each in getattr(right_node, "elts", ())]
         if within or len(links) > 1:
             each = [ast.copy_location(ast.Compare(a, [b], [c]), node) for a, b, c in links]
             return self.value(ast.BoolOp(ast.Or() if within else ast.And(), [*each]))
         if type(op) not in COMPARISON:
             raise self.refusal(node, "this comparison", "use < <= > >= == != or in")
-        one, other, _ = _alike(self.value(left), self.value(right))
+        first, second, _ = _alike(self.value(left_node), self.value(right_node))
         word = COMPARISON[type(op)]
-        text = f"{one.within(RELATION + 1)} {word} {other.within(RELATION + 1)}"
+        text = f"{first.within(RELATION + 1)} {word} {second.within(RELATION + 1)}"
         return Value(text, EQUAL if word in ("==", "!=") else RELATION, BOOL)
 
     def _function(self, node: ast.Call) -> Value:
@@ -704,26 +706,26 @@ class _Translator:
             if plain not in FUNCTIONS:
                 raise self.refusal(node, f"{name}()", f"use {', '.join(sorted(FUNCTIONS))}")
             texts = [self.value(each).to(REAL).text for each in node.args]
-            return Value(f"{plain}{'f' * self.whole.single}({', '.join(texts)})", ATOM, REAL)
+            return Value(f"{plain}{'f' * self.translation.single}({', '.join(texts)})", ATOM, REAL)
         return self._call(node)
 
     def _bounded(self, name: str, values: list[Value]) -> Value:
         """Return the smallest, the largest, the size or the whole part of numbers."""
-        real, one = any(each.type == REAL for each in values), values[0]
+        real, result = any(each.type == REAL for each in values), values[0]
         if name == "int":
-            return Value(f"(int){one.within(UNARY)}", UNARY) if real else one
+            return Value(f"(int){result.within(UNARY)}", UNARY) if real else result
         if name == "abs" and real:
-            return Value(f"fabs{'f' * self.whole.single}({one.text})", ATOM, REAL)
+            return Value(f"fabs{'f' * self.translation.single}({result.text})", ATOM, REAL)
         if name == "abs":
-            name, values = "max", [one, _negative(one)]
+            name, values = "max", [result, _negative(result)]
         for other in values[1:]:
             if real:
-                text = f"mck_{name}({one.to(REAL).text}, {other.to(REAL).text})"
-                one = Value(text, ATOM, REAL)
+                text = f"mck_{name}({result.to(REAL).text}, {other.to(REAL).text})"
+                result = Value(text, ATOM, REAL)
             else:
-                a, b = one.within(RELATION + 1), other.within(RELATION + 1)
-                one = Value(f"({b} {'<' if name == 'min' else '>'} {a} ? {b} : {a})")
-        return one
+                a, b = result.within(RELATION + 1), other.within(RELATION + 1)
+                result = Value(f"({b} {'<' if name == 'min' else '>'} {a} ? {b} : {a})")
+        return result
 
     def _callee(self, node: ast.Call) -> Function:
         """Return the function that is called, with the functions and tuples that it is given."""
@@ -734,9 +736,9 @@ class _Translator:
         names = source_of(kernel).given
         if len(names) != len(node.args) or node.keywords:
             raise self.refusal(node, "arguments by name", "give every argument by its place")
-        known = zip(names, map(self._meaning, node.args), strict=True)
-        bound = [(name, len(each) if isinstance(each, list) else each) for name, each in known]
-        return self.whole.add(kernel, tuple(each for each in bound if each[1] is not None))
+        meanings = zip(names, map(self._meaning, node.args), strict=True)
+        bound = [(name, len(each) if isinstance(each, list) else each) for name, each in meanings]
+        return self.translation.add(kernel, tuple(each for each in bound if each[1] is not None))
 
     def _meaning(self, node: ast.expr) -> Any:
         """Return the kernel that a name means, or the arrays of a tuple; None for all else."""
@@ -744,9 +746,11 @@ class _Translator:
             return node.elts
         if not isinstance(node, ast.Name) or node.id in self.types:
             return None
-        known = self.bound.get(node.id, self.source.globals.get(node.id))
+        kernel = self.bound.get(node.id, self.source.globals.get(node.id))
         arrays = self.arrays.get(node.id)
-        return arrays if isinstance(arrays, list) else known if hasattr(known, "py_func") else None
+        return (
+            arrays if isinstance(arrays, list) else kernel if hasattr(kernel, "py_func") else None
+        )
 
     def _call(self, node: ast.Call, pointers: Sequence[str] = ()) -> Value:
         """Return a call, with pointers for results after the first."""
@@ -761,30 +765,30 @@ class _Translator:
         return Value(f"{callee.name}({texts})", ATOM, next(iter(callee.returns), ""))
 
     def _arguments(self, node: ast.Call, callee: Function) -> Iterator[str]:
-        for each in callee.parameters:
-            given = node.args[each.place]
-            if not each.asks:
-                yield self._as(given, each.type).text
+        for parameter in callee.parameters:
+            argument = node.args[parameter.place]
+            if not parameter.asks:
+                yield self._as(argument, parameter.type).text
                 continue
-            items = self._meaning(given)
-            item = items[each.item] if isinstance(items, list) else given
+            items = self._meaning(argument)
+            item = items[parameter.item] if isinstance(items, list) else argument
             view = item if isinstance(item, View) else self.view(item)
-            if each.name in callee.written:
+            if parameter.name in callee.written:
                 self.function.written |= {*view.roots}
-            if each.asks == "columns" and view.columns is None:
-                raise self.refusal(given, "an array without rows here", "reshape it")
+            if parameter.asks == "columns" and view.columns is None:
+                raise self.refusal(argument, "an array without rows here", "reshape it")
             columns = view.columns.text if view.columns else ""
             size = view.size.value().text
-            yield {"itself": view.place(), "size": size, "columns": columns}[each.asks]
+            yield {"itself": view.place(), "size": size, "columns": columns}[parameter.asks]
 
     def _accumulate(self, total: ast.expr, change: ast.expr, lost: ast.expr, at: ast.expr) -> Value:
         """Return a sum, which in single precision carries what rounding loses."""
-        one, other, _ = _alike(self.value(total), self.value(change), REAL)
-        if not self.whole.single:
-            return Value(f"{one.within(PLUS)} + {other.within(PLUS + 1)}", PLUS, REAL)
+        sum_, addend, _ = _alike(self.value(total), self.value(change), REAL)
+        if not self.translation.single:
+            return Value(f"{sum_.within(PLUS)} + {addend.within(PLUS + 1)}", PLUS, REAL)
         element = self._item(ast.Subscript(lost, at))
-        self._learn(ast.Subscript(lost, at), REAL)
-        return Value(f"mck_sum({one.text}, {other.text}, &{element.text})", ATOM, REAL)
+        self._register(ast.Subscript(lost, at), REAL)
+        return Value(f"mck_sum({sum_.text}, {addend.text}, &{element.text})", ATOM, REAL)
 
     def _finish(self) -> None:
         """Write the function: its docstring, its head with the parameters that it needs, its body."""
@@ -808,10 +812,10 @@ class _Translator:
         function.text = "\n".join([*about, *head, "{", body, "}", ""])
 
 
-def _alike(one: Value, other: Value, kind: str = INT) -> tuple[Value, Value, str]:
+def _alike(left: Value, right: Value, kind: str = INT) -> tuple[Value, Value, str]:
     """Return two numbers in the type that holds both, and that type."""
-    kind = _widest(one.type, other.type, kind)
-    return one.to(kind), other.to(kind), kind
+    kind = _widest(left.type, right.type, kind)
+    return left.to(kind), right.to(kind), kind
 
 
 def _widest(*kinds: str) -> str:
@@ -829,18 +833,18 @@ def _alone(node: ast.stmt) -> ast.expr | None:
     return None if isinstance(node, ast.AugAssign) or len(places) > 1 else value
 
 
-def _negative(one: Value) -> Value:
-    text = one.within(UNARY)
+def _negative(value: Value) -> Value:
+    text = value.within(UNARY)
     text = f"({text})" if text.startswith("-") else text
-    return Value(f"-{text}", UNARY, _widest(one.type, INT))
+    return Value(f"-{text}", UNARY, _widest(value.type, INT))
 
 
 def _without_idle(text: str) -> str:
     """Return a body without constants that only sizes were read from, which C does not need."""
     pattern = re.compile(r"^ *const (?:int|mck_real) \*?(\w+) = (?:(?!\w\()[^;])*;\n?", re.M)
-    for found in pattern.finditer(text):
-        if len(re.findall(rf"\b{found[1]}\b", text)) == 1:
-            return _without_idle(text.replace(found[0], "", 1))
+    for match in pattern.finditer(text):
+        if len(re.findall(rf"\b{match[1]}\b", text)) == 1:
+            return _without_idle(text.replace(match[0], "", 1))
     return text
 
 
@@ -856,8 +860,8 @@ def _declaring(body: Sequence[ast.stmt], name: str) -> ast.stmt:
     head = getattr(first, "test", getattr(first, "iter", None))
     if len(uses) > 1 or len(inner) != 1 or (head is not None and name in used(head)):
         return first
-    found = _declaring(inner[0], name)
-    assigns = isinstance(found, ast.Assign) and name not in used(found, how=ast.Load)
-    if isinstance(first, ast.For | ast.While) and found in inner[0] and not assigns:
+    inner_first = _declaring(inner[0], name)
+    assigns = isinstance(inner_first, ast.Assign) and name not in used(inner_first, how=ast.Load)
+    if isinstance(first, ast.For | ast.While) and inner_first in inner[0] and not assigns:
         return first
-    return found
+    return inner_first

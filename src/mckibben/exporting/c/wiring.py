@@ -73,9 +73,9 @@ class Wiring:
         self.outputs, self.n_signals = list(named(layout.given)), layout.n_signals - n
         self.memory_size, self.clip_counts = 0, list[int]()
         for step in layout.steps:
-            part, taken, first = step.block, named(step.taken), step.given[0] - n
+            part, input_names, first = step.block, named(step.taken), step.given[0] - n
             if part is None:
-                self.steps.append(Sum(taken, first))
+                self.steps.append(Sum(input_names, first))
                 continue
             coefficients = part.coefficients(sample_time)
             if not part.c_kernels:
@@ -90,7 +90,7 @@ class Wiring:
             if state is not None:  # what was clipped before is not counted again
                 state = state.copy()
                 state[[*part.clip_counts]] = 0.0
-            self.steps.append(Call(part, coefficients, state, taken, first, self.memory_size))
+            self.steps.append(Call(part, coefficients, state, input_names, first, self.memory_size))
             self.memory_size += part.n_states + part.n_scratch
         self.calls = [step for step in self.steps if isinstance(step, Call)]
 

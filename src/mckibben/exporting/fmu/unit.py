@@ -165,15 +165,15 @@ def _token(block: Block, sample_time: float | None) -> str:
 
 def _variables(content: Mapping[str, Any], starts: Sequence[float]) -> list[dict[str, Any]]:
     """Return the channels as variables with distinct names; time and status are reserved."""
-    taken = {"time", "status"}
+    names = {"time", "status"}
     variables = []
     channels = [("input", *each) for each in zip(content["inputs"], starts, strict=True)]
     channels += [("output", channel, 0.0) for channel in content["outputs"]]
     for causality, channel, start in channels:
         name = channel["name"]
-        while name in taken:
+        while name in names:
             name = f"{name}_{causality}"
-        taken.add(name)
+        names.add(name)
         variables.append(
             {"name": name, "unit": channel["unit"], "causality": causality, "start": repr(start)}
         )
@@ -187,14 +187,14 @@ def own_platform() -> tuple[str, str] | None:
 
 def _library(files: Mapping[str, str], name: str) -> dict[str, bytes]:
     """Return the library for this machine, by path in the zip."""
-    own, compiler = own_platform(), own_compiler()
-    if own is None or compiler is None:
+    platform, compiler = own_platform(), own_compiler()
+    if platform is None or compiler is None:
         raise ModelError(
             "this machine cannot build the library of the FMU",
             remedy="install a C compiler, or leave the library out (`library=False`): importers can "
             "build the sources",
         )
-    where, suffix = own
+    where, suffix = platform
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         texts = {Path(path).name: files[path] for path in files if path.startswith("sources/")}

@@ -88,8 +88,8 @@ def ros2_files(
     content |= {
         "references": references,
         "handles": [
-            each if handles.count(each) == 1 else f"{each}_{place}"
-            for place, each in enumerate(handles, start=1)
+            each if handles.count(each) == 1 else f"{each}_{k}"
+            for k, each in enumerate(handles, start=1)
         ],
         "measured": content["inputs"][n_driven:],
         "lowest": min(float(low.min()), 0.0),

@@ -83,8 +83,8 @@ class Joint(Rig):
     def outputs(self) -> tuple[str, ...]:
         """Measured channels: pressures and tendon forces are of two muscles."""
         each = {"pressure": ("pressure_1", "pressure_2"), "force": ("force_1", "force_2")}
-        there = (kind for kind in self.measurable if kind in self.sensor)
-        return tuple(name for kind in there for name in each.get(kind, (kind,)))
+        kinds = (kind for kind in self.measurable if kind in self.sensor)
+        return tuple(name for kind in kinds for name in each.get(kind, (kind,)))
 
     def build(self) -> System:
         """Return two muscles on one coordinate, the angle, and the arm as a pendulum."""
@@ -113,13 +113,13 @@ class Joint(Rig):
 
         The torque is the one applied, with weight and inertia of the payload.
         """
-        place, acceleration = traces.place[:, 0], traces.acceleration[:, 0]
+        angle, acceleration = traces.place[:, 0], traces.acceleration[:, 0]
         reach = self.reach / METRE
-        weight = GRAVITY * np.sin(place - math.radians(self.hanging)) if self.vertical else 0.0
+        weight = GRAVITY * np.sin(angle - math.radians(self.hanging)) if self.vertical else 0.0
         carried = self.payload * reach * (weight + reach * acceleration)
         return {
             **{f"pressure_{k + 1}": traces.pressure[:, k] for k in (0, 1)},
-            "angle": place - zero[0],
+            "angle": angle - zero[0],
             "torque": self._torque(inputs)[:, 0] + carried,
             **{f"force_{k + 1}": traces.tension[:, k] for k in (0, 1)},
         }

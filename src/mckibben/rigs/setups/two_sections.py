@@ -128,8 +128,8 @@ def _sines(muscle: str) -> PlannedRun:
 def _planned(name: str, role: Role, waves: dict[str, Array], driven: str) -> PlannedRun:
     """Return a run that begins at rest at its first pressures; muscles that are not driven have none."""
     still = np.zeros(len(waves[EXTENSORS[0]]))
-    every = [*(f"pressure_{k}" for numbers in MUSCLES.values() for k in numbers), *EXTENSORS]
-    inputs = Recording({channel: waves.get(channel, still) for channel in every}, STEP)
+    channels = [*(f"pressure_{k}" for numbers in MUSCLES.values() for k in numbers), *EXTENSORS]
+    inputs = Recording({channel: waves.get(channel, still) for channel in channels}, STEP)
     start = {f"start.{channel}": float(inputs[channel][0]) for channel in EXTENSORS}
     return PlannedRun(name, role, inputs, start, {"driven": driven})
 

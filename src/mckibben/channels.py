@@ -54,7 +54,7 @@ LOAD_UNITS = ("N", "N*m")
 FORCE, PRESSURE, LENGTHS = "force", "pressure", ("length", "displacement")
 """Channels of force laws: the first of these that is present, with the pressure."""
 
-SMALLEST_VARIATION = 0.01
+LEAST_VARIATION = 0.01
 """Smallest variation of a channel, relative to its largest value, that is more than holding it."""
 
 LARGEST_DRIFT = 0.05
@@ -289,12 +289,10 @@ def any_moves(recordings: Sequence[Recording], channels: Sequence[str]) -> bool:
 
 def varies(samples: Sequence[Array]) -> bool:
     """Return whether a channel takes several values over all recordings, ignoring approaches."""
-    values = np.concatenate([*samples, np.zeros(0)])
-    if not values.size:
+    x = np.concatenate([*samples, np.zeros(0)])
+    if not x.size:
         return False
-    return bool(
-        np.ptp(np.percentile(values, (1.0, 99.0))) > SMALLEST_VARIATION * np.abs(values).max()
-    )
+    return bool(np.ptp(np.percentile(x, (1.0, 99.0))) > LEAST_VARIATION * np.abs(x).max())
 
 
 def loop_of(

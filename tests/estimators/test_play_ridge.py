@@ -11,7 +11,7 @@ import pytest
 
 from mckibben import Recording
 from mckibben.arrays import Array
-from mckibben.estimators.coupled.play_ridge import LEAST, N_BLOCKS, PENALTIES
+from mckibben.estimators.coupled.play_ridge import N_BLOCKS, PENALTIES, SMALLEST_PENALTY
 from mckibben.registry import load
 from tests.golden.plants import STEP, lag, noise, play, runs
 
@@ -44,7 +44,9 @@ def written_out(run: Recording, spans: Array, lags: tuple[float, ...], degree: i
 
 def ridge(x: Array, y: Array, penalty: float, size: Array) -> Array:
     """Return weights by least squares, with a row below for every weight but the first."""
-    damping = np.sqrt(np.append(LEAST, np.full(x.shape[1] - 1, penalty + LEAST)))
+    damping = np.sqrt(
+        np.append(SMALLEST_PENALTY, np.full(x.shape[1] - 1, penalty + SMALLEST_PENALTY))
+    )
     below = np.diag(damping * size)
     found: Array = np.linalg.lstsq(np.vstack([x, below]), np.append(y, np.zeros(len(below))))[0]
     return found

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mckibben.files.lines import MOST
+from mckibben.files.lines import LARGEST_SHARE_SKIPPED
 from tests.files.made import columns, one, place, refused, rows, several, table
 from tests.refusals import mentions
 
@@ -302,9 +302,9 @@ def test_a_line_that_is_cut_off_shifts_no_column(tmp_path: Path) -> None:
 
 def test_a_file_with_many_other_lines_is_refused(tmp_path: Path) -> None:
     lines = PLAIN.splitlines()
-    for share in (MOST / 2, 2 * MOST):
+    for share in (LARGEST_SHARE_SKIPPED / 2, 2 * LARGEST_SHARE_SKIPPED):
         other = [f"{line},7" if k % round(1 / share) == 1 else line for k, line in enumerate(lines)]
-        if share > MOST:
+        if share > LARGEST_SHARE_SKIPPED:
             assert refused(file(tmp_path, "\n".join(other))).row == 2
         else:
             one(file(tmp_path, "\n".join(other)))

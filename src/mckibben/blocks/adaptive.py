@@ -59,8 +59,8 @@ NOISES = 1e-9, 1e3
 def learnable_of(block: Block) -> Learnable | None:
     """Return the adaptive parameters of a block, as it or its inverse declares; None if it has none."""
     inner = block.forward if isinstance(block, Inverse) else block
-    found = inner.learnable if isinstance(inner, Invertible) else None
-    return found if found and found.compensates == isinstance(block, Inverse) else None
+    learnable = inner.learnable if isinstance(inner, Invertible) else None
+    return learnable if learnable and learnable.compensates == isinstance(block, Inverse) else None
 
 
 def learning_part(model: Block) -> tuple[tuple[Block, ...], Block, tuple[Block, ...]]:
@@ -194,13 +194,15 @@ class Adaptive(Block):
     def _check_settings(self) -> None:
         """Raise an error for an invalid adaptation time or noise."""
         shortest, longest = TIMES
-        wanted = f"{shortest:g} to {longest:g} s"
-        require(shortest <= self.time <= longest, "time", self.time, wanted)
+        expectation = f"{shortest:g} to {longest:g} s"
+        require(shortest <= self.time <= longest, "time", self.time, expectation)
         _, part, behind = learning_part(self.forward)
         width = width_of((part, *behind))
         low, high = (bound * width for bound in NOISES) if 0 < width < np.inf else NOISES
-        wanted = f"the standard deviation of what is measured, {low:.3g} to {high:.3g} in its unit"
-        require(low <= self.noise <= high, "noise", self.noise, wanted)
+        expectation = (
+            f"the standard deviation of what is measured, {low:.3g} to {high:.3g} in its unit"
+        )
+        require(low <= self.noise <= high, "noise", self.noise, expectation)
 
     def _check_memory(self, state: Array) -> None:
         """Raise an error for a state that adaptation cannot have reached."""
@@ -211,7 +213,7 @@ class Adaptive(Block):
                 else:
                     part.initial_state(np.zeros(len(part.inputs)), share.tolist())
             return
-        own, theta, used, root, senses = self._split(state)
+        fixed_state, theta, parameters_used, root, senses = self._split(state)
         p, senses = theta.size, senses.reshape(-1, SENSES)
         counts = (senses[:, READY] >= 0) & (senses[:, READY] <= p) & (senses[:, USUAL] > 0)
         if not (counts.all() and (root[:p] > 0).all()):
@@ -220,11 +222,11 @@ class Adaptive(Block):
                 parameter="memory",
                 remedy="save the model afresh, or resume what was saved unchanged",
             )
-        for parameters in (theta, used):
+        for parameters in (theta, parameters_used):
             self.learnable.with_parameters(parameters).inverse()
-        if own.size:
+        if fixed_state.size:
             fixed = self.fixed
-            fixed.initial_state(np.zeros(len(fixed.inputs)), own[: fixed.n_states].tolist())
+            fixed.initial_state(np.zeros(len(fixed.inputs)), fixed_state[: fixed.n_states].tolist())
 
     # -- what it is made of ------------------------------------------------------------------
 
@@ -252,8 +254,8 @@ class Adaptive(Block):
         if self.core is self:
             return ()
         behind, before = self._around
-        found = (*self._prompt, behind, behind, self.core, before)
-        return tuple(part for part in found if part is not None)
+        parts = (*self._prompt, behind, behind, self.core, before)
+        return tuple(part for part in parts if part is not None)
 
     @cached_property
     def _prompt(self) -> tuple[Prompt, ...]:
@@ -264,9 +266,9 @@ class Adaptive(Block):
 
     @cached_property
     def learnable(self) -> Learnable:
-        found = learnable_of(self.core.forward)
-        assert found is not None
-        return found
+        learnable = learnable_of(self.core.forward)
+        assert learnable is not None
+        return learnable
 
     @cached_property
     def fixed(self) -> Block:
@@ -338,31 +340,31 @@ class Adaptive(Block):
         """
         start = self.start if initial is None else initial
         if self.parts:
-            named = initial is None and isinstance(start, str)  # each starts by a rule of its own
-            return Layout(self).initial_state(first, None if named else start, sample_time)
+            by_rule = initial is None and isinstance(start, str)  # each starts by a rule of its own
+            return Layout(self).initial_state(first, None if by_rule else start, sample_time)
         if isinstance(start, str):
             return super().initial_state(first, start, sample_time)
-        asked = first[: len(first) - len(self.measured)]
+        desired = first[: len(first) - len(self.measured)]
         if len(start) == self.n_states:
             return stated(self.kind, self.n_states, start)
         if len(start) == self.n_adapted:
             adapted = np.array(start)
             self._split(adapted)[4][READY::SENSES] = 0.0  # the next measurement has no prediction
-            own = self.fixed.initial_state(asked, self.forward.start, sample_time)
-            return np.concatenate([own, np.zeros(self.learnable.n_more_states), adapted])
+            fixed_state = self.fixed.initial_state(desired, self.forward.start, sample_time)
+            return np.concatenate([fixed_state, np.zeros(self.learnable.n_more_states), adapted])
         state = self.initial_state(first, "first_sample", sample_time)
-        state[: self.fixed.n_states] = self.fixed.initial_state(asked, start, sample_time)
+        state[: self.fixed.n_states] = self.fixed.initial_state(desired, start, sample_time)
         return state
 
     def _core_state(self, state: Array) -> Array:
-        return next((own for part, own in self.shares(state) if part is self.core), state)
+        return next((share for part, share in self.shares(state) if part is self.core), state)
 
     def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Return views of a state of the core: inverse state, theta, used, root and senses."""
         p = self.learnable.fitted.size
         sizes = [len(state) - self.n_adapted, p, p, (p * (p + 1)) // 2]
-        own, theta, used, root, senses = np.split(state, np.cumsum(sizes))
-        return own, theta, used, root, senses
+        fixed_state, theta, parameters_used, root, senses = np.split(state, np.cumsum(sizes))
+        return fixed_state, theta, parameters_used, root, senses
 
     def resumed(self, state: Array, memory: bool = True) -> Self:
         """Return this block with a given state as its initial state.
@@ -412,22 +414,22 @@ class Adaptive(Block):
         if not self.parts:
             return super().wired(board, taken)
         behind, before = self._around
-        named = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
+        by_name = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
         m = len(self.measured)
         answers = list(taken[-m:])
         for j, part in enumerate(self._prompt):
             answers[j : j + 1] = part.wired(board, [taken[j], answers[j]])
 
         def run(block: Block | None, driven: Sequence[Any]) -> Sequence[Any]:
-            own = [named[name] for name in block.scheduling] if block else []
-            return block.wired(board, [*driven, *own]) if block else driven
+            loads_of = [by_name[name] for name in block.scheduling] if block else []
+            return block.wired(board, [*driven, *loads_of]) if block else driven
 
-        asked, measured = run(behind, taken[:m]), run(behind, answers)
-        loads = [named[name] for name in self.core.fixed.scheduling]
-        found = run(before, self.core.wired(board, [*asked, *loads, *measured]))
+        desired, measured = run(behind, taken[:m]), run(behind, answers)
+        loads = [by_name[name] for name in self.core.fixed.scheduling]
+        signals = run(before, self.core.wired(board, [*desired, *loads, *measured]))
         if not isinstance(self.start, str):
             board.resume(self.start)
-        return [*found]
+        return [*signals]
 
     def report(self, state: Array) -> None:
         if self.parts:
@@ -443,9 +445,13 @@ class Adaptive(Block):
 
     def present(self, state: Array) -> Block:
         """Return the forward block with the parameters of a state, shape (n_states,)."""
-        found = self.learnable.with_parameters(self._split(self._core_state(state))[2])
+        learned_block = self.learnable.with_parameters(self._split(self._core_state(state))[2])
         before, _, behind = learning_part(self.forward)
-        return Series((*before, found, *behind)) if isinstance(self.forward, Series) else found
+        return (
+            Series((*before, learned_block, *behind))
+            if isinstance(self.forward, Series)
+            else learned_block
+        )
 
     def equations(self) -> tuple[str, ...]:
         return (

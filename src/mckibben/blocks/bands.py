@@ -228,12 +228,12 @@ class Banded(Composition):
         """
         if initial is None or isinstance(initial, str) or len(initial) != self.forward.n_states:
             return super().initial_state(first, initial, sample_time)
-        own = self.forward.initial_state(first, initial, sample_time)
-        return np.concatenate([own, np.zeros(self.band.n_states)])
+        state = self.forward.initial_state(first, initial, sample_time)
+        return np.concatenate([state, np.zeros(self.band.n_states)])
 
     def start_on(self, recording: Recording) -> Array:
-        own = self.forward.start_on(recording)
-        return np.concatenate([own, np.zeros(self.band.n_states)])
+        start = self.forward.start_on(recording)
+        return np.concatenate([start, np.zeros(self.band.n_states)])
 
     def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         return self.band.wired(board, self.forward.wired(board, taken))

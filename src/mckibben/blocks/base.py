@@ -199,11 +199,11 @@ class Block(Hinted, DrawsItself, Parametrised):
         return self._channels(*self.ports[2])
 
     def _channels(self, *fields: str) -> tuple[Channel, ...]:
-        found: list[Channel] = []
+        channels: list[Channel] = []
         for field in fields:
             value = attrgetter(field)(self)
-            found += value if isinstance(value, tuple) else [value]
-        return tuple(found)
+            channels += value if isinstance(value, tuple) else [value]
+        return tuple(channels)
 
     def check_channels(self) -> None:
         """Raise an error for repeated channel names, or no channels."""
@@ -234,14 +234,14 @@ class Block(Hinted, DrawsItself, Parametrised):
         """
         if self._of_model is not None:
             return first_known(self.inputs, self._of_model.known_channels)
-        found = first_known(self.inputs, self._known_of_parts())
-        driven = found[: self.n_driven]
+        ranges = first_known(self.inputs, self._known_of_parts())
+        driven = ranges[: self.n_driven]
         if hasattr(self, "input_range"):
             driven[:] = self.input_limits
         if not np.isfinite(driven).any():
             with suppress(ModelError):
                 driven[:] = np.transpose(self.inverse().reachable())
-        return found
+        return ranges
 
     @property
     def _of_model(self) -> Block | None:
@@ -263,8 +263,8 @@ class Block(Hinted, DrawsItself, Parametrised):
             return first_known(self.outputs, self._of_model.known_channels)
         timeless = self.rate_dependent and self.sample_time is None
         run = partial(self._run, REST_SAMPLE_TIME if timeless else self.sample_time)
-        found = range_over(run, self.known_inputs, moving=not timeless)
-        return unknown_ranges(len(self.outputs)) if found is None else found
+        ranges = range_over(run, self.known_inputs, moving=not timeless)
+        return unknown_ranges(len(self.outputs)) if ranges is None else ranges
 
     @property
     def known_channels(self) -> list[tuple[tuple[Channel, ...], Array]]:
@@ -312,8 +312,8 @@ class Block(Hinted, DrawsItself, Parametrised):
         """Return every part with its slice of a state, as a view; empty without parts."""
         shares = []
         for part in getattr(self, "parts", ()):
-            own, state = np.split(state, [part.n_states])
-            shares.append((part, own))
+            share, state = np.split(state, [part.n_states])
+            shares.append((part, share))
         return shares
 
     @property
@@ -340,9 +340,9 @@ class Block(Hinted, DrawsItself, Parametrised):
         state = np.zeros(self.n_states)
         kernel = self.start_kernel
         if kernel is not None:
-            given = np.ascontiguousarray(first, dtype=np.float64)
+            first_inputs = np.ascontiguousarray(first, dtype=np.float64)
             scratch = scratch_of(kernel, self.n_scratch)
-            kernel(self.coefficients(sample_time), state, *scratch, given, VIRGIN[start])
+            kernel(self.coefficients(sample_time), state, *scratch, first_inputs, VIRGIN[start])
         return state
 
     def state_at(self, first: Array, output: Array) -> Array | None:
@@ -355,14 +355,14 @@ class Block(Hinted, DrawsItself, Parametrised):
         ``rows`` are the samples that count, shape (n,); those bridged in reading never do.
         """
         inputs, outputs = ([c.name for c in some] for some in (self.inputs, self.outputs))
-        whole = recording.with_derived([*inputs, *outputs])
-        measured = all(whole.units.get(channel.name) == channel.unit for channel in self.outputs)
+        complete = recording.with_derived([*inputs, *outputs])
+        measured = all(complete.units.get(channel.name) == channel.unit for channel in self.outputs)
         return run_of(
-            whole,
+            complete,
             inputs[: self.n_driven],
             outputs if measured else (),
             inputs[self.n_driven :],
-            ~whole.bridged if rows is None else rows & ~whole.bridged,
+            ~complete.bridged if rows is None else rows & ~complete.bridged,
             index=index,
         )
 
@@ -376,9 +376,9 @@ class Block(Hinted, DrawsItself, Parametrised):
 
         That of a block of past outputs is given by the first outputs instead.
         """
-        known = self.known_state(run)
-        if known is not None:
-            return known
+        state = self.known_state(run)
+        if state is not None:
+            return state
         if len(past):
             return self.run(past, run.sample_time, "first_sample")[1]
         return self.initial_state(run.first, sample_time=run.sample_time)
@@ -405,8 +405,8 @@ class Block(Hinted, DrawsItself, Parametrised):
         start, and where it is a compensator, whose outputs are commands.
         """
         commands = drives(self.outputs[0]) and not drives(self.inputs[0])
-        given = {channel.name for channel in self.inputs}
-        again = any(channel.name in given for channel in self.outputs)
+        input_names = {channel.name for channel in self.inputs}
+        again = any(channel.name in input_names for channel in self.outputs)
         if commands or again or self.n_states == 0 or not self._starts_at_rest():
             return None
         return run.start
@@ -629,8 +629,8 @@ class Block(Hinted, DrawsItself, Parametrised):
             )
         units = {channel.name: channel.unit for channel in self.outputs}
         modelled = dict(zip(units, outputs.T, strict=True))
-        kept = recording.select([channel.name for channel in self.inputs])
-        return kept.with_channels(units, **modelled)
+        inputs = recording.select([channel.name for channel in self.inputs])
+        return inputs.with_channels(units, **modelled)
 
     def check_time(self, sample_time: float | None) -> None:
         """Warn if the sample time changes the model or one of its parts."""
@@ -639,18 +639,18 @@ class Block(Hinted, DrawsItself, Parametrised):
 
     def report(self, state: Array) -> None:
         """Warn about events of a run, such as clipping, recorded in its final state."""
-        for part, own in self.shares(state):
-            part.report(own)
+        for part, share in self.shares(state):
+            part.report(share)
 
     @property
     def clip_counts(self) -> tuple[int, ...]:
         """Places in the state that count samples that were clipped, or not solved."""
         shares = self.shares(np.arange(self.n_states, dtype=np.float64))
-        return tuple(int(own[place]) for part, own in shares for place in part.clip_counts)
+        return tuple(int(share[index]) for part, share in shares for index in part.clip_counts)
 
     def n_clipped(self, state: Array) -> int:
         """Return the number of samples that were clipped, or not solved, from the final state."""
-        return int(sum(max(state[place], 0.0) for place in self.clip_counts))
+        return int(sum(max(state[index], 0.0) for index in self.clip_counts))
 
     def _inputs_from(self, recording: Recording) -> Array:
         check_units(recording, self.inputs)
@@ -763,16 +763,16 @@ class Stream:
             if not self._one_given and np.size(inputs) != self._input.size:  # spread, not given
                 raise self._misfit(ValueError(f"{np.size(inputs)} number(s)"))
         status, last = self.GOOD, self._last
-        for place, (low, high) in enumerate(self._bounds):
-            value = given[place]
+        for k, (low, high) in enumerate(self._bounds):
+            value = given[k]
             if low <= value <= high:
-                last[place] = value
-            elif place >= self._needed:  # missing
+                last[k] = value
+            elif k >= self._needed:  # missing
                 status |= self.BAD_INPUT * (value == value)
-                given[place] = nan
+                given[k] = nan
             else:
                 status |= self.BAD_INPUT
-                given[place] = last[place]
+                given[k] = last[k]
         if status and not all(map(isfinite, last[: self._needed])):
             return self._held(status)
         if not self._started:
@@ -785,14 +785,14 @@ class Stream:
             if clipped > self._clipped:
                 status |= self.CLIPPED
             self._clipped = clipped
-        kept: Any = gives[0] if self._one_gives else gives.tolist()
+        output: Any = gives[0] if self._one_gives else gives.tolist()
         # a sum is finite only if all terms are; it may overflow, and infinity less itself is NaN
-        total = kept if self._one_gives else sum(kept)
+        total = output if self._one_gives else sum(output)
         if total - total and not all(map(isfinite, gives)):
             if not np.isfinite(self.state).all():
                 self._started = False
             return self._held(status | self.BAD_OUTPUT)
-        self._kept = kept
+        self._kept = output
         self.status = status
         return self._output
 

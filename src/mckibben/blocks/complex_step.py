@@ -77,9 +77,9 @@ def _pow(x: Any, n: Any) -> complex:
 
 def _improved(evaluate: Any, target: Any, u: Any, memory: Any) -> Any:
     # the residual is linear in imaginary parts: one step would do, but for rounding of the slope
-    here = evaluate(u, memory)
-    step = abs(here.imag) + STEP  # of the size that is there, or it would be lost beside it
-    slope = (evaluate(u + complex(0.0, step), memory) - here).imag / step
+    residual = evaluate(u, memory)
+    step = abs(residual.imag) + STEP  # of the size that is there, or it would be lost beside it
+    slope = (evaluate(u + complex(0.0, step), memory) - residual).imag / step
     if slope != 0.0:
         for _ in range(3):
             missing = evaluate(u, memory) - target
@@ -89,11 +89,11 @@ def _improved(evaluate: Any, target: Any, u: Any, memory: Any) -> Any:
 
 def _with_derivative(name: str, slope: Callable[[float, float], float]) -> Callable[[Any], complex]:
     """Return a function of ``math`` that propagates its derivative, ``slope(x, value)``."""
-    own, by = getattr(math, name), deferred(slope)
+    function, by = getattr(math, name), deferred(slope)
 
     def with_derivative(x: Any) -> complex:
         z = complex(x)
-        value = own(z.real)
+        value = function(z.real)
         return complex(value, z.imag * by(z.real, value))
 
     return deferred(with_derivative)
@@ -153,10 +153,10 @@ class _Rewriting(ast.NodeTransformer):
         elif name in HELPERS:
             return _helper_call(name, *node.args)
         elif name != ast.unparse(node.func):
-            known = ", ".join(sorted({*HELPERS, *BY_REAL_PART} - {"over"}))
+            functions = ", ".join(sorted({*HELPERS, *BY_REAL_PART} - {"over"}))
             raise ModelError(
                 f"kernels have no derivative of {ast.unparse(node.func)}",
-                remedy=f"use one of {known}",
+                remedy=f"use one of {functions}",
             )
         return node
 
@@ -181,8 +181,8 @@ class _Rewriting(ast.NodeTransformer):
         return node
 
 
-def _helper_call(name: str, *given: Any) -> ast.Call:
-    return ast.Call(ast.Name(PREFIX + name, ast.Load()), list(given), [])
+def _helper_call(name: str, *arguments: Any) -> ast.Call:
+    return ast.Call(ast.Name(PREFIX + name, ast.Load()), list(arguments), [])
 
 
 def _real_part(node: Any) -> Any:

@@ -59,10 +59,10 @@ class Layout:
         self.given = block.wired(self, range(self.n_inputs))
 
     def _append(self, block: Block | None, taken: Sequence[int], count: int) -> list[int]:
-        given = [*range(self.n_signals, self.n_signals + count)]
-        self.steps.append(Call(block, [*taken], given))
+        outputs = [*range(self.n_signals, self.n_signals + count)]
+        self.steps.append(Call(block, [*taken], outputs))
         self.n_signals += count
-        return given
+        return outputs
 
     def call(self, block: Block, taken: Sequence[int]) -> list[int]:
         """Append a block, and return its output signals."""
@@ -76,10 +76,10 @@ class Layout:
 
     def resume(self, state: Sequence[float] | Array) -> None:
         """Set the start state of the blocks called last from their joint state."""
-        left = np.array(state, dtype=np.float64)
+        rest = np.array(state, dtype=np.float64)
         for call, block in reversed(list(self.calls())):
-            if left.size:
-                left, call.state = np.split(left, [left.size - block.n_states])
+            if rest.size:
+                rest, call.state = np.split(rest, [rest.size - block.n_states])
 
     def calls(self) -> Iterator[tuple[Call, Block]]:
         """Yield the calls of blocks, in order."""
@@ -95,19 +95,19 @@ class Layout:
         for step in reversed(self.steps):
             if step.block is not None or passed_on.issuperset(step.given):
                 passed_on.update(step.taken)
-        states, left = [np.empty(0)], None
+        states, rest = [np.empty(0)], None
         if not isinstance(initial, str | None):
-            left = stated(self.block.kind, self.block.n_states, initial).tolist()
+            rest = stated(self.block.kind, self.block.n_states, initial).tolist()
         for step in self.steps:
             sample, block = signals[step.taken], step.block
             if block is None:
                 signals[step.given] = sample.sum()
                 continue
             start = initial if step.state is None or initial is not None else step.state.tolist()
-            if left is not None:
-                start, left = left[: block.n_states], left[block.n_states :]
+            if rest is not None:
+                start, rest = rest[: block.n_states], rest[block.n_states :]
             states.append(block.initial_state(sample, start, sample_time))
-            if left is None and not passed_on.isdisjoint(step.given):
+            if rest is None and not passed_on.isdisjoint(step.given):
                 outputs, _ = block.run(sample[np.newaxis], sample_time, states[-1].tolist())
                 signals[step.given] = outputs[0]
         return np.concatenate(states)
@@ -124,8 +124,8 @@ class Layout:
 
         def copy(signals: Sequence[int], into: Array) -> None:
             for _, group in groupby(enumerate(signals), neighbours):
-                (first, signal), *others = group
-                (table, column), count = places[signal], 1 + len(others)
+                (first, signal), *copies = group
+                (table, column), count = places[signal], 1 + len(copies)
                 target, source = into[:, first : first + count], table[:, column : column + count]
                 runs.append(partial(np.copyto, target, source))
 
@@ -141,8 +141,8 @@ class Layout:
                 if taken is None:
                     taken = np.empty((len(inputs), len(step.taken)))
                     copy(step.taken, taken)
-                own, state = np.split(state, [step.block.n_states])
-                runs.append(step.block.bind(sample_time, own, taken, into))
+                share, state = np.split(state, [step.block.n_states])
+                runs.append(step.block.bind(sample_time, share, taken, into))
             tables[tuple(step.given)] = into
             places += [(into, column) for column in range(len(step.given))]
         if tuple(self.given) not in tables:
@@ -183,7 +183,7 @@ class Composition(Block):
         """Return the LaTeX expression of the composition, from the names of the parts."""
 
     def equations(self) -> tuple[str, ...]:
-        marks = [f"{self.letter}_{{{place + 1}}}" for place in range(len(self.parts))]
+        marks = [f"{self.letter}_{{{k + 1}}}" for k in range(len(self.parts))]
         return (self.joined(marks),)
 
     rate_dependent = _of_any("rate_dependent")
@@ -276,21 +276,21 @@ class Series(Composition):
         Where the first part knows none of a channel, it is that of the next one through the curve
         between.
         """
-        first, *others = self.parts
-        found = [(first.inputs, first.known_inputs)]
-        found += [
-            (part.inputs[part.n_driven :], part.known_inputs[part.n_driven :]) for part in others
+        first, *rest = self.parts
+        ranges = [(first.inputs, first.known_inputs)]
+        ranges += [
+            (part.inputs[part.n_driven :], part.known_inputs[part.n_driven :]) for part in rest
         ]
         for curve in first.parts if isinstance(first, PerChannel) else (first,):
             behind = first_known(
-                curve.outputs, [(part.inputs, part.known_inputs) for part in others[:1]]
+                curve.outputs, [(part.inputs, part.known_inputs) for part in rest[:1]]
             )
             bare = not (curve.path_dependent or curve.rate_dependent)
             if bare and len(curve.inputs) == len(behind) == 1 and np.isfinite(behind).all():
                 with suppress(ModelError):
                     ends = curve.inverse().simulate(behind[0])
-                    found.append((curve.inputs, np.sort(ends).reshape(1, 2)))
-        return found
+                    ranges.append((curve.inputs, np.sort(ends).reshape(1, 2)))
+        return ranges
 
     def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         signal_of = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
@@ -358,8 +358,10 @@ class Parallel(Composition):
     @cached_property
     def inputs(self) -> tuple[Channel, ...]:
         """Driving inputs of any part, then inputs that only schedule."""
-        every = {channel.name: channel for part in self.parts for channel in part.inputs}
-        return tuple(sorted(every.values(), key=lambda channel: channel.name not in self._driving))
+        channels = {channel.name: channel for part in self.parts for channel in part.inputs}
+        return tuple(
+            sorted(channels.values(), key=lambda channel: channel.name not in self._driving)
+        )
 
     @property
     def scheduling(self) -> tuple[str, ...]:
@@ -376,18 +378,18 @@ class Parallel(Composition):
     def _places(self, part: Block) -> tuple[list[int], list[int]]:
         """Return the indices of a part's inputs and outputs among those of the composition."""
         names = [channel.name for channel in self.inputs]
-        given = [channel.name for channel in self.outputs]
-        taken = [names.index(channel.name) for channel in part.inputs]
-        return taken, [given.index(channel.name) for channel in part.outputs]
+        output_names = [channel.name for channel in self.outputs]
+        input_places = [names.index(channel.name) for channel in part.inputs]
+        return input_places, [output_names.index(channel.name) for channel in part.outputs]
 
     def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         terms: list[list[Any]] = [[] for _ in self.outputs]
         for part in self.parts:
-            own, places = self._places(part)
-            signals = part.wired(board, [taken[place] for place in own])
-            for place, signal in zip(places, signals, strict=True):
-                terms[place].append(signal)
-        return [board.add(own) for own in terms]
+            input_places, places = self._places(part)
+            signals = part.wired(board, [taken[index] for index in input_places])
+            for index, signal in zip(places, signals, strict=True):
+                terms[index].append(signal)
+        return [board.add(input_places) for input_places in terms]
 
     def joined(self, parts: Sequence[str]) -> str:
         return f"y = {' + '.join(f'{part}[u]' for part in parts)}"

@@ -83,9 +83,9 @@ def _moved(value: Any, numbers: Iterator[float]) -> Any:
     if type(value).unpack is not Parametrised.unpack:
         return value.unpack([next(numbers) for _ in range(value.n_parameters)])
     other = object.__new__(type(value))
-    known: Any = value
-    vars(other).update({each.name: getattr(known, each.name) for each in fields(known)})
-    vars(other).update({name: _moved(getattr(known, name), numbers) for name in value.parameters})
+    number: Any = value
+    vars(other).update({each.name: getattr(number, each.name) for each in fields(number)})
+    vars(other).update({name: _moved(getattr(number, name), numbers) for name in value.parameters})
     return other
 
 
@@ -127,8 +127,8 @@ class Tangents:
 
     def _numbers_of(self, block: Block) -> list[Array]:
         """Return the coefficients of all kernels, then the state, if that is a function."""
-        found = [each.coefficients(self._sample_time) for _, each in _laid_out(block).calls()]
-        return [*found, self._initial(block)] if callable(self._initial) else found
+        numbers = [each.coefficients(self._sample_time) for _, each in _laid_out(block).calls()]
+        return [*numbers, self._initial(block)] if callable(self._initial) else numbers
 
     def _slopes_of(self, values: Array, place: int, own: list[Array]) -> list[Array]:
         """Return the derivatives of those numbers by a parameter.
@@ -142,7 +142,7 @@ class Tangents:
             other[place] += change
             return np.concatenate(self._numbers_of(_moved(self._block, iter(other.tolist()))))
 
-        tried: list[Array] = []
+        trials: list[Array] = []
         ends = np.cumsum([numbers.size for numbers in own])
         found, nearest = np.zeros(ends[-1]), np.full(ends[-1], np.inf)
         for share in CHANGES:
@@ -155,13 +155,13 @@ class Tangents:
                     slopes[moves] += weight * (above[moves] - below[moves]) / change
             except ModelError:
                 continue
-            if tried:
-                gap = np.abs(slopes - tried[-1])
-                found = np.where(gap < nearest, tried[-1], found)
+            if trials:
+                gap = np.abs(slopes - trials[-1])
+                found = np.where(gap < nearest, trials[-1], found)
                 nearest = np.minimum(gap, nearest)
                 if (nearest <= AGREEING * np.abs(found)).all():
                     break
-            tried.append(slopes)
+            trials.append(slopes)
         return np.split(found, ends[:-1])
 
     def over(self, inputs: Array) -> tuple[Array, Array]:
@@ -186,10 +186,10 @@ class Tangents:
         if callable(initial):
             whole = numbers[-1]
         elif initial is not None and not isinstance(initial, str):
-            given = self._block.initial_state(first[0], initial, self._sample_time)
-            whole = np.asarray(given, dtype=np.complex128)
+            real_state = self._block.initial_state(first[0], initial, self._sample_time)
+            whole = np.asarray(real_state, dtype=np.complex128)
         if whole is not None:
-            return [whole[own].copy() for own in self._states]
+            return [whole[part].copy() for part in self._states]
 
         def begin(index: int, inputs: Complex) -> Complex:
             call, block = self._calls[index]
@@ -217,23 +217,29 @@ class Tangents:
         signals[:, : inputs.shape[1]] = inputs
         index = 0
         for step in self._layout.steps:
-            taken = np.ascontiguousarray(signals[:, step.taken])
+            inputs_of_step = np.ascontiguousarray(signals[:, step.taken])
             if step.block is None:
-                signals[:, step.given] = taken.sum(axis=1, keepdims=True)
+                signals[:, step.given] = inputs_of_step.sum(axis=1, keepdims=True)
                 continue
-            found = np.empty((len(inputs), len(step.given)), np.complex128)
+            outputs_of_step = np.empty((len(inputs), len(step.given)), np.complex128)
             kernel: Any = step.block.c_kernels[0]
             room = [self._scratch[index]] if in_scratch(kernel) else []
-            twin(kernel.batch)(numbers[index], memory(index, taken), *room, taken, found)
-            signals[:, step.given] = found
+            twin(kernel.batch)(
+                numbers[index],
+                memory(index, inputs_of_step),
+                *room,
+                inputs_of_step,
+                outputs_of_step,
+            )
+            signals[:, step.given] = outputs_of_step
             index += 1
         return signals[:, self._layout.given]
 
 
 def _complex(real: Array, slopes: Array) -> Complex:
-    found = np.empty(real.shape, np.complex128)
-    found.real, found.imag = real, STEP * slopes
-    return found
+    table = np.empty(real.shape, np.complex128)
+    table.real, table.imag = real, STEP * slopes
+    return table
 
 
 def by_moving(
@@ -242,7 +248,7 @@ def by_moving(
     """Return the differences of a block's runs, (n, m), by k of its parameters, shape (n, m, k)."""
     values = block.pack()
     steps = DIFFERENCE * relative_sizes(values)
-    return differences(lambda moved: run(block.unpack(moved)), values, steps, places)
+    return differences(lambda shifted: run(block.unpack(shifted)), values, steps, places)
 
 
 def derivatives(
@@ -284,7 +290,7 @@ def derivatives(
 
     with ThreadPoolExecutor(workers) as pool:
         shares = [places[first::workers] for first in range(workers)]
-        found = np.empty((len(table), len(block.outputs), len(places)))
+        result = np.empty((len(table), len(block.outputs), len(places)))
         for first, own in enumerate(pool.map(run, shares)):
-            found[:, :, first::workers] = own
-    return found
+            result[:, :, first::workers] = own
+    return result

@@ -59,11 +59,11 @@ class Quantity:
 
 def quantities(block: Block) -> tuple[Quantity, ...]:
     """Return the meanings of the entries of ``block.pack()``, in order."""
-    found = list(_quantities(block, "", channel_units(block)))
-    alike = Counter(one.name for _, one in found)
+    result = list(_quantities(block, "", channel_units(block)))
+    alike = Counter(quantity.name for _, quantity in result)
     return tuple(
-        replace(one, name=prefix + one.name) if alike[one.name] > 1 else one
-        for prefix, one in found
+        replace(quantity, name=prefix + quantity.name) if alike[quantity.name] > 1 else quantity
+        for prefix, quantity in result
     )
 
 
@@ -99,18 +99,20 @@ def _quantities(part: Parametrised, prefix: str, units: Units) -> Iterator[tuple
     units = channel_units(part) or units
     names = iter(part.parameter_names)
     if not part.parameters:
-        for place, name in enumerate(names):
-            unit = part.unit_of("", (place,)) or ""
-            yield prefix, Quantity(name, indexed(r"\theta_i", (place,), 1), unit, "")
+        for k, name in enumerate(names):
+            unit = part.unit_of("", (k,)) or ""
+            yield prefix, Quantity(name, indexed(r"\theta_i", (k,), 1), unit, "")
         return
     said = meanings(type(part))
     for field in part.parameters:
-        meaning, whole = short(said.get(field, "")), getattr(part, field)
-        for index, value in leaves(whole):
+        meaning, values = short(said.get(field, "")), getattr(part, field)
+        for index, value in leaves(values):
             if isinstance(value, Parametrised):
                 called = field.replace("_", " ")
                 if index:
-                    called = f"{value.kind} {index[0] + 1}:" if len(whole) > 1 else f"{value.kind}:"
+                    called = (
+                        f"{value.kind} {index[0] + 1}:" if len(values) > 1 else f"{value.kind}:"
+                    )
                 for found in _quantities(value, f"{prefix}{called} ", units):
                     next(names)
                     yield found
@@ -174,15 +176,15 @@ def channel_symbols(block: Parametrised) -> dict[str, str]:
 
     Channels are left out that have no letter of their own.
     """
-    found = {name: letter for letter, name, _ in _lettered(block)}
-    if not found:
-        every = [getattr(block, field.name) for field in fields(block)]  # type: ignore[arg-type]
-        parts = [part for value in every for _, part in leaves(value)]
+    letters = {name: letter for letter, name, _ in _lettered(block)}
+    if not letters:
+        values = [getattr(block, field.name) for field in fields(block)]  # type: ignore[arg-type]
+        parts = [part for value in values for _, part in leaves(value)]
         for part in parts:
             if isinstance(part, Parametrised):
-                found = channel_symbols(part) | found
-    used = Counter(found.values())
-    return {name: letter for name, letter in found.items() if used[letter] == 1}
+                letters = channel_symbols(part) | letters
+    counts = Counter(letters.values())
+    return {name: letter for name, letter in letters.items() if counts[letter] == 1}
 
 
 def _lettered(part: Any) -> list[tuple[str, str, str]]:
@@ -193,26 +195,28 @@ def _lettered(part: Any) -> list[tuple[str, str, str]]:
     if not hasattr(part, "ports") or not part.formulas:
         return []
     ports = zip("uxy", part.ports, strict=True)
-    found = []
+    result = []
     for field, usual in {field: letter for letter, names in ports for field in names}.items():
         channels: Any = getattr(part, field, ())
         several = channels if isinstance(channels, tuple) else (channels,)
-        found += [(part.letter_of(field, k) or f"{usual}_i", one) for k, one in enumerate(several)]
-    alike = Counter(letter for letter, _ in found)
+        result += [
+            (part.letter_of(field, k) or f"{usual}_i", channel) for k, channel in enumerate(several)
+        ]
+    alike = Counter(letter for letter, _ in result)
     counted = {letter: count() for letter in alike}
     return [
         (
             indexed(letter, (next(counted[letter]),), 1) if alike[letter] > 1 else bare(letter),
-            one.name,
-            one.unit,
+            channel.name,
+            channel.unit,
         )
-        for letter, one in found
+        for letter, channel in result
     ]
 
 
 def _channels(part: Any) -> Iterator[str]:
     """Yield the meanings of the channel letters."""
-    if letters := [lettered(*one) for one in _lettered(part)]:
+    if letters := [lettered(*entry) for entry in _lettered(part)]:
         yield r",\quad ".join(letters)
 
 

@@ -133,10 +133,10 @@ class PIDFeedback(Block):
             return (r"p_{\min}", r"p_{\max}")[index[0]]
         return super().symbol_of(field, index)
 
-    def letter_of(self, field: str, place: int) -> str:
+    def letter_of(self, field: str, k: int) -> str:
         """Return the letter of a channel: what feedback is added to is behind the measurements."""
-        added = field == "scheduled" and place >= len(self.driven)
-        return "p_{b,i}" if added else super().letter_of(field, place)
+        added = field == "scheduled" and k >= len(self.driven)
+        return "p_{b,i}" if added else super().letter_of(field, k)
 
     def __post_init__(self) -> None:
         self.check_channels()
@@ -190,18 +190,18 @@ class PIDFeedback(Block):
         references, outputs = compensator.inputs[: compensator.n_driven], compensator.outputs
         pairs = {channel: place for place, channel in enumerate(self.driven)}
         if set(pairs) != set(references) or set(map(_sent, self.given)) != set(map(_sent, outputs)):
-            own, theirs = (
+            names, output_names = (
                 f"{_listed(ins)} to {_listed(outs)}"
                 for ins, outs in ((self.driven, self.given), (references, outputs))
             )
             raise ModelError(
-                f"feedback goes from {own}, and the compensator from {theirs}",
+                f"feedback goes from {names}, and the compensator from {output_names}",
                 remedy="tune it for the compensator's (tune_pid(..., "
                 "references=compensator.inputs))",
             )
         order = [pairs[channel] for channel in references]
-        named = {_sent(channel): channel for channel in outputs}
-        given = tuple(named[_sent(self.given[place])] for place in order)
+        by_sent = {_sent(channel): channel for channel in outputs}
+        given = tuple(by_sent[_sent(self.given[place])] for place in order)
         kp, ki, kd = (tuple(gains[k] for k in order) for gains in (self.kp, self.ki, self.kd))
         scheduled = (*_with_suffix(references, MEASURED), *_with_suffix(given, BASE))
         made = replace(self, kp=kp, ki=ki, kd=kd, late=True)
@@ -285,8 +285,8 @@ class FeedforwardFeedback(Composition):
     def inputs(self) -> tuple[Channel, ...]:
         """References, measurements, and further inputs of the compensator."""
         n = len(self.feedback.driven)
-        others = (c for c in self.compensator.inputs[n:] if c not in self.measured)
-        return (*self.compensator.inputs[:n], *self.measured, *others)
+        further = (c for c in self.compensator.inputs[n:] if c not in self.measured)
+        return (*self.compensator.inputs[:n], *self.measured, *further)
 
     @cached_property
     def scheduling(self) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from mckibben.recording import Recording
 AT_ONCE = 2_000_000
 """Numbers of derivatives that are held in memory at once."""
 
-AWAY = 1e3
+DIVERGED = 1e3
 """Error, in ranges of the measured output, above which a model has diverged."""
 
 Kind = TypeVar("Kind", np.float64, np.bool_)
@@ -55,7 +55,7 @@ def free_run(block: Block, recording: Recording) -> FreeRun:
         warnings.simplefilter("ignore", RuntimeWarning)
         modelled = block.simulate(recording).matrix(channel.name for channel in block.outputs)
     span = np.ptp(run.outputs, axis=0)
-    if not (np.abs(modelled - run.outputs) <= AWAY * span).all():
+    if not (np.abs(modelled - run.outputs) <= DIVERGED * span).all():
         far, wide = float(np.abs(modelled).max()), float(span.max())
         raise ModelError(
             f"the output of {block.kind!r} runs away on {recording.name}: to {far:.4g}, "
@@ -148,8 +148,8 @@ class FreeRuns:
     def apart(self, other: FreeRuns) -> float:
         """Return the root mean square by which outputs differ from those of other runs."""
         with np.errstate(over="ignore", invalid="ignore"):
-            apart = self.scored(self.modelled) - self.scored(other.modelled)
-            return float(np.sqrt(np.mean(apart**2)))
+            distance = self.scored(self.modelled) - self.scored(other.modelled)
+            return float(np.sqrt(np.mean(distance**2)))
 
     def scored(self, outputs: Sequence[NDArray[Kind]]) -> NDArray[Kind]:
         """Return the outputs of all runs, (n, m) each, at the samples that count, (N,)."""
@@ -158,16 +158,16 @@ class FreeRuns:
 
     def simulated(self, block: Block) -> list[Array]:
         """Return the outputs of a block over every run, shape (n, m) each."""
-        found = []
+        result = []
         for run, past in zip(self.runs, self.pasts, strict=True):
-            own = self.changed(block, run.index)
+            changed_block = self.changed(block, run.index)
             if run.source.periodic:
-                found.append(own.simulate(run.source).matrix(self.names))
+                result.append(changed_block.simulate(run.source).matrix(self.names))
                 continue
-            state, outputs = own.state_after(past, run), np.empty(run.outputs.shape)
-            own.bind(run.sample_time, state, run.inputs, outputs)()
-            found.append(outputs)
-        return found
+            state, outputs = changed_block.state_after(past, run), np.empty(run.outputs.shape)
+            changed_block.bind(run.sample_time, state, run.inputs, outputs)()
+            result.append(outputs)
+        return result
 
     def slopes(self, places: Sequence[int], kept: Array | slice = slice(None)) -> Array:
         """Return derivatives of the outputs by parameters in units of their sizes, shape (n, k).
@@ -198,6 +198,6 @@ class FreeRuns:
             assert state is not None
             return state
 
-        begun = start if block.known_state(run) is not None else None
-        whole = np.vstack([past, run.inputs])
-        return derivatives(block, whole, run.sample_time, begun, places)[len(past) :]
+        initial = start if block.known_state(run) is not None else None
+        inputs = np.vstack([past, run.inputs])
+        return derivatives(block, inputs, run.sample_time, initial, places)[len(past) :]

@@ -146,11 +146,11 @@ class Invertible(Block):
     def inverse_complaint(self, state: Array) -> str:
         """Return the warning about counted samples in a run of the inverse."""
         low, high = self.reachable()
-        wanted, given = self.outputs[0], self.inputs[0]
+        output, input_ = self.outputs[0], self.inputs[0]
         return (
-            f"{int(state[-1])} sample(s) of the reference {wanted.name!r} were clipped: they "
-            f"need {given.name} outside its limits. Reachable whatever happened before is "
-            f"{low[0]:.6g} to {high[0]:.6g} {wanted.unit}"
+            f"{int(state[-1])} sample(s) of the reference {output.name!r} were clipped: they "
+            f"need {input_.name} outside its limits. Reachable whatever happened before is "
+            f"{low[0]:.6g} to {high[0]:.6g} {output.unit}"
         )
 
 

@@ -73,8 +73,8 @@ def examples() -> dict[str, Block]:
     """Return the examples of all registered blocks and their inverses, by title."""
     blocks: list[Block] = [load("blocks", kind).example() for kind in names("blocks")]
     blocks += [block.inverse() for block in blocks if isinstance(block, Invertible)]
-    found = {block.title: block for block in blocks}
-    return {title: found[title] for title in sorted(found)}
+    by_title = {block.title: block for block in blocks}
+    return {title: by_title[title] for title in sorted(by_title)}
 
 
 # -- trials ----------------------------------------------------------------------------------
@@ -158,9 +158,9 @@ def trial_limits(block: Block) -> tuple[Array, Array]:
         except ModelError:
             return lowest, highest
     with np.errstate(over="ignore", invalid="ignore"):
-        known = np.isfinite(high - low)
-    lowest[driven] = np.where(known, low, lowest[driven])
-    highest[driven] = np.where(known, high, highest[driven])
+        is_finite = np.isfinite(high - low)
+    lowest[driven] = np.where(is_finite, low, lowest[driven])
+    highest[driven] = np.where(is_finite, high, highest[driven])
     return narrowed(lowest, highest)
 
 
@@ -214,14 +214,14 @@ def _sizes_agree(trial: Trial) -> None:
 
 
 def _simulates(trial: Trial) -> None:
-    given = trial.inputs.copy()
-    state = trial.block.initial_state(given[0], sample_time=trial.sample_time).tolist()
+    inputs = trial.inputs.copy()
+    state = trial.block.initial_state(inputs[0], sample_time=trial.sample_time).tolist()
     kept = list(state)
-    outputs = trial.run(given, state)
-    shape = (len(given), len(trial.block.outputs))
+    outputs = trial.run(inputs, state)
+    shape = (len(inputs), len(trial.block.outputs))
     trial.demand(trial.outputs.shape == shape, "simulate returns one column per output")
     trial.demand(bool(np.isfinite(trial.outputs).all()), "outputs are finite")
-    trial.demand(np.array_equal(given, trial.inputs), "simulate does not change its inputs")
+    trial.demand(np.array_equal(inputs, trial.inputs), "simulate does not change its inputs")
     trial.demand(state == kept, "simulate does not change its initial state")
     law = "simulating again, from the state of initial_state, returns the same"
     trial.same(outputs, trial.outputs, law)
@@ -261,15 +261,15 @@ def _equals_its_parts(trial: Trial) -> None:
     for initial in starts:
         signals = [*trial.inputs.T]
         for call in wiring.steps:
-            taken = [signals[place] for place in call.taken]
+            taken = [signals[k] for k in call.taken]
             if call.block is None:
                 signals.append(sum(taken, np.zeros(len(trial.inputs))))
                 continue
-            own = call.state.tolist() if initial is None and call.state is not None else initial
-            signals += [*trial.run(np.column_stack(taken), own, call.block).T]
-        apart = np.column_stack([signals[place] for place in wiring.given])
+            start = call.state.tolist() if initial is None and call.state is not None else initial
+            signals += [*trial.run(np.column_stack(taken), start, call.block).T]
+        by_parts = np.column_stack([signals[k] for k in wiring.given])
         law = "a composition equals its parts, run one after another"
-        trial.same(trial.run(trial.inputs, initial), apart, law)
+        trial.same(trial.run(trial.inputs, initial), by_parts, law)
 
 
 def _saves(trial: Trial) -> None:
@@ -300,9 +300,9 @@ def _takes_recordings(trial: Trial) -> None:
     trial.same(trial.run(trial.inputs[half:], state), trial.outputs[half:], law)
     trial.demand(len(repr(block)) <= 240 and "\n" not in repr(block), "repr takes three lines")
     for name in columns:
-        others = {**columns, "unrelated": columns[name]}
-        del others[name]
-        trial.refused(DataError, name, block.simulate, Recording(others, trial.sample_time))
+        columns_ = {**columns, "unrelated": columns[name]}
+        del columns_[name]
+        trial.refused(DataError, name, block.simulate, Recording(columns_, trial.sample_time))
         if standard_unit(name) is None:
             wrong = Recording(columns, trial.sample_time, {**units, name: "furlong"})
             trial.refused(DataError, name, block.simulate, wrong)
@@ -374,19 +374,19 @@ def _tracks(trial: Trial, inverse: Block, references: Array) -> None:
     """
     n = min(len(references), len(trial.inputs))
     references, scheduling = references[:n], trial.inputs[:n, trial.n_driven :]
-    wanted = np.column_stack([references, scheduling])
-    given = np.column_stack([trial.run(wanted, block=inverse), scheduling])
+    references_ = np.column_stack([references, scheduling])
+    given = np.column_stack([trial.run(references_, block=inverse), scheduling])
     late = _late(trial, inverse)
     due = references[: n - late]
     law = "forward of inverse returns the reference, after the dead time, to 1e-9 of the output's range"
     trial.agree(trial.run(given)[late:], due, EXACT, law)
     half = n // 2
     forward_state = _state_after(trial.block, given[:half], trial.sample_time)
-    starts = [_state_after(inverse, wanted[:half], trial.sample_time)]
+    starts = [_state_after(inverse, references_[:half], trial.sample_time)]
     limited = isinstance(inverse, Inverse) and hasattr(trial.block, "input_range")
     starts += [forward_state] if limited else []
     for start in starts:
-        resumed = trial.run(wanted[half:], start, inverse)
+        resumed = trial.run(references_[half:], start, inverse)
         outputs = trial.run(np.column_stack([resumed, scheduling[half:]]), forward_state)
         trial.agree(outputs[late:], due[half:], EXACT, f"from a carried-over state, {law}")
 
@@ -400,10 +400,10 @@ def _recovers(trial: Trial, inverse: Block, low: Array, high: Array) -> None:
     scheduling = np.tile(trial.inputs[0, trial.n_driven :], (len(references), 1))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        given = trial.run(np.column_stack([references, scheduling]), block=inverse)
+        inputs = trial.run(np.column_stack([references, scheduling]), block=inverse)
     warned = any(issubclass(warning.category, ModelWarning) for warning in caught)
     trial.demand(warned, "an inverse warns of references out of reach with a ModelWarning")
-    outputs = trial.run(np.column_stack([given, scheduling]))[_late(trial, inverse) :]
+    outputs = trial.run(np.column_stack([inputs, scheduling]))[_late(trial, inverse) :]
     references = references[: len(outputs)]
     inside = (np.abs(references - middle) <= (0.5 - MARGIN) * span).all(axis=1)
     law = "after a reference out of reach, the inverse is exact again"

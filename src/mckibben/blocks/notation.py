@@ -35,20 +35,20 @@ class Symbol(NamedTuple):
 @cache
 def symbols(cls: type) -> dict[str, Symbol]:
     """Return the symbols that fields of a class have in their annotations."""
-    found = {}
+    result = {}
     for name, field in getattr(cls, "__pydantic_fields__", {}).items():
         for text in field.metadata:
             if isinstance(text, str):
                 parts = re.fullmatch(r"(.*?)(?: from (\d))?(?: \[(.*)\])?", text)
                 assert parts is not None
-                found[name] = Symbol(parts[1], int(parts[2] or 1), parts[3] or "")
-    return found
+                result[name] = Symbol(parts[1], int(parts[2] or 1), parts[3] or "")
+    return result
 
 
 def declared(cls: type, field: str) -> Symbol:
     """Return the symbol of a field: as declared, or by its name."""
-    named = rf"\mathrm{{{field.replace('_', chr(92) + ' ')}}}"
-    return symbols(cls).get(field, Symbol(named))
+    text = rf"\mathrm{{{field.replace('_', chr(92) + ' ')}}}"
+    return symbols(cls).get(field, Symbol(text))
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def resolved(unit: str, place: int, units: Mapping[str, str]) -> str:
 @cache
 def meanings(cls: type) -> dict[str, str]:
     """Return the description of every field of a class and its bases, from docstrings."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for owner in reversed(cls.__mro__):
         text = inspect.cleandoc(owner.__dict__.get("__doc__") or "")
         _, _, section = text.partition("Parameters\n----------\n")
@@ -143,8 +143,8 @@ def meanings(cls: type) -> dict[str, str]:
             r"^(\S[^\n]*?) : [^\n]*\n((?:[ ]{4}[^\n]*\n?|\n)+)", section, re.M
         ):
             said = " ".join(entry[2].split())
-            found |= dict.fromkeys(re.split(r",\s*", entry[1]), said)
-    return found
+            result |= dict.fromkeys(re.split(r",\s*", entry[1]), said)
+    return result
 
 
 def short(meaning: str) -> str:

@@ -135,7 +135,7 @@ class Parametrised(metaclass=Checked):
 
     def name_of(self, field: str, index: tuple[int, ...]) -> str:
         """Return the label of a parameter: the field's name, and its indices."""
-        return " ".join([field.replace("_", " "), *(str(place + 1) for place in index)])
+        return " ".join([field.replace("_", " "), *(str(k + 1) for k in index)])
 
     def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
         """Return the symbol of a number of a field in the equations, in LaTeX, with its indices."""
@@ -160,7 +160,7 @@ class Parametrised(metaclass=Checked):
             for index, leaf in leaves(getattr(self, field)):
                 part = isinstance(leaf, Parametrised)
                 names += leaf.parameter_names if part else [self.name_of(field, index)]
-        return tuple(names or (f"{self.kind} {place + 1}" for place in range(self.n_parameters)))
+        return tuple(names or (f"{self.kind} {k + 1}" for k in range(self.n_parameters)))
 
     def numbers(self) -> Iterator[tuple[Parametrised, str, tuple[int, ...]]]:
         """Yield part, field and indices of every entry of `pack`, in order."""
@@ -191,11 +191,11 @@ class Parametrised(metaclass=Checked):
 def plain(part: Any) -> Any:
     """Return a block, or a value in one, as JSON-ready values."""
     if is_dataclass(part) and not isinstance(part, type):
-        named = {"kind": part.kind} if hasattr(part, "kind") else {}
-        own = sorted(
+        head = {"kind": part.kind} if hasattr(part, "kind") else {}
+        members = sorted(
             fields(part), key=lambda field: bool(field.kw_only)
         )  # those of a base come last
-        return named | {field.name: plain(getattr(part, field.name)) for field in own}
+        return head | {field.name: plain(getattr(part, field.name)) for field in members}
     if isinstance(part, tuple):
         return [plain(item) for item in part]
     return part
@@ -268,8 +268,8 @@ def _is_flat(values: tuple[Any, ...]) -> bool:
 def leaves(value: Any, index: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Any]]:
     """Yield the numbers and parts of a field, each with its indices."""
     if isinstance(value, tuple):
-        for place, item in enumerate(value):
-            yield from leaves(item, (*index, place))
+        for k, item in enumerate(value):
+            yield from leaves(item, (*index, k))
     elif isinstance(value, float | Parametrised):
         yield index, value
 

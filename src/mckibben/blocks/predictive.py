@@ -85,8 +85,10 @@ def model_state_of(compensator: Block, state: Array) -> Array:
         case Series() | PerChannel():
             parts = compensator.parts
             shares = np.split(state, np.cumsum([part.n_states for part in parts])[:-1])
-            found = [model_state_of(part, own) for part, own in zip(parts, shares, strict=True)]
-            return np.concatenate(found[:: -1 if isinstance(compensator, Series) else 1])
+            states = [
+                model_state_of(part, share) for part, share in zip(parts, shares, strict=True)
+            ]
+            return np.concatenate(states[:: -1 if isinstance(compensator, Series) else 1])
     if isinstance(compensator, Balance) or compensator.n_states == 0:
         return state.copy()
     raise ModelError(
@@ -480,10 +482,10 @@ class Predictive(Block):
     ) -> Array:
         if initial is not None and not isinstance(initial, str):
             return stated(self.kind, self.n_states, initial)
-        own = model_state_of(
+        model_state = model_state_of(
             self._inverse, self._inverse.initial_state(first, initial, sample_time)
         )
-        return np.concatenate([own, np.zeros(self.n_states - own.size)])
+        return np.concatenate([model_state, np.zeros(self.n_states - model_state.size)])
 
     @property
     def clip_counts(self) -> tuple[int, ...]:

@@ -36,16 +36,16 @@ def first_known(
 
     A measured channel has that of what it measures.
     """
-    found = unknown_ranges(len(channels))
-    named: dict[Channel, Array] = {}
-    for given, ranges in sources:
-        for channel, ends in zip(given, ranges, strict=True):
+    ranges_found = unknown_ranges(len(channels))
+    by_channel: dict[Channel, Array] = {}
+    for channels_of, ranges in sources:
+        for channel, ends in zip(channels_of, ranges, strict=True):
             if np.isfinite(ends).all():
-                named.setdefault(channel, ends)
-    for place, channel in enumerate(channels):
+                by_channel.setdefault(channel, ends)
+    for k, channel in enumerate(channels):
         plain = Channel(channel.name.removesuffix(MEASURED), channel.unit)
-        found[place] = named.get(channel, named.get(plain, found[place]))
-    return found
+        ranges_found[k] = by_channel.get(channel, by_channel.get(plain, ranges_found[k]))
+    return ranges_found
 
 
 def known_ranges(channels: Sequence[Channel], ranges: Array) -> dict[str, tuple[float, float]]:
@@ -92,8 +92,8 @@ def range_over(
     way = np.stack([np.interp(legs, np.arange(len(corners)), line) for line in corners.T], axis=1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found = [run(way, None)] if moving else []
-        outputs = np.vstack([*found, *(run(row[np.newaxis], "first_sample") for row in corners)])
+        runs = [run(way, None)] if moving else []
+        outputs = np.vstack([*runs, *(run(row[np.newaxis], "first_sample") for row in corners)])
     ends = np.stack([outputs.min(axis=0), outputs.max(axis=0)], axis=1)
     return np.where(np.isfinite(ends), ends, unknown_ranges(len(ends)))
 
@@ -120,7 +120,7 @@ def plausible(channel: Channel) -> tuple[float, float]:
 
     A number without a unit may be anything, unless its name is a standard one.
     """
-    found = PLAUSIBLE.get(channel.unit)
-    if found is None or not (channel.unit or standard_unit(channel.name) == ""):
+    limits = PLAUSIBLE.get(channel.unit)
+    if limits is None or not (channel.unit or standard_unit(channel.name) == ""):
         return -np.inf, np.inf
-    return found.low, found.high
+    return limits.low, limits.high

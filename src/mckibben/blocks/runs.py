@@ -74,8 +74,8 @@ class Run:
     @property
     def start(self) -> Array | None:
         """The outputs that a free run begins from, shape (m,); None where it begins at rest."""
-        known = self.from_outputs and self.counts[0] and self.outputs.shape[1]
-        return self.outputs[0] if known else None
+        has_output = self.from_outputs and self.counts[0] and self.outputs.shape[1]
+        return self.outputs[0] if has_output else None
 
     @property
     def first(self) -> Array:
@@ -102,9 +102,9 @@ class Run:
         Play operators do not depend on the path between turning points. Turns within
         the noise go too, so this is for searching, not for the final word.
         """
-        kept = self.counts.copy()
-        kept[reversals(self.u)] = True
-        return self._at(kept)
+        mask = self.counts.copy()
+        mask[reversals(self.u)] = True
+        return self._at(mask)
 
     def _at(self, kept: slice | Mask) -> Self:
         """Return the remaining samples."""
@@ -141,8 +141,8 @@ class FreeRun(Run):
     @property
     def speeds(self) -> Array:
         """Speeds of the modelled outputs there [unit/s], shape (scored, m); 0 without time."""
-        moved = np.abs(np.diff(self.modelled, axis=0, prepend=self.modelled[:1]))[self.counts]
-        return np.asarray(0.0 * moved if self.sample_time is None else moved / self.sample_time)
+        steps = np.abs(np.diff(self.modelled, axis=0, prepend=self.modelled[:1]))[self.counts]
+        return np.asarray(0.0 * steps if self.sample_time is None else steps / self.sample_time)
 
 
 def run_of(

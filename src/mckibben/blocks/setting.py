@@ -36,10 +36,10 @@ def with_fields(model: Block, values: Mapping[str, Any]) -> Block:
     ModelError
         On a field that no part lets be set, or a value that it may not have.
     """
-    known = settable(model)
+    names = settable(model)
     for name in values:
-        if name not in known:
-            listed = f"set one of {', '.join(known)}" if known else "leave it out"
+        if name not in names:
+            listed = f"set one of {', '.join(names)}" if names else "leave it out"
             raise ModelError(
                 f"{model.title!r} does not let it be set: it is identified, or no such field",
                 parameter=name,

@@ -38,7 +38,7 @@ from mckibben.numerics.blocks import (
 from mckibben.numerics.statistics import correlation_length
 from mckibben.options import CompareOptions, given_options
 from mckibben.recording import Recording
-from mckibben.system.progress import SURE, telling
+from mckibben.system.progress import FORECAST_SHARE, telling
 from mckibben.system.threads import cores
 from mckibben.system.workers import checked, outcomes
 
@@ -389,7 +389,7 @@ class _Work:
         remaining = sum(self.efforts[name] for name in waiting)
         finished = sum(self.efforts.values()) - remaining
         spent = time.monotonic() - self.started
-        pace = spent / finished if finished > SURE * (finished + remaining) else 1 / self.workers
+        pace = spent / finished if finished > FORECAST_SHARE * (finished + remaining) else 1 / self.workers
         self.progress(
             Standing(
                 done=len(self.table.rows),

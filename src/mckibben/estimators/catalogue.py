@@ -64,10 +64,10 @@ def needs() -> tuple[Need, ...]:
 def declared(model: str) -> type[Estimator]:
     """Return the estimator class of a model; defaults if it cannot be loaded."""
     try:
-        found: type[Estimator] = registry.load("estimators", model)
+        estimator: type[Estimator] = registry.load("estimators", model)
     except ModelError:
         return Estimator
-    return found
+    return estimator
 
 
 def full_name(model: str) -> str:
@@ -81,8 +81,8 @@ def full_name(model: str) -> str:
 
 def ability(model: str) -> str:
     """Return what a model represents, in one sentence."""
-    known = declared(model)
-    return known.can or (known.__doc__ or "").strip().partition("\n")[0]
+    estimator = declared(model)
+    return estimator.can or (estimator.__doc__ or "").strip().partition("\n")[0]
 
 
 def summary(model: str) -> str:
@@ -106,13 +106,13 @@ def described() -> dict[str, Any]:
     return {name: {"summary": summary(name), "settings": defaults(name)} for name in names}
 
 
-def settings_of(model: str, given: Mapping[str, Any]) -> dict[str, Any]:
+def settings_of(model: str, stated: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of one model's estimator; see `settings_of_all`."""
-    return settings_of_all({model: registry.load("estimators", model)}, given)[model]
+    return settings_of_all({model: registry.load("estimators", model)}, stated)[model]
 
 
 def settings_of_all(
-    estimators: Mapping[str, type[Estimator]], given: Mapping[str, Any]
+    estimators: Mapping[str, type[Estimator]], stated: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
     """Return the settings of several models, checked against their declarations.
 
@@ -128,11 +128,11 @@ def settings_of_all(
     ModelError
         If no model has one of the settings, or it may not have that value.
     """
-    known = {name: [one.name for one in fields(each)] for name, each in estimators.items()}
-    found: dict[str, dict[str, Any]] = {name: {} for name in estimators}
+    names_of = {name: [one.name for one in fields(each)] for name, each in estimators.items()}
+    result: dict[str, dict[str, Any]] = {name: {} for name in estimators}
     flat = {
         name: value
-        for key, one in given.items()
+        for key, one in stated.items()
         for name, value in (
             {f"{key}.{k}": v for k, v in one.items()} if isinstance(one, Mapping) else {key: one}
         ).items()
@@ -142,19 +142,19 @@ def settings_of_all(
         takers = [
             model
             for model in estimators
-            if name in known[model] and (not dot or owner == model.replace("-", "_"))
+            if name in names_of[model] and (not dot or owner == model.replace("-", "_"))
         ]
         if not takers:
-            every = sorted({setting for some in known.values() for setting in some})
+            all_names = sorted({setting for some in names_of.values() for setting in some})
             hints = (former([model], name, FORMER_SETTINGS) for model in estimators)
             raise ModelError(
                 f"{', '.join(estimators)} has no such setting",
                 parameter=key,
-                remedy=next(filter(None, hints), f"give one, or MODEL.NAME, of {', '.join(every)}"),
+                remedy=next(filter(None, hints), f"give one, or MODEL.NAME, of {', '.join(all_names)}"),
             )
         for model in takers:
-            found[model][name] = value
-    for model, settings in found.items():
+            result[model][name] = value
+    for model, settings in result.items():
         if settings:  # now, and not when this model's turn has come
             estimators[model](**settings).check_settings()
-    return found
+    return result

@@ -56,7 +56,8 @@ TAKEN = frozenset(
 )
 """Names that C, C++, <math.h>, compilers or the export's own files have already."""
 
-LONGEST = 40
+LONGEST_NAME = 40
+"""Longest name of a file or function [characters]."""
 
 
 def identifier(name: str) -> str:
@@ -70,7 +71,7 @@ def identifier(name: str) -> str:
     """
     if (
         not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name)
-        or len(name) > LONGEST
+        or len(name) > LONGEST_NAME
         or name.lower() in RESERVED
         or name.lower().startswith("mck")
     ):
@@ -78,7 +79,7 @@ def identifier(name: str) -> str:
             f"{name!r:.60} cannot name C functions",
             parameter="name",
             remedy="give `name` a letter and then letters, digits or underscores, at most "
-            f"{LONGEST}, no word of C or name of its headers, and not starting with "
+            f"{LONGEST_NAME}, no word of C or name of its headers, and not starting with "
             "mck",
         )
     return name
@@ -86,7 +87,7 @@ def identifier(name: str) -> str:
 
 def name_from(path: Path) -> str:
     """Return an identifier from a file name, with underscores for invalid characters."""
-    words = re.sub(r"[^A-Za-z0-9_]+", "_", path.stem).strip("_")[: LONGEST - 6]
+    words = re.sub(r"[^A-Za-z0-9_]+", "_", path.stem).strip("_")[: LONGEST_NAME - 6]
     fits = words and words[0].isalpha() and words.lower() not in RESERVED
     return words if fits and not words.lower().startswith("mck") else f"model_{words}".rstrip("_")
 

@@ -121,7 +121,7 @@ class Folder(Described):
         """Return the settings including matching entries of ``files``."""
         time, sheet = self.time.model_dump(exclude_none=True), self.sheet
         channels = {
-            name: channel.model_dump(exclude_none=True) for name, channel in self.channels.items()
+            name: given.model_dump(exclude_none=True) for name, given in self.channels.items()
         }
         for some in files:
             time |= some.time
@@ -188,11 +188,9 @@ def about(path: Path) -> Described:
     """Return the settings for a recording: from inside its folder, or from the folder it is in."""
     inside = path.is_dir() and os.path.lexists(path / NAME)
     folder = path if inside else path.parent
-    folder_settings = described(folder)
+    settings = described(folder)
     with _refusing(folder / NAME):
-        return folder_settings.merged(
-            some for some in folder_settings.files if some.include(path.name)
-        )
+        return settings.merged(some for some in settings.files if some.include(path.name))
 
 
 def _matched(part: str, name: str) -> re.Match[str] | None:

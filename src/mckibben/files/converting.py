@@ -80,26 +80,22 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
             "there is no column of numbers", "give one with samples in columns"
         )
     items = signals.items()
-    references = {
-        name: signal.read_in.reference for name, signal in items if signal.read_in.reference
-    }
+    references = {name: s.read_in.reference for name, s in items if s.read_in.reference}
     meta = {
         "ignored_columns": list(left_out),
         "converted_units": [
-            f"{name} from {signal.read_in.name} to {signal.unit}"
-            for name, signal in items
-            if signal.read_in.name != signal.unit
+            f"{name} from {s.read_in.name} to {s.unit}"
+            for name, s in items
+            if s.read_in.name != s.unit
         ],
         "pressure_reference": references,
-        "calibration": {name: signal.calibration for name, signal in items if signal.calibration},
-        "assumed_units": [name for name, signal in items if signal.assumed and signal.unit],
+        "calibration": {name: s.calibration for name, s in items if s.calibration},
+        "assumed_units": [name for name, s in items if s.assumed and s.unit],
         "sampled": sampled,
         "began": None if times is None else times.began,
     }
     assumed = ["time in s"] if times is not None and times.assumed else []
-    assumed += [
-        f"{name} in {signal.unit}" for name, signal in items if signal.assumed and signal.unit
-    ]
+    assumed += [f"{name} in {s.unit}" for name, s in items if s.assumed and s.unit]
     if assumed:
         text = f"{ASSUMED}{listed(assumed)}; use `units[CHANNEL]=UNIT` where that is wrong"
         source.warn(text, quiet=source.in_memory)  # names in a program are its author's

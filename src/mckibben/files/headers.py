@@ -14,8 +14,8 @@ from mckibben.files.names import AMBIGUOUS, CHANNELS, MEASURED, MUSCLES, ROLES, 
 from mckibben.files.units import COUNTS, GAUGE, find, find_listed, weight
 from mckibben.recording import base_name, standard_unit
 
-LONGEST = 256
-"""Characters of a header."""
+LONGEST_HEADER = 256
+"""Longest header that is parsed [characters]."""
 
 _ROLES, _CHANNELS, _UNITS = words_of(ROLES), words_of(CHANNELS), words_of(UNITS)
 _MEASURED, _MUSCLES = words_of(MEASURED), words_of(MUSCLES)
@@ -68,7 +68,7 @@ def parse(text: str) -> Header:
     Header(name='current 2', unit=None)
     """
     text = " ".join(_plain(text).split())
-    if len(text) > LONGEST:  # the forms below take time by the square of the length
+    if len(text) > LONGEST_HEADER:  # the forms below take time by the square of the length
         return Header(text, None)
     if text.startswith("/"):  # a topic of ROS, whose last word but these has the unit
         *path, last = [word for word in text.split("/") if word not in ("", "data", "value")] or [

@@ -31,7 +31,7 @@ STEPS_BETWEEN = 3.0
 MOST_PAIRED = 20
 """Recordings of which all pairs are compared."""
 
-AWAY = 0.2
+LEAST_RETURN = 0.2
 """Smallest distance between both ends of a piece, as a share of its range: a run from rest to rest is
 whole.
 """
@@ -105,7 +105,7 @@ def _meet(
         width = max(old.high, new.high) - min(old.low, new.low)
         if abs(new.first - old.last) > MEETS * width + STEPS_BETWEEN * old.step:
             return False
-        meets &= name not in drives or abs(old.last - old.first) < AWAY * width
+        meets &= name not in drives or abs(old.last - old.first) < LEAST_RETURN * width
     return not meets
 
 
@@ -217,12 +217,12 @@ def _end_to_end(pieces: Sequence[Recording], name: str) -> Array:
 
 def _side_by_side(loggers: list[Recording], request: Request) -> Recording:
     columns: dict[str, Column] = {}
-    for logger in loggers:
-        if logger.sample_time is None:
+    for one in loggers:
+        if one.sample_time is None:
             remedy = "state its rate, or save a column of times"
-            raise DataError("it has no time", file=logger.source, remedy=remedy)
-        for name, values in logger.channels.items():
-            columns[name] = Column(name, values, logger.units[name], times=logger.time)
+            raise DataError("it has no time", file=one.source, remedy=remedy)
+        for name, values in one.channels.items():
+            columns[name] = Column(name, values, one.units[name], times=one.time)
     request = replace(request, channels=list(columns))
     source = Source(Table(tuple(columns.values())), request, _path(loggers))
     resampled, _ = on_one(columns, source)
@@ -230,11 +230,9 @@ def _side_by_side(loggers: list[Recording], request: Request) -> Recording:
         name: column.values for name, column in resampled.items() if column.values is not None
     }
     start = float(samples.pop("time")[0])
-    slowest = max(loggers, key=lambda logger: logger.step)
+    slowest = max(loggers, key=lambda one: one.step)
     step = slowest.step if request.step is None else request.step
-    units = {
-        name: unit for logger in loggers for name, unit in logger.units.items() if name in samples
-    }
+    units = {name: unit for one in loggers for name, unit in one.units.items() if name in samples}
     joint = Recording(samples, step, units, start, slowest.meta)
     return _together(joint, loggers, samples).with_meta(sampled=rates(columns))
 

@@ -17,7 +17,7 @@ from mckibben.files.notices import warn
 from mckibben.files.sniffing import Layout
 from mckibben.files.units import find
 
-MOST = 0.1
+LARGEST_SHARE_SKIPPED = 0.1
 """Largest share of lines with digits that are no samples; a file with more is refused."""
 
 
@@ -104,7 +104,7 @@ def _end(lines: Sequence[bytes], numbers: Rows, sound: Mask, width: int, path: P
     behind = np.union1d(np.flatnonzero(np.diff(numbers) > 1), blank).astype(np.intp) + 1
     so_far = np.cumsum(sound)
     for at in map(int, behind[behind < len(lines)]):
-        if named(lines[at]) and so_far[-1] - so_far[at] <= MOST * so_far[at]:
+        if named(lines[at]) and so_far[-1] - so_far[at] <= LARGEST_SHARE_SKIPPED * so_far[at]:
             line = lines[at].decode("utf-8", "replace")
             warn(path, f"from row {numbers[at]} on it is no table, left out: {line[:60]!r}")
             while separators(lines[at - 1]):
@@ -130,7 +130,7 @@ def _refuse_many(
 ) -> None:
     """Raise an error if many lines with digits are no samples."""
     digits = [int(k) for k in np.flatnonzero(wrong) if re.search(rb"\d", lines[k])]
-    if len(digits) <= max(1, MOST * len(lines)) and not wrong.all():
+    if len(digits) <= max(1, LARGEST_SHARE_SKIPPED * len(lines)) and not wrong.all():
         return
     at = digits[0] if digits else 0
     problem = f"there are {counts[at]} cells where the header has {len(layout.headers)}"

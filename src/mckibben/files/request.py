@@ -20,7 +20,7 @@ from mckibben.recording import FEWEST_SAMPLES, SAME_TIME, conversion
 GAPS_BRIDGED = ({"gaps": "interpolate"}, {"gaps": "split"})
 """Remedies of missing samples and of gaps."""
 
-LONGEST = 1e6
+LARGEST_REST_LENGTH = 1e6
 """Largest rest length of a muscle [mm]."""
 
 
@@ -111,8 +111,14 @@ class Request(ReadOptions):
         if self.rate and self.sample_time and abs(self.rate * self.sample_time - 1.0) > SAME_TIME:
             problem = f"it is {self.sample_time:g} s, but `rate` is {self.rate:g} Hz"
             raise error(problem, parameter="sample_time", remedy="give one of both")
-        possible = self.rest_length is None or 0 < self.rest_length <= LONGEST
-        require(possible, "rest_length", self.rest_length, f"a length up to {LONGEST:g} mm", error)
+        possible = self.rest_length is None or 0 < self.rest_length <= LARGEST_REST_LENGTH
+        require(
+            possible,
+            "rest_length",
+            self.rest_length,
+            f"a length up to {LARGEST_REST_LENGTH:g} mm",
+            error,
+        )
         for name, lines in (("header", self.header), ("skip", self.skip)):
             require(lines >= 0, name, lines, "a number of lines", error)
         for channel, (value, _) in self.constants.items():

@@ -93,7 +93,7 @@ def expanded(
     """
     by_role = [roles(file) for file in files]
     train, validation, tests = (
-        [p for roles_of in by_role for p in roles_of.get(role, [])] for role in ROLES
+        [p for roles_ in by_role for p in roles_.get(role, [])] for role in ROLES
     )
     return train, validation, tests + [path for file in test for path in inside(file)]
 

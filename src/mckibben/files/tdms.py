@@ -44,18 +44,16 @@ def _table(group: Any, meta: Mapping[str, Any], name: str | None) -> Table:
     clocks: dict[str, tuple[float, float, Any]] = {}
     unread: dict[str, str] = {}
     for channel in group.channels():
-        channel_name, kind, about = channel.name, channel.dtype.kind, channel.properties
+        header, kind, about = channel.name, channel.dtype.kind, channel.properties
         if not len(channel):
-            unread[channel_name] = "no samples"
-        elif kind not in "biufmM" and not is_time(channel_name):
-            unread[channel_name] = "complex numbers" if kind == "c" else "text"
+            unread[header] = "no samples"
+        elif kind not in "biufmM" and not is_time(header):
+            unread[header] = "complex numbers" if kind == "c" else "text"
         else:
-            columns[channel_name] = column(
-                channel_name, channel[:], about.get("unit_string") or None
-            )
+            columns[header] = column(header, channel[:], about.get("unit_string") or None)
             step, offset = about.get("wf_increment"), about.get("wf_start_offset", 0.0)
             if isinstance(step, (int, float)) and 0 < step < math.inf:
-                clocks[channel_name] = (float(step), float(offset), about.get("wf_start_time"))
+                clocks[header] = (float(step), float(offset), about.get("wf_start_time"))
     meta = {**meta, **plain_meta(group.properties)}
     if len(set(clocks.values())) <= 1:
         step, offset, _ = next(iter(clocks.values()), (None, 0.0, None))
@@ -63,12 +61,10 @@ def _table(group: Any, meta: Mapping[str, Any], name: str | None) -> Table:
         return Table(all_columns, None, step, offset, meta=meta, unread=unread, name=name)
     first = min((began for *_, began in clocks.values() if began is not None), default=None)
     clocked: list[Column] = []
-    for channel_name, made in columns.items():
-        step, offset, began = clocks.get(channel_name, (None, 0.0, None))
-        if is_time(channel_name) or step is None or (first is not None and began is None):
-            unread[channel_name] = (
-                "its start and increment are not stated, and others differ in them"
-            )
+    for header, made in columns.items():
+        step, offset, began = clocks.get(header, (None, 0.0, None))
+        if is_time(header) or step is None or (first is not None and began is None):
+            unread[header] = "its start and increment are not stated, and others differ in them"
         else:
             late = 0.0 if began is None else float((began - first) / np.timedelta64(1, "us")) / 1e6
             times = offset + late + step * np.arange(made.size, dtype=np.float64)

@@ -173,11 +173,9 @@ def _ask_pint(text: str) -> Unit | None:
         if pure or (target == "Hz" and "hertz" not in str(unit)):
             continue
         if unit.dimensionality == registry.Unit(target).dimensionality:
-            quantity, base = (
-                registry.Quantity(1.0, each).to_base_units().m for each in (unit, target)
-            )
+            size, base = (registry.Quantity(1.0, each).to_base_units().m for each in (unit, target))
             # RN is a record number, not 1e27 newtons
-            return Unit(str(unit), target) if 1e-10 < quantity / base < 1e10 else None
+            return Unit(str(unit), target) if 1e-10 < size / base < 1e10 else None
     return Unit(text, None)
 
 

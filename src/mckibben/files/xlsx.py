@@ -34,15 +34,13 @@ def read(file: BufferedReader, path: Path, sheet: str | None = None) -> list[Tab
     DataError
         If it is not there, or has no numbers.
     """
-    wanted_sheet = sheet or about(path).sheet
+    wanted = sheet or about(path).sheet
     with _opened(file, path) as book:
         names = [one.title for one in book.worksheets]
-        if wanted_sheet is not None and wanted_sheet not in names:
-            problem, remedy = f"there is no sheet {wanted_sheet!r}", f"name one of {listed(names)}"
+        if wanted is not None and wanted not in names:
+            problem, remedy = f"there is no sheet {wanted!r}", f"name one of {listed(names)}"
             raise DataError(problem, file=path, parameter="sheet", remedy=remedy)
-        texts_of = {
-            one.title: _text(one) for one in book.worksheets if wanted_sheet in (None, one.title)
-        }
+        texts_of = {one.title: _text(one) for one in book.worksheets if wanted in (None, one.title)}
     name = max(texts_of, key=lambda name: texts_of[name][1:])
     text, _, n_numbers = texts_of[name]
     if not n_numbers:

@@ -21,7 +21,7 @@ from mckibben.system.validation import invalid
 ALIKE = 0.1
 """Standard deviation of the logarithm among muscles of one make and size."""
 
-NEAR = 0.25
+CORRELATION_LENGTH = 0.25
 """Correlation length of the logarithm of size, slenderness and braid."""
 
 ZERO = 0.03
@@ -178,7 +178,7 @@ def _kriging_weights(similarity: Array, target: Array, spread: float) -> tuple[A
         return np.zeros(0), 1.0
 
     def correlation(some: Array, points: Array) -> Array:
-        distances = (some[:, np.newaxis] - points) / NEAR
+        distances = (some[:, np.newaxis] - points) / CORRELATION_LENGTH
         return np.asarray(np.exp(-0.5 * (distances**2).sum(axis=2)))
 
     to_wanted = correlation(similarity, target[np.newaxis])[:, 0]

@@ -32,7 +32,7 @@ MOST_TRIES, HEAVIER, LIGHTER = 7, 10.0, 0.2
 FIRST_DAMPING, RAISED, LIGHTEST = 1e-3, 1e-9, 1e-14
 """Damping of the first step, the smallest after a step that failed, and the smallest."""
 
-SLOW, SLOWEST = 1e-3, 2
+SLOW_GAIN, MOST_SLOW_STEPS = 1e-3, 2
 """Relative gain of a slow step, and number of slow steps that end a descent."""
 
 
@@ -199,10 +199,10 @@ def levenberg_marquardt(
             damping = max(HEAVIER * damping, RAISED)
         else:
             return point
-        slow = slow + 1 if size > (1.0 - SLOW) * cost else 0
+        slow = slow + 1 if size > (1.0 - SLOW_GAIN) * cost else 0
         point, cost = trial, size
         improved(point, cost)
-        if slow >= SLOWEST:
+        if slow >= MOST_SLOW_STEPS:
             return point
         damping = max(LIGHTER * damping, LIGHTEST)
     return point

@@ -311,12 +311,9 @@ class Experiment:
         if key not in self._free:
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always", ModelWarning)
-                free_run = self.models[name].simulate(recording)
+                run = self.models[name].simulate(recording)
             self.warned |= {f"{name} on {recording.name}: {w.message}.": None for w in caught}
-            self._free[key] = (
-                recording,
-                free_run,
-            )  # with the recording, so that its id stays its own
+            self._free[key] = (recording, run)  # with the recording, so that its id stays its own
         return self._free[key][1]
 
     def table(
@@ -460,14 +457,12 @@ def reproduce(
     """
     run: Callable[[Experiment], None] = registry.load("papers", name)
     plant = _plant(name, rig, data)
-    checkpoints = Checkpoints(folder, name, quick, seed)
+    stored = Checkpoints(folder, name, quick, seed)
     with one_blas_thread(), telling(progress, name) as tell:
-        experiment = Experiment(
-            name, plant, data, quick, seed, jobs, checkpoints, tell or _no_progress
-        )
+        experiment = Experiment(name, plant, data, quick, seed, jobs, stored, tell or _no_progress)
         run(experiment)
     if clear:
-        checkpoints.clear()
+        stored.clear()
     on = f"{len(data)} recordings" if data is not None else f"rig {plant.name}" if plant else ""
     return experiment.done(on)
 

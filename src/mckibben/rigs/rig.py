@@ -235,11 +235,11 @@ class Rig(DrawsItself, Section, ABC):
             On missing or unknown channels, or a recording without time.
         """
         changed = changes(self)
-        commands, saturated = self._commanded().of_recording(inputs)
+        given, saturated = self._commanded().of_recording(inputs)
         step = float(inputs.sample_time or 0.0)  # one without is refused above
-        traces = self._march(self._at_rest().copy(), commands, step, held)
+        traces = self._march(self._at_rest().copy(), given, step, held)
         # A held command is seen from the next sample on.
-        seen = np.vstack([self.resting, commands[:-1]]) if held else commands
+        seen = np.vstack([self.resting, given[:-1]]) if held else given
         readings = self._readings(traces, seen)
         self._refuse_divergence(readings)
         if ideal:
@@ -251,9 +251,7 @@ class Rig(DrawsItself, Section, ABC):
                 name: self._sensed(name, samples, noise[:, i])
                 for i, (name, samples) in enumerate(readings.items())
             }
-        applied = {
-            name: commands[:, i] for i, name in enumerate(self.inputs) if name not in readings
-        }
+        applied = {name: given[:, i] for i, name in enumerate(self.inputs) if name not in readings}
         return Recording(
             {**applied, **readings},
             inputs.sample_time,

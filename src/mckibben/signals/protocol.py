@@ -136,13 +136,11 @@ def scaling(name: str, rig: object) -> list[Scaled]:
 
 
 def _extents(plan: Protocol) -> dict[str, Extent]:
-    by_channel: dict[str, list[float]] = {}
+    limits: dict[str, list[float]] = {}
     for run in plan.runs:
         for channel, extent in run.inputs.ranges.items():
-            by_channel.setdefault(f"{channel} [{run.inputs.units.get(channel, '')}]", []).extend(
-                extent
-            )
+            limits.setdefault(f"{channel} [{run.inputs.units.get(channel, '')}]", []).extend(extent)
         if "payload" in run.settings:
-            by_channel.setdefault("payload [kg]", []).append(run.settings["payload"])
-        by_channel.setdefault("time [s]", []).append(len(run.inputs) * run.inputs.step)
-    return {what: (min(values), max(values)) for what, values in by_channel.items()}
+            limits.setdefault("payload [kg]", []).append(run.settings["payload"])
+        limits.setdefault("time [s]", []).append(len(run.inputs) * run.inputs.step)
+    return {what: (min(values), max(values)) for what, values in limits.items()}

@@ -29,7 +29,7 @@ OF_NORMAL = 0.6745 * np.sqrt(20.0)
 RANGE_SHARE = 0.01
 """Smallest swing that counts as a movement, relative to the range."""
 
-WHOLE = 0.9
+LEAST_WHOLE = 0.9
 """Smallest ratio of a first or last branch to its partner for a cycle to count."""
 
 
@@ -188,7 +188,7 @@ def cycles(x: ArrayLike, threshold: float | None = None) -> list[slice]:
     return whole_cycles(values, reversals(values, threshold))
 
 
-def whole_cycles(x: Array, turns: Indices, whole: float = WHOLE) -> list[slice]:
+def whole_cycles(x: Array, turns: Indices, whole: float = LEAST_WHOLE) -> list[slice]:
     """Return the whole cycles between known turning points.
 
     At either end of the signal, a branch counts as whole from this share of the other one.

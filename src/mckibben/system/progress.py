@@ -24,11 +24,11 @@ Show = Callable[[float, str], None]
 
 Item = TypeVar("Item")
 
-LINE = 0.01
+LEAST_PROGRESS = 0.01
 """Least progress between two lines, as a share of the whole."""
 
 
-SURE = 0.1
+FORECAST_SHARE = 0.1
 """Share of the work after which the time left is extrapolated from the progress so far."""
 
 
@@ -85,12 +85,12 @@ def words_of(progress: str | float = "", *_: object) -> str:
 def time_left(share: float, elapsed: float) -> str:
     """Return the time left in words, from the share done in some time [s].
 
-    Nothing within the first second, before `SURE` is done, and at the end.
+    Nothing within the first second, before `FORECAST_SHARE` is done, and at the end.
 
     >>> time_left(0.2, 10.0), time_left(0.05, 10.0)
     ('about 40 s left', '')
     """
-    if elapsed < 1 or not SURE <= share < 1:
+    if elapsed < 1 or not FORECAST_SHARE <= share < 1:
         return ""
     return f"about {duration(elapsed * (1 - share) / share)} left"
 
@@ -126,7 +126,7 @@ def _in_lines(title: str) -> Iterator[Show]:
 
     def show(share: float, words: str) -> None:
         nonlocal last
-        if share >= last + LINE or share == 1.0 > last:
+        if share >= last + LEAST_PROGRESS or share == 1.0 > last:
             with suppress(OSError):
                 print(_line(title, words), file=sys.stderr, flush=True)
             last = share

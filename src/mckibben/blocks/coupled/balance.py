@@ -269,12 +269,12 @@ class Balance(Invertible):
             return fields
         offset = fields.pop("friction_offset")
         top = max(map(abs, fields.get("pressure_range") or (USUAL_TOP,)))
-        whole = top + offset
+        full = top + offset
         return fields | {
-            "limits": vector(whole * np.array(fields["limits"])),
-            "friction_growth": top / whole,
+            "limits": vector(full * np.array(fields["limits"])),
+            "friction_growth": top / full,
             "highest_pressure": top,
-            "friction_slopes": vector(np.array(fields.get("friction_slopes", ())) / whole),
+            "friction_slopes": vector(np.array(fields.get("friction_slopes", ())) / full),
         }
 
     @classmethod
@@ -339,8 +339,8 @@ class Balance(Invertible):
             wrong = any(not value > 0 for value in values)
             self._refuse(wrong, f"has {values}", "give positive ones", name)
         rises = all(a < b for a, b in pairwise((0.0, *self.limits)))
-        wanted = "give positive ones, in increasing order"
-        self._refuse(not rises, f"has {self.limits}", wanted, "limits")
+        remedy = "give positive ones, in increasing order"
+        self._refuse(not rises, f"has {self.limits}", remedy, "limits")
         for name in self.parameters:
             numbers = np.array(getattr(self, name) or 0.0, ndmin=2)
             if name == "obstacles" and self.obstacles:
@@ -349,11 +349,11 @@ class Balance(Invertible):
             self._refuse(
                 wrong, "has some below 0, which would generate energy", "give none below 0", name
             )
-        both = bool(self.mass and self.pushes)
+        pushes_mass = bool(self.mass and self.pushes)
         only = "give one of mass and pushes"
-        self._refuse(both, "has it, and muscles that go slack", only, "mass")
-        both = self.held and self.tare
-        self._refuse(both, "has it, and starts held", "give one of tare and held", "tare")
+        self._refuse(pushes_mass, "has it, and muscles that go slack", only, "mass")
+        pushes_mass = self.held and self.tare
+        self._refuse(pushes_mass, "has it, and starts held", "give one of tare and held", "tare")
 
     def _refuse(self, wrong: bool, what: str, remedy: str, field: str | None = None) -> None:
         if wrong:
@@ -435,11 +435,11 @@ class Balance(Invertible):
             return f"{letter}_{{{','.join(map(str, places))}}}"
         return super().symbol_of(field, index)
 
-    def letter_of(self, field: str, place: int) -> str:
+    def letter_of(self, field: str, k: int) -> str:
         """Return the letter of a channel: loads are behind what schedules."""
         if field == "scheduled":
-            return "x_i" if place < self.n_schedules else "F_l"
-        return "q_i" if field == "driven" and self.directions else super().letter_of(field, place)
+            return "x_i" if k < self.n_schedules else "F_l"
+        return "q_i" if field == "driven" and self.directions else super().letter_of(field, k)
 
     @property
     def n_loads(self) -> int:
@@ -617,8 +617,8 @@ class Balance(Invertible):
         _, unit, by = self._entry(field, index)
         driving = self.given[0].unit
         force = driving if self.areas[0][0] == 1.0 else "N"
-        own = {"N": force, "mm": self.driven[0].unit, "bar": driving}
-        unit = re.sub(r"\b(N|mm|bar)\b", lambda one: own[one[0]], unit).rstrip("/")
+        units = {"N": force, "mm": self.driven[0].unit, "bar": driving}
+        unit = re.sub(r"\b(N|mm|bar)\b", lambda match: units[match[0]], unit).rstrip("/")
         return f"{unit or 1}{' ' if '/' in unit else '/'}{by}" if by else unit
 
     def is_convention(self, field: str, index: tuple[int, ...]) -> bool:
@@ -714,11 +714,11 @@ class Placed(NamedTuple):
 def balance_in(model: Block) -> Placed | None:
     """Return the balance of a model, compensator or inverse; None if it has none."""
     parts = model.parts if isinstance(model, Series) else (model,)
-    for place, part in enumerate(parts):
+    for k, part in enumerate(parts):
         solved = isinstance(part, Inverse)
         balance = part.forward if isinstance(part, Inverse) else part
         if isinstance(balance, Balance):
-            return Placed(balance, solved, parts[:place], parts[place + 1 :])
+            return Placed(balance, solved, parts[:k], parts[k + 1 :])
     return None
 
 

@@ -296,12 +296,12 @@ def learnable_balance(
 
 def adaptable_in(c: Array) -> list[tuple[int, int]]:
     """Return muscle and kind of every adaptive parameter, of a balance's coefficients."""
-    places, found = places_of(c), list[tuple[int, int]]()
+    places, adaptable = places_of(c), list[tuple[int, int]]()
     for k in range(int(c[at.N_MUSCLES])):
         lasting = (bool(c[places[name][k]].any()) for name in ("friction", "relaxation"))
-        there = (True, True, k > 0 or c[at.N_LOADS] > 0, *lasting)
-        found += [(k, kind) for kind in KINDS if there[kind]]
-    return found
+        is_there = (True, True, k > 0 or c[at.N_LOADS] > 0, *lasting)
+        adaptable += [(k, kind) for kind in KINDS if is_there[kind]]
+    return adaptable
 
 
 def family_of(c: Array, adapted: list[tuple[int, int]], scales: Array, scheduled: Array) -> Array:

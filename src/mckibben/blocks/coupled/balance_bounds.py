@@ -43,21 +43,21 @@ def ratios(c: Array, k: int, scheduled: Array) -> tuple[float, float]:
         Lowest and highest of what schedules springs.
     """
     places, m, scale = places_of(c), int(c[at.N_COORDINATES]), c[at.SCALE]
-    own = {name: c[places[name][k]] for name in ORDER["muscle"]}
+    muscle = {name: c[places[name][k]] for name in ORDER["muscle"]}
     springs, ways = c[places["springs"]].reshape(m, -1, 1 + m), c[places["directions"]]
-    low, high = own["hull"].tolist()
+    low, high = muscle["hull"].tolist()
     u = np.linspace(low, high, GRID) / scale
-    area, elasticity = Polynomial(own["areas"]), Polynomial([0.0, 0.0, *own["elasticity"]])
+    area, elasticity = Polynomial(muscle["areas"]), Polynomial([0.0, 0.0, *muscle["elasticity"]])
     rise = c[at.GROWTH] / c[at.TOP]
-    rubbed = float(own["friction"] @ (rise * c[places["limits"][0]] + own["walls"]))
-    left = float(area(u).min()) - LEAST_LEFT * own["areas"][0]
-    moved, most = np.count_nonzero(ways[k]), (ways**2).sum(axis=0).max()
+    rubbed = float(muscle["friction"] @ (rise * c[places["limits"][0]] + muscle["walls"]))
+    area_left = float(area(u).min()) - LEAST_LEFT * muscle["areas"][0]
+    n_moved, most = np.count_nonzero(ways[k]), (ways**2).sum(axis=0).max()
     soft = softest(springs, scheduled, int(c[at.DEGREE]))[0]
-    stiff = elasticity.deriv()(u) / scale + max(soft, 0.0) / (moved * most) + own["bladders"]
+    stiff = elasticity.deriv()(u) / scale + max(soft, 0.0) / (n_moved * most) + muscle["bladders"]
     lost = c[at.TOP] * area.deriv()(u) / scale
     loses = lost > 0.0
     least = float(np.min(stiff[loses] / lost[loses], initial=NEVER))
-    return max(left / rubbed, 1.0) if rubbed > 0.0 else NEVER, max(least, 1.0)
+    return max(area_left / rubbed, 1.0) if rubbed > 0.0 else NEVER, max(least, 1.0)
 
 
 def softest(springs: Array, ends: Array, degree: int) -> tuple[float, Array, Array]:
@@ -66,12 +66,12 @@ def softest(springs: Array, ends: Array, degree: int) -> tuple[float, Array, Arr
     Over all combinations of the ``ends`` and middles of what schedules, which are returned with the
     direction.
     """
-    found = []
+    result = []
     for x in corners(ends):
         matrix = springs_at(springs, x, degree)[:, 1:]
         stiffnesses, directions = np.linalg.eigh(0.5 * (matrix + matrix.T))
-        found.append((float(stiffnesses[0]), x, directions[:, 0]))
-    return min(found, key=lambda candidate: candidate[0])
+        result.append((float(stiffnesses[0]), x, directions[:, 0]))
+    return min(result, key=lambda candidate: candidate[0])
 
 
 def springs_at(springs: Array, x: Array, degree: int) -> Array:

@@ -45,10 +45,10 @@ def coupled_memory_step(coefficients: Array, state: Array, inputs: Array, output
     width = readout.size // n_out
     for lag in range(n_lags):
         for i in range(n):
-            place = lag * n + i
-            state[place] += (1.0 - decays[lag]) * (inputs[i] - origin[i] - state[place])
-            x = state[place]
-            plays = state[n_lags * n + place * m :]
+            position = lag * n + i
+            state[position] += (1.0 - decays[lag]) * (inputs[i] - origin[i] - state[position])
+            x = state[position]
+            plays = state[n_lags * n + position * m :]
             for k in range(m):
                 r = radii[i * m + k]
                 plays[k] = min(max(plays[k], x - r), x + r)

@@ -326,8 +326,8 @@ class FuzzyNetwork(Invertible):
 
     def equations(self) -> tuple[str, ...]:
         """Return the equations, with the constants of consequents if there are any."""
-        first, *others = self.formulas
-        return (first if self.constants else first.replace(" + c_{rk}", ""), *others)
+        first, *rest = self.formulas
+        return (first if self.constants else first.replace(" + c_{rk}", ""), *rest)
 
     def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
         """Return the symbol of a number: consequents have rule, output, and input."""
@@ -348,12 +348,12 @@ class FuzzyNetwork(Invertible):
                 f"widths of {[len(row) for row in self.widths]} sets",
                 remedy="give each input as many of both",
             )
-        wanted = int(np.prod(sets)) * len(self.given) * (len(sets) + self.constants)
-        if len(self.consequents) != wanted:
+        n_consequents = int(np.prod(sets)) * len(self.given) * (len(sets) + self.constants)
+        if len(self.consequents) != n_consequents:
             raise ModelError(
-                f"{self.kind!r} of this structure has {wanted} consequents, got "
+                f"{self.kind!r} of this structure has {n_consequents} consequents, got "
                 f"{len(self.consequents)}",
-                remedy=f"give {wanted}",
+                remedy=f"give {n_consequents}",
             )
         if self.limits is not None and (
             len(self.limits) != len(self.driven)
@@ -405,8 +405,8 @@ class FuzzyNetwork(Invertible):
         if field != "consequents":
             return super().unit_of(field, index)
         per = [*(channel.unit for channel in self.inputs), *[""] * self.constants]
-        rule, place = divmod(index[-1], len(per))
-        return f"{self.outputs[rule % len(self.outputs)].unit or '1'}/{per[place] or '1'}"
+        rule, k = divmod(index[-1], len(per))
+        return f"{self.outputs[rule % len(self.outputs)].unit or '1'}/{per[k] or '1'}"
 
     @classmethod
     def example(cls) -> Self:

@@ -181,16 +181,16 @@ class RecurrentFuzzyNetwork(Block):
 
     def equations(self) -> tuple[str, ...]:
         """Return the equations, with the constants of consequents if there are any."""
-        first, *others = self.formulas
-        return (first if self.constants else first.replace(" + c_r", ""), *others)
+        first, *rest = self.formulas
+        return (first if self.constants else first.replace(" + c_r", ""), *rest)
 
     def symbol_of(self, field: str, index: tuple[int, ...]) -> str:
         """Return the symbol of a number: consequents have rule and input."""
         if field != "consequents":
             return super().symbol_of(field, index)
-        rule, place = divmod(index[0], self.n_regressors + self.constants)
-        constant = place == self.n_regressors
-        return f"c_{{{rule + 1}}}" if constant else f"P_{{{rule + 1},{place + 1}}}"
+        rule, k = divmod(index[0], self.n_regressors + self.constants)
+        constant = k == self.n_regressors
+        return f"c_{{{rule + 1}}}" if constant else f"P_{{{rule + 1},{k + 1}}}"
 
     def __post_init__(self) -> None:
         self.check_channels()
@@ -207,12 +207,12 @@ class RecurrentFuzzyNetwork(Block):
                 "inputs, as many sets for each",
                 remedy="give them",
             )
-        wanted = self.n_sets**self.n_regressors * (self.n_regressors + self.constants)
-        if len(self.consequents) != wanted:
+        n_consequents = self.n_sets**self.n_regressors * (self.n_regressors + self.constants)
+        if len(self.consequents) != n_consequents:
             raise ModelError(
-                f"{self.kind!r} of this structure has {wanted} consequents, got "
+                f"{self.kind!r} of this structure has {n_consequents} consequents, got "
                 f"{len(self.consequents)}",
-                remedy=f"give {wanted}",
+                remedy=f"give {n_consequents}",
             )
 
     @property

@@ -257,8 +257,8 @@ class Air(fields.WithMemory, Invertible):
         ends = sorted([self.goal(low, -1), self.goal(high, 1)])
         lowest, highest = np.array(ends)
         lags = self.filling_time > 0 or self.venting_time > 0
-        left = APPROACHED * (highest - lowest) if lags and np.isfinite(ends).all() else 0.0
-        return np.array([lowest + left]), np.array([highest - left])
+        margin = APPROACHED * (highest - lowest) if lags and np.isfinite(ends).all() else 0.0
+        return np.array([lowest + margin]), np.array([highest - margin])
 
     def inverse_complaint(self, state: Array) -> str:
         low, high = self.reachable()

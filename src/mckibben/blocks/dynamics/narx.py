@@ -287,10 +287,10 @@ class NarxPolynomial(Narx):
         """Return the products themselves, and the derivative of their sum by past outputs."""
         by_past = np.zeros((len(regressors), self.output_lags))
         for term, weight in zip(self.terms, self.weights, strict=True):
-            for place, factor in enumerate(term):
+            for k, factor in enumerate(term):
                 if factor < self.output_lags:
-                    others = term[:place] + term[place + 1 :]
-                    by_past[:, factor] += weight * products(regressors, (others,))[:, 0]
+                    other_factors = term[:k] + term[k + 1 :]
+                    by_past[:, factor] += weight * products(regressors, (other_factors,))[:, 0]
         return products(regressors, self.terms), by_past
 
     @classmethod
@@ -309,11 +309,11 @@ class NarxPolynomial(Narx):
 
 def products(regressors: Array, terms: Terms) -> Array:
     """Return the terms at regressors of shape (k, number of regressors), shape (k, number of terms)."""
-    found = np.ones((len(regressors), len(terms)))
+    columns = np.ones((len(regressors), len(terms)))
     for column, term in enumerate(terms):
         for factor in term:
-            found[:, column] *= regressors[:, factor]
-    return found
+            columns[:, column] *= regressors[:, factor]
+    return columns
 
 
 @dataclass(frozen=True, kw_only=True, config=fields.STRICT)
@@ -366,10 +366,10 @@ class NarxNetwork(Narx):
         if field != "hidden":
             return super().symbol_of(field, index)
         n = len(self.linear)
-        unit, place = divmod(index[0], n + 2)
-        if place < n:
-            return f"w_{{{unit + 1},{place + 1}}}"
-        return f"{'so'[place - n]}_{{{unit + 1}}}"
+        unit, k = divmod(index[0], n + 2)
+        if k < n:
+            return f"w_{{{unit + 1},{k + 1}}}"
+        return f"{'so'[k - n]}_{{{unit + 1}}}"
 
     def slopes(self, regressors: Array) -> tuple[Array, Array]:
         """Return the derivatives by bias, linear and hidden weights, and past outputs, for tanh."""

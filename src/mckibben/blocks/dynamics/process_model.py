@@ -149,10 +149,10 @@ class ProcessModel(fields.WithMemory, Block):
         if self.damping is not None:
             (t,) = self.time_constants
             return np.array([t**2, 2 * self.damping * t, 1.0])
-        found = np.array([1.0])
+        polynomial = np.array([1.0])
         for t in self.time_constants:
-            found = np.polymul(found, [t, 1.0])
-        return found
+            polynomial = np.polymul(polynomial, [t, 1.0])
+        return polynomial
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return the coefficients of the kernel; raise an error for delays above 254 samples."""
@@ -229,7 +229,7 @@ def held(a: Array, b: Array, step: float) -> tuple[Array, Array, Array]:
     from scipy.linalg import expm
 
     n = b.size
-    whole = np.zeros((n + 2, n + 2))
-    whole[:n, :n], whole[:n, n], whole[n, n + 1] = a * step, b * step, 1.0
-    found = expm(whole)
-    return found[:n, :n], found[:n, n] - found[:n, n + 1], found[:n, n + 1]
+    matrix = np.zeros((n + 2, n + 2))
+    matrix[:n, :n], matrix[:n, n], matrix[n, n + 1] = a * step, b * step, 1.0
+    exponential = expm(matrix)
+    return exponential[:n, :n], exponential[:n, n] - exponential[:n, n + 1], exponential[:n, n + 1]

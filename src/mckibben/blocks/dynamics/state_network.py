@@ -36,7 +36,7 @@ SUBSTEP, N_SUBSTEPS, HOLDS, N_STATES, N_OUTPUTS, UNITS = range(HEAD)
 `SUBSTEP` is in units of 1 / rate, and `HOLDS` 1 for zero-order hold.
 """
 
-SETTLING, SETTLING_STEP, LENGTHENED, LONGEST = 64, 0.1, 1.5, 1e9
+SETTLING, SETTLING_STEP, LENGTHENED, LONGEST_STEP = 64, 0.1, 1.5, 1e9
 """Number of implicit steps in which an initial equilibrium is reached, the length of the first in units
 of 1 / rate, the factor from one to the next, and the longest, which is a step of Newton's method.
 """
@@ -182,7 +182,7 @@ def state_network_start(
             eliminate(matrix, change)
             for i in range(n):
                 v[i] += change[i]
-            length = min(LENGTHENED * length, LONGEST)
+            length = min(LENGTHENED * length, LONGEST_STEP)
         for i in range(n):
             state[i] = v[i]
 
@@ -216,18 +216,18 @@ def steady_state(block: StateNetwork, recording: Recording) -> Recording:
     ModelError
         Where no response comes to repeat itself.
     """
-    given = block._inputs_from(recording)
+    inputs = block._inputs_from(recording)
     step, ratio = needs_sample_time(block.kind, recording.sample_time), BETWEEN * block.substeps
-    fine = np.column_stack([np.roll(band_limited(column, ratio), -1) for column in given.T])
+    fine = np.column_stack([np.roll(band_limited(column, ratio), -1) for column in inputs.T])
     finer = replace(block, substeps=1, hold="first")
-    state = block.initial_state(given[0], "virgin", step)
-    found = np.empty((len(fine), len(block.outputs)))
-    run = finer.bind(step / ratio, state, np.ascontiguousarray(fine), found)
-    state[block.order :] = given[0]
-    before = np.full((len(given), found.shape[1]), np.inf)
+    state = block.initial_state(inputs[0], "virgin", step)
+    outputs = np.empty((len(fine), len(block.outputs)))
+    run = finer.bind(step / ratio, state, np.ascontiguousarray(fine), outputs)
+    state[block.order :] = inputs[0]
+    before = np.full((len(inputs), outputs.shape[1]), np.inf)
     for _ in range(PERIODS):
         run()
-        now = np.roll(found[ratio - 1 :: ratio], 1, axis=0)
+        now = np.roll(outputs[ratio - 1 :: ratio], 1, axis=0)
         change, span = np.abs(now - before).max(axis=0), np.ptp(now, axis=0)
         if not np.isfinite(now).all() or (change <= REPEATS * span).all():
             break

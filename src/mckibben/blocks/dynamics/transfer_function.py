@@ -136,8 +136,8 @@ class TransferFunction(fields.WithMemory, Block):
     @property
     def gain(self) -> float:
         """Output per input at rest; infinite for an integrator."""
-        whole = 1.0 + float(np.sum(self.denominator))
-        return float(np.sum(self.numerator)) / whole if whole != 0 else float("inf")
+        sum_ = 1.0 + float(np.sum(self.denominator))
+        return float(np.sum(self.numerator)) / sum_ if sum_ != 0 else float("inf")
 
     def _padded(self) -> tuple[Array, Array]:
         n = self.n_states

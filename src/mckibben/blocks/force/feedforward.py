@@ -159,10 +159,10 @@ class ForceFeedforward(Block):
 
     def coefficients(self, sample_time: float | None) -> Array:
         law = self.law.coefficients(sample_time)
-        own = np.array([law.size, *law])
+        numbers = np.array([law.size, *law])
         if self.friction is None:
-            return own
-        return np.append(own, self.friction.coefficients(sample_time))
+            return numbers
+        return np.append(numbers, self.friction.coefficients(sample_time))
 
 
 def compensator(model: Block) -> Block:
@@ -179,9 +179,9 @@ def compensator(model: Block) -> Block:
 
 
 def _limited(model: Block) -> Block:
-    inverse, known = model.inverse(), model.known_inputs[: model.n_driven]
-    if len(known) > 1 or np.isfinite(inverse.reachable()).all() or not np.isfinite(known).all():
+    inverse, ranges = model.inverse(), model.known_inputs[: model.n_driven]
+    if len(ranges) > 1 or np.isfinite(inverse.reachable()).all() or not np.isfinite(ranges).all():
         return inverse
-    (channel,), (ends,) = inverse.outputs, known
+    (channel,), (ends,) = inverse.outputs, ranges
     identity = Polynomial((0.0, 1.0), input_range=tuple(ends), input=channel, output=channel)
     return Series((inverse, identity.inverse()))

@@ -70,8 +70,8 @@ class ForceLaw(ForceByLength, Block):
         """
         self.check_linear()
         numbers, terms = self.coefficients(None), type(self).terms_kernel
-        found = np.array([terms(each, numbers) for each in np.ravel(length).tolist()])
-        per_bar, rest = found.reshape(-1, 2).T
+        table = np.array([terms(each, numbers) for each in np.ravel(length).tolist()])
+        per_bar, rest = table.reshape(-1, 2).T
         return per_bar.reshape(np.shape(length)), rest.reshape(np.shape(length))
 
     def check_linear(self) -> None:

@@ -203,12 +203,12 @@ class MultistateFriction(ForceByLength, Block):
     initial: fields.StoredInitial = Field(default="first_sample", kw_only=True)
 
     def __post_init__(self) -> None:
-        wanted = sum(SIZES[element] for element in self.elements)
-        if not self.elements or len(self.values) != wanted:
+        n_values = sum(SIZES[element] for element in self.elements)
+        if not self.elements or len(self.values) != n_values:
             raise ModelError(
                 f"{self.kind!r} with the elements {', '.join(self.elements) or 'none'} "
                 f"has {len(self.values)} values",
-                remedy=f"give {wanted} positive ones",
+                remedy=f"give {n_values} positive ones",
             )
 
     @property
@@ -264,10 +264,10 @@ class MultistateFriction(ForceByLength, Block):
         The order of such elements has no effect; so two fits can be compared value by value.
         """
         ends = np.cumsum([SIZES[element] for element in self.elements]).tolist()
-        own = [[*range(end - SIZES[e], end)] for e, end in zip(self.elements, ends, strict=True)]
-        ranked = sorted(range(len(own)), key=lambda place: -self.values[own[place][-1]])
-        given = {kind: iter([p for p in ranked if self.elements[p] == kind]) for kind in SIZES}
-        order = [value for kind in self.elements for value in own[next(given[kind])]]
+        groups = [[*range(end - SIZES[e], end)] for e, end in zip(self.elements, ends, strict=True)]
+        ranked = sorted(range(len(groups)), key=lambda place: -self.values[groups[place][-1]])
+        by_kind = {kind: iter([p for p in ranked if self.elements[p] == kind]) for kind in SIZES}
+        order = [value for kind in self.elements for value in groups[next(by_kind[kind])]]
         return replace(self, values=tuple(self.values[place] for place in order)), order
 
     def coefficients(self, sample_time: float | None) -> Array:

@@ -294,10 +294,10 @@ class Preisach(Triangle, Invertible):
         n = len(self.levels) - 1
         cells = np.zeros((n, n))
         cells[np.tril_indices(n)] = self.weights
-        found = np.zeros((n + 1, n + 1))
+        values = np.zeros((n + 1, n + 1))
         # all cells with rising thresholds up to level i and falling ones from level j on
-        found[1:, :n] = np.cumsum(np.cumsum(cells[:, ::-1], axis=1)[:, ::-1], axis=0)
-        return np.tril(found, -1)
+        values[1:, :n] = np.cumsum(np.cumsum(cells[:, ::-1], axis=1)[:, ::-1], axis=0)
+        return np.tril(values, -1)
 
     def initial_state(
         self, first: Array, initial: fields.Initial | None = None, sample_time: float | None = None

@@ -614,9 +614,7 @@ class Estimator(ABC):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ModelWarning)
             by_output, from_rest = runs.errors, runs.from_rest.errors
-        notes = dict.fromkeys(
-            [*tracker.notes, *sorted({str(warning.message) for warning in caught})]
-        )
+        notes = dict.fromkeys([*tracker.notes, *sorted({str(w.message) for w in caught})])
         return Diagnostics(
             rmse=float(np.mean(by_output)),
             rmse_by_output=by_output,

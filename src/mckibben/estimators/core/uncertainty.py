@@ -25,7 +25,7 @@ from mckibben.numerics.statistics import Autoregression, autoregression
 LARGEST = 1e150
 """Largest sensitivity; its square is finite."""
 
-LEAST, DETERMINED = 1e-6, 0.99
+SMALLEST_SINGULAR, DETERMINED = 1e-6, 0.99
 """Smallest singular value of the sensitivities, relative to the largest, that is used; share of a
 parameter's direction that must be determined.
 """
@@ -109,9 +109,7 @@ def sandwich(
     n_outputs, k = moves[0].shape[1:]
     scale = np.array([np.sqrt(model.variance) or 1.0 for model in models])
     weighed = [slopes / scale[:, np.newaxis] for slopes in moves]
-    condition, inverse, determined = pseudo_inverse(
-        np.concatenate([w.reshape(-1, k) for w in weighed])
-    )
+    condition, inv, determined = pseudo_inverse(np.concatenate([w.reshape(-1, k) for w in weighed]))
     innovations = [
         np.concatenate([m.whitened(np.nan_to_num(e[:, j])) for e in residuals])
         for j, m in enumerate(models)
@@ -124,8 +122,8 @@ def sandwich(
             for j in range(n_outputs):
                 middle += together[i, j] * (coloured[i].T @ coloured[j])
     # what the fit has taken out of the residuals, of all that was in them
-    effect = float(np.sum(inverse * middle)) / sum(int(np.isfinite(e).sum()) for e in residuals)
-    return condition, inverse @ middle @ inverse / max(1.0 - effect, 0.1), determined
+    effect = float(np.sum(inv * middle)) / sum(int(np.isfinite(e).sum()) for e in residuals)
+    return condition, inv @ middle @ inv / max(1.0 - effect, 0.1), determined
 
 
 def _pieces(series: Array) -> list[Array]:
@@ -142,7 +140,7 @@ def pseudo_inverse(slopes: Array) -> tuple[float, Array, NDArray[np.bool_]]:
     """Return condition, pseudo-inverse of the products, and which parameters are determined."""
     singular, right = np.linalg.svd(np.linalg.qr(slopes, mode="r"), full_matrices=False)[1:]
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
-    is_kept = singular > LEAST * singular[0]
+    is_kept = singular > SMALLEST_SINGULAR * singular[0]
     inverse = (right[is_kept].T / singular[is_kept] ** 2) @ right[is_kept]
     return condition, inverse, 1 - (right[~is_kept] ** 2).sum(axis=0) > DETERMINED
 

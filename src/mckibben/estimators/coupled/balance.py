@@ -67,7 +67,7 @@ PRESSURES = ("bar", "V", "")
 LIMITED = ("bar", "V")
 """Units of channels with hardware limits."""
 
-FEW, MOST, MOST_SAMPLES = 4_000, 12_000, 60_000
+SELECTION_ERRORS, FINAL_ERRORS, MOST_SAMPLES = 4_000, 12_000, 60_000
 """Number of errors used to select terms, and for the final fit; number of samples simulated there.
 """
 
@@ -86,7 +86,7 @@ STEPS_BETWEEN, LAST_STEPS = 12, 8
 LIKE_FRICTION = tuple(kind.name for kind in TABLE.values() if kind.like_friction)
 """Kinds of terms that may take the place of friction."""
 
-DRY, FINEST, LONGEST = 0.0003, 0.003, 0.5
+DRY_DISTANCE, SHORTEST_YIELD, LONGEST_YIELD = 0.0003, 0.003, 0.5
 """Break-away distances of stops, by the stroke: of dry friction, and the shortest and longest of
 those that yield before they slide.
 """
@@ -217,37 +217,37 @@ class BalanceEstimator(CoupledEstimator):
         scheduling: Names = None,
     ) -> Channels:
         """Return the channels to fit: of motion, also where that is held and a force varies."""
-        moved = by_name(recordings)[1] if outputs is None else outputs
-        return super().resolved(recordings, inputs, moved or None, scheduling)
+        outputs_found = by_name(recordings)[1] if outputs is None else outputs
+        return super().resolved(recordings, inputs, outputs_found or None, scheduling)
 
     @classmethod
     def objection(cls, recordings: Sequence[Recording], channels: Channels) -> str | None:
-        known = super().objection(recordings, channels)
-        for name in channels.inputs if known is None else ():
-            unit = next((one.units[name] for one in recordings if name in one), "")
+        inherited = super().objection(recordings, channels)
+        for name in channels.inputs if inherited is None else ():
+            unit = next((run.units[name] for run in recordings if name in run), "")
             if unit not in PRESSURES:
                 return (
                     f"{name} is in {unit}, which is no pressure of a muscle, nor a valve's voltage"
                 )
-        return known
+        return inherited
 
     def completed(
         self, recordings: Sequence[Recording], rows: Sequence[Mask] | None, names: Sequence[str]
     ) -> list[Recording]:
         """Return recordings with the loads that others have, unless all are to have one."""
-        every = listed(recordings)
-        return every if self.unknown_load is False else with_loads(every, names, rows)
+        runs = listed(recordings)
+        return runs if self.unknown_load is False else with_loads(runs, names, rows)
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
         """Return the training data; recordings may lack a load that others have."""
-        every = listed(recordings)
-        names = self.taken(self.resolved(every, self.input, self.output, self.scheduling))
-        data = super().data(self.completed(every, rows, names), rows)
+        runs = listed(recordings)
+        names = self.taken(self.resolved(runs, self.input, self.output, self.scheduling))
+        data = super().data(self.completed(runs, rows, names), rows)
 
         def unmeasured(run: Run) -> tuple[str, ...]:
-            return tuple(name for name in names if name not in every[run.index])
+            return tuple(name for name in names if name not in runs[run.index])
 
         return data.changed(lambda run: replace(run, unmeasured=unmeasured(run)))
 
@@ -305,15 +305,15 @@ class BalanceEstimator(CoupledEstimator):
         data = scheduled_by(in_one_order(without_held(data)[0]), [*bench.scheduled, *bench.loaded])
         return self._model(self._search, of_coordinates(data, bench.sensors), tracker)
 
-    def _fit(self, *given: Any) -> TrainingData:
-        data = super()._fit(*given)
+    def _fit(self, *arguments: Any) -> TrainingData:
+        data = super()._fit(*arguments)
         del self._search  # needed for `find_again` only
         return data
 
     def _model(self, search: Search, data: TrainingData, tracker: Tracker) -> Block:
         """Return the model after a last descent on all samples."""
         of_force = search.structure.bench.of_force
-        problem = problem_of(data, MOST_SAMPLES, MOST, of_force=of_force)
+        problem = problem_of(data, MOST_SAMPLES, FINAL_ERRORS, of_force=of_force)
         search = replace(search, problem=problem)
         for _ in range(1 if search.prior is None else REFINED):
             search = search.weighed()
@@ -321,8 +321,8 @@ class BalanceEstimator(CoupledEstimator):
         self._search, structure = search, search.structure
         balance = in_newtons(structure.block(search.values, final=True))
         self.loads_ = np.zeros((data.n_recordings, structure.m))
-        own = search.z[len(structure.terms) :].reshape(-1, structure.m)
-        self.loads_[list(structure.bench.unmeasured)] = own * balance.areas[0][0]
+        loads = search.z[len(structure.terms) :].reshape(-1, structure.m)
+        self.loads_[list(structure.bench.unmeasured)] = loads * balance.areas[0][0]
         fronts = [front(structure, search.values, channel) for channel in data.inputs]
         balance, before = self._limited(balance, fronts, data)
         sensors, behind = structure.bench.sensors, list[Block]()
@@ -337,10 +337,10 @@ class BalanceEstimator(CoupledEstimator):
         """Return a balance within the recorded ranges, and the blocks before it."""
         static = [block for block in fronts[0] if not block.rate_dependent]
 
-        def acting_in_muscles(given: Array) -> Array:
+        def acting_in_muscles(pressures_: Array) -> Array:
             for block in static:
-                given = block.simulate(given)
-            return given
+                pressures_ = block.simulate(pressures_)
+            return pressures_
 
         given_range = None
         if data.inputs[0].unit in LIMITED:
@@ -349,7 +349,7 @@ class BalanceEstimator(CoupledEstimator):
             balance = replace(balance, pressure_range=(low, high))
         n, m = balance.moves.shape
         if n > m and self.drive == "recorded":
-            pressures = [acting_in_muscles(given) for given in data.stacked("driven").T]
+            pressures = [acting_in_muscles(pressures_) for pressures_ in data.stacked("driven").T]
             drive = recorded_drive(np.column_stack(pressures))
             if m < drive.shape[1] <= n:  # not any, and enough to balance along
                 balance = replace(balance, drive=rows(drive))
@@ -367,9 +367,9 @@ class BalanceEstimator(CoupledEstimator):
 
     def widest(self, bench: Bench, *, timed: bool) -> Structure:
         """Return the structure with all candidate terms."""
-        longest = LONGEST if self.prior is None else TRAVELS[-1]
-        yielding = np.geomspace(FINEST, longest, self.n_stops)
-        travels = bench.stroke * (np.append(DRY, yielding) if self.n_stops else yielding)
+        longest = LONGEST_YIELD if self.prior is None else TRAVELS[-1]
+        yielding = np.geomspace(SHORTEST_YIELD, longest, self.n_stops)
+        travels = bench.stroke * (np.append(DRY_DISTANCE, yielding) if self.n_stops else yielding)
         shortest, longest = bench.lag_range
         lags = np.geomspace(shortest, longest, self.n_lags + 1)[1:] if bench.step and timed else ()
         if self.lags is not None:
@@ -383,7 +383,7 @@ class BalanceEstimator(CoupledEstimator):
                     f"{shortest:.3g} to {longest:.3g} s",
                 )
         places = TABLE["places"].begins
-        sides = [(1, place) for place in places] + [(-1, 1.0 - place) for place in places]
+        sides = [(1, edge) for edge in places] + [(-1, 1.0 - edge) for edge in places]
         return Structure(
             bench,
             n_elastic=self.elasticity - 1,
@@ -400,27 +400,27 @@ class BalanceEstimator(CoupledEstimator):
 
     def _always(self, structure: Structure, term: Term) -> bool:
         """Return whether a balance has a term whatever may be added."""
-        kind, which, muscle = term
+        kind, number, muscle = term
         if muscle is not None:
             return False
         if kind == "springs":
-            return which == 0 or (which - 1) % structure.degree == 0
+            return number == 0 or (number - 1) % structure.degree == 0
         if kind in ("relaxation", "lags"):
             count = len(structure.lags)
-            return count < 3 or self.lags is not None or which in (count // 3, 2 * count // 3)
+            return count < 3 or self.lags is not None or number in (count // 3, 2 * count // 3)
         if kind in ("elasticity", "areas"):
-            return which < 2
+            return number < 2
         return not TABLE[kind].option
 
     def _possible(self, structure: Structure, kind: Kind) -> bool:
         """Return whether what a kind of term acts on is there."""
-        there = {
+        possible = {
             "time": structure.bench.step > 0.0,
             "stops": bool(structure.limits),
             "hold": structure.n > 1 or structure.bench.some_held,
         }
         grows = kind.name in ("friction_growth", "friction_slopes")
-        return there.get(kind.needs, True) and not (grows and self.friction == "constant")
+        return possible.get(kind.needs, True) and not (grows and self.friction == "constant")
 
     def _first(self, structure: Structure) -> Mask:
         """Return which terms are free from the start: all that act smoothly."""
@@ -444,12 +444,15 @@ class BalanceEstimator(CoupledEstimator):
     ) -> Search:
         """Return the search with the selected terms."""
         of_force, first = structure.bench.of_force, self._first(structure)
-        few = problem_of(data, FEW, FEW, of_force=of_force)
-        begun = np.append(structure.none, np.zeros(few.size(structure) - first.size))
-        search = self._linear_start(Search(few, structure, first, begun, prior_errors), tracker)
+        few = problem_of(data, SELECTION_ERRORS, SELECTION_ERRORS, of_force=of_force)
+        start = np.append(structure.none, np.zeros(few.size(structure) - first.size))
+        search = self._linear_start(Search(few, structure, first, start, prior_errors), tracker)
         if prior_errors is not None:
             starts = (search, self._from_prior(search, prior_errors.prior.sheet))
-            search = min((one.descend(TOWARDS) for one in starts), key=lambda one: one.cost)
+            search = min(
+                (candidate.descend(TOWARDS) for candidate in starts),
+                key=lambda candidate: candidate.cost,
+            )
         steps = min(self.steps, STEPS_BETWEEN)
         may = {
             name
@@ -460,8 +463,8 @@ class BalanceEstimator(CoupledEstimator):
         if not search.problem.all_at_rest:
             search = self._settled_if_better(search)
         search = search.weighed().descend(steps, tracker.part(0.1, 0.2)).weighed()
-        tried = {TABLE[name].option for name in may if TABLE[name].phenomenon}
-        search = choose(search, tried, tracker.part(0.2, 0.4))
+        options_tried = {TABLE[name].option for name in may if TABLE[name].phenomenon}
+        search = choose(search, options_tried, tracker.part(0.2, 0.4))
         if structure.n == 1 and self.unknown_load is None:
             search = self._with_own_loads(search, data)
         late = np.isin(structure.kinds, LIKE_FRICTION) & first
@@ -472,9 +475,11 @@ class BalanceEstimator(CoupledEstimator):
             if self._always(structure, term)
         }
         search = prune(search.descend(steps, tracker.part(0.4, 0.5))).narrowed()
-        there = [key for key in compress(search.structure.keys, search.active) if key not in always]
+        terms_in = [
+            key for key in compress(search.structure.keys, search.active) if key not in always
+        ]
         names = (
-            "muscles" if muscle is not None else TABLE[kind].option for kind, _, muscle in there
+            "muscles" if muscle is not None else TABLE[kind].option for kind, _, muscle in terms_in
         )
         self.terms_ = tuple(dict.fromkeys(names))
         return search.descend(self.steps, tracker.part(0.5, 0.7))
@@ -485,18 +490,18 @@ class BalanceEstimator(CoupledEstimator):
         It may take the place of friction where that is not yet known.
         """
         steps, terms = min(self.steps, STEPS_BETWEEN), search.structure.kinds
-        begun = replace(search, active=search.active & ~np.isin(terms, LIKE_FRICTION))
-        search = begun.descend(steps, tracker)
+        start = replace(search, active=search.active & ~np.isin(terms, LIKE_FRICTION))
+        search = start.descend(steps, tracker)
         for kind in [kind for kind in LIKE_FRICTION if kind in may]:
-            more = replace(begun, active=search.active | (terms == kind)).descend(steps, tracker)
+            more = replace(start, active=search.active | (terms == kind)).descend(steps, tracker)
             search = more if is_demanded(search, more) else search
         return search
 
     def _settled_if_better(self, search: Search) -> Search:
         """Return the search with settled starts, if that explains the runs better."""
         settled = replace(search, structure=replace(search.structure, settled=True))
-        both = (one.descend(STEPS_BETWEEN) for one in (search, settled))
-        return min(both, key=lambda one: one.cost)
+        searches = (candidate.descend(STEPS_BETWEEN) for candidate in (search, settled))
+        return min(searches, key=lambda candidate: candidate.cost)
 
     def _linear_start(self, search: Search, tracker: Tracker) -> Search:
         """Return the best linear force balance at measured positions, over several starts.
@@ -515,30 +520,30 @@ class BalanceEstimator(CoupledEstimator):
             z = search.problem.balanced(structure, z, search.active)
             starts.append(replace(search, z=z))
             tracker.update(z, starts[-1].cost)
-        return min(starts, key=lambda one: one.cost)
+        return min(starts, key=lambda candidate: candidate.cost)
 
     def _from_prior(self, search: Search, sheet: Sheet) -> Search:
         """Return the search from the most probable model of its prior."""
         structure, z = search.structure, search.none.copy()
         growing = search.active[structure.positions("friction_growth")].all()
         z[: search.active.size] = structure.initial(FIRST_GROWTH if growing else 0.0)
-        for place, term in enumerate(structure.terms):
+        for k, term in enumerate(structure.terms):
             if term.kind == "loads":
-                z[place] = 1.0 / sheet.area
+                z[k] = 1.0 / sheet.area
             elif term[:2] == ("areas", 0):
-                z[place] = sheet.area
+                z[k] = sheet.area
         none = replace(search.problem, data=replace(search.problem.data, runs=()))
         return replace(search, z=replace(search, problem=none, z=z).descend(TOWARDS).z)
 
     def _with_own_loads(self, search: Search, data: TrainingData) -> Search:
         """Return the search with constant loads per recording, if data demand them."""
-        bench, every = search.structure.bench, unmeasured_in(data, every=True)
-        if bench.loaded or bench.unmeasured or bench.tare or not every:
+        bench, all_unmeasured = search.structure.bench, unmeasured_in(data, every=True)
+        if bench.loaded or bench.unmeasured or bench.tare or not all_unmeasured:
             return search
-        structure = replace(search.structure, bench=replace(bench, unmeasured=every))
-        z = np.append(search.z, np.zeros(len(every) * structure.m))
-        own = replace(search, structure=structure, z=z).descend(STEPS_BETWEEN)
-        return own if is_demanded(search, own) else search
+        structure = replace(search.structure, bench=replace(bench, unmeasured=all_unmeasured))
+        z = np.append(search.z, np.zeros(len(all_unmeasured) * structure.m))
+        with_loads_ = replace(search, structure=structure, z=z).descend(STEPS_BETWEEN)
+        return with_loads_ if is_demanded(search, with_loads_) else search
 
     def fixed(self, block: Block) -> tuple[int, ...]:
         return fixed_in(block)
@@ -565,8 +570,8 @@ class BalanceEstimator(CoupledEstimator):
 def fixed_in(block: Block) -> tuple[int, ...]:
     """Return the indices of parameters that are not found, or set a side or the unit of force."""
     return tuple(
-        place
-        for place, (part, field, index) in enumerate(block.numbers())
+        k
+        for k, (part, field, index) in enumerate(block.numbers())
         if (part.is_convention(field, index) if isinstance(part, Balance) else field in FIXED)
     )
 

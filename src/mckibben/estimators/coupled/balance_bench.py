@@ -58,24 +58,24 @@ def with_loads(
     What one lacks is what it is in others on average, over their samples that count.
     """
     filled = list(recordings)
-    counting = [~one.bridged for one in recordings]
+    counting = [~run.bridged for run in recordings]
     if rows is not None:
         counting = [mask & own for mask, own in zip(rows, counting, strict=True)]
     for name in scheduling:
-        units = {one.units[name] for one in recordings if name in one}
+        units = {run.units[name] for run in recordings if name in run}
         if not units or not units <= {*LOAD_UNITS}:
             continue
         pairs = zip(recordings, counting, strict=True)
-        known = np.concatenate([one[name][own] for one, own in pairs if name in one])
+        loads = np.concatenate([run[name][own] for run, own in pairs if name in run])
         mean, unit = (
-            float(known.mean()) if known.size else 0.0,
+            float(loads.mean()) if loads.size else 0.0,
             min(units),
         )  # of none it is left out
         filled = [
-            one
-            if name in one
-            else one.with_channels({name: unit}, **{name: np.full(len(one), mean)})
-            for one in filled
+            run
+            if name in run
+            else run.with_channels({name: unit}, **{name: np.full(len(run), mean)})
+            for run in filled
         ]
     return filled
 
@@ -107,9 +107,9 @@ def only_forces(data: TrainingData) -> bool:
 
 def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
     """Return data without constant loads and scheduling inputs, loads last; and those left out."""
-    kept, constant = list[Channel](), list[Channel]()
-    for place, channel in enumerate(data.scheduled):
-        columns = [run.scheduled[:, place] for run in data.runs]
+    moving, constant = list[Channel](), list[Channel]()
+    for k, channel in enumerate(data.scheduled):
+        columns = [run.scheduled[:, k] for run in data.runs]
         means = np.concatenate(
             [
                 np.add.reduceat(v, starts := np.arange(0, v.size, BLOCK))
@@ -117,11 +117,11 @@ def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
                 for v in columns
             ]
         )
-        whole = np.concatenate(columns)
-        least = max(LEAST_VARIED * float(np.abs(whole).max()), NOISE * float(np.ptp(whole)))
-        (kept if np.ptp(means) > least else constant).append(channel)
-    kept.sort(key=lambda channel: channel.unit in LOAD_UNITS)
-    return scheduled_by(data, kept), [channel.name for channel in constant]
+        table = np.concatenate(columns)
+        least = max(LEAST_VARIED * float(np.abs(table).max()), NOISE * float(np.ptp(table)))
+        (moving if np.ptp(means) > least else constant).append(channel)
+    moving.sort(key=lambda channel: channel.unit in LOAD_UNITS)
+    return scheduled_by(data, moving), [channel.name for channel in constant]
 
 
 def scheduled_by(data: TrainingData, channels: Sequence[Channel]) -> TrainingData:
@@ -150,11 +150,11 @@ def check_numbers(data: TrainingData) -> None:
         )
     for run in data.runs:
         for channels, table in ((data.inputs, run.driven), (data.outputs, run.outputs)):
-            for place in np.flatnonzero(np.abs(table).max(axis=0) > LARGEST).tolist():
+            for k in np.flatnonzero(np.abs(table).max(axis=0) > LARGEST).tolist():
                 raise DataError(
-                    f"it reaches {np.abs(table[:, place]).max():.3g} {channels[place].unit}",
+                    f"it reaches {np.abs(table[:, k]).max():.3g} {channels[k].unit}",
                     file=run.name,
-                    channel=channels[place].name,
+                    channel=channels[k].name,
                     remedy="check its unit",
                 )
     if not data.highest.max() > 0:
@@ -185,11 +185,11 @@ def directions(data: TrainingData) -> Array:
     # along a direction in which pressures hardly went they share what they do
     found = np.linalg.lstsq(columns, outputs, rcond=LEAST_DRIVEN)[0][: driven.shape[1]]
     found /= span[:, np.newaxis]
-    moved = found * span[:, np.newaxis] / data.travel
-    n, m = moved.shape
-    if n == m and (np.abs(moved).argmax(axis=1) == np.arange(n)).all():
-        return np.diag(np.where(np.diag(moved) < 0, -1.0, 1.0))
-    sizes = np.sqrt((moved**2).sum(axis=1))
+    effects = found * span[:, np.newaxis] / data.travel
+    n, m = effects.shape
+    if n == m and (np.abs(effects).argmax(axis=1) == np.arange(n)).all():
+        return np.diag(np.where(np.diag(effects) < 0, -1.0, 1.0))
+    sizes = np.sqrt((effects**2).sum(axis=1))
     for k in np.flatnonzero(~(sizes > LEAST_MOVED * sizes.max())).tolist():
         raise DataError(
             "it has no effect",
@@ -223,8 +223,8 @@ def sensors_of(data: TrainingData, ways: Array) -> tuple[tuple[Affine, ...], Arr
 
     Muscles with a coordinate each shorten by that.
     """
-    own = bool((np.abs(ways) == np.eye(*ways.shape)).all())
-    gains = np.diag(ways).copy() if own else np.ones(ways.shape[1])
+    is_own = bool((np.abs(ways) == np.eye(*ways.shape)).all())
+    gains = np.diag(ways).copy() if is_own else np.ones(ways.shape[1])
     shortened = data.stacked("outputs") * gains
     offsets = []
     for column, gain, span in zip(shortened.T, gains, data.travel.tolist(), strict=True):
@@ -235,7 +235,7 @@ def sensors_of(data: TrainingData, ways: Array) -> tuple[tuple[Affine, ...], Arr
         Affine(float(gain), offset, channel, channel)
         for gain, offset, channel in zip(gains, offsets, data.outputs, strict=True)
     )
-    return sensors, np.eye(*ways.shape) if own else ways
+    return sensors, np.eye(*ways.shape) if is_own else ways
 
 
 def of_coordinates(data: TrainingData, sensors: Sequence[Affine]) -> TrainingData:
@@ -249,20 +249,20 @@ def one_speed(data: TrainingData) -> bool:
     if any(run.sample_time is None for run in data.runs):
         return True
     speeds = [(np.abs(np.diff(run.driven, axis=0)) / data.timed()).max(axis=1) for run in data.runs]
-    found = np.concatenate(speeds)
-    rests = found <= SLOW * float(np.quantile(found, 0.99))
+    speeds_found = np.concatenate(speeds)
+    rests = speeds_found <= SLOW * float(np.quantile(speeds_found, 0.99))
     if rests.mean() > SLOW:
         return False
-    slow, fast = np.quantile(found[~rests], [0.1, 0.9])
+    slow, fast = np.quantile(speeds_found[~rests], [0.1, 0.9])
     return bool(fast <= ONE_SPEED * slow)
 
 
 def unmeasured_in(data: TrainingData, *, every: bool) -> tuple[int, ...]:
     """Return the recordings without a load that others have; or all but the first with it."""
     lacking = {run.index for run in data.runs if run.unmeasured}
-    found = sorted({run.index for run in data.runs})
-    reference = next((one for one in found if one not in lacking), None)
-    return tuple(one for one in found if one in lacking or (every and one != reference))
+    indices = sorted({run.index for run in data.runs})
+    reference = next((index for index in indices if index not in lacking), None)
+    return tuple(index for index in indices if index in lacking or (every and index != reference))
 
 
 def set_up(

@@ -57,34 +57,34 @@ class Trial(NamedTuple):
         return self._replace(search=search, cost=search.cost)
 
 
-def choose(search: Search, tried: set[str], tracker: Tracker) -> Search:
+def choose(search: Search, options_tried: set[str], tracker: Tracker) -> Search:
     """Return the search with the phenomena that data demand.
 
     What came later may do what was there before it: that stays only if it is still demanded, and so does
     the air's lag, which takes a block of its own.
     """
-    found, hopeless = list[Trial](), set[str]()
+    trials, hopeless = list[Trial](), set[str]()
     while True:
         peeked, least = list[Trial](), np.sqrt(1.0 - PROMISING) * search.cost
-        for starts in _starts(search, tried):
+        for starts in _starts(search, options_tried):
             if starts and starts[0].name not in hopeless:
                 peeked.append(_best(search, starts))
                 # those that cost no descent are tried again once others are in
                 if starts[0].search.z is not search.z and not peeked[-1].cost < least:
                     hopeless.add(starts[0].name)
-        promising = sorted((one for one in peeked if one.cost < least), key=lambda one: one.cost)
+        promising = sorted((t for t in peeked if t.cost < least), key=lambda t: t.cost)
         if not promising:
             break
         search = search.descend(STEPS, tracker)
-        followed = [one.followed(STEPS) for one in promising[:MOST_FOLLOWED]]
-        best = min(followed, key=lambda one: one.cost)
+        followed = [t.followed(STEPS) for t in promising[:MOST_FOLLOWED]]
+        best = min(followed, key=lambda t: t.cost)
         if not is_demanded(search, best.search):
             break
         search = best.search.weighed()
-        found.append(best)
+        trials.append(best)
     kinds = search.structure.kinds
     doubtful = [(np.isin(kinds, ("filling", "venting")), 0.0), (kinds == "asymmetry", GAIN)]
-    doubtful += [(one.terms, GAIN) for one in found]
+    doubtful += [(t.terms, GAIN) for t in trials]
     for terms, gain in doubtful:
         if (terms & search.active).any():
             fewer = search.without(terms).descend(STEPS, tracker)
@@ -109,37 +109,37 @@ def _best(search: Search, starts: list[Trial]) -> Trial:
     Of those that begin where the search is, by a linear model; others are followed.
     """
     if starts[0].search.z is search.z:
-        costs = search.ahead([one.search.active for one in starts])
-        starts = [one._replace(cost=cost) for one, cost in zip(starts, costs, strict=True)]
+        costs = search.ahead([trial.search.active for trial in starts])
+        starts = [trial._replace(cost=cost) for trial, cost in zip(starts, costs, strict=True)]
     else:
-        starts = [one.followed(PEEK) for one in starts]
-    return min(starts, key=lambda one: one.cost)
+        starts = [trial.followed(PEEK) for trial in starts]
+    return min(starts, key=lambda trial: trial.cost)
 
 
-def _starts(search: Search, tried: set[str]) -> Iterator[list[Trial]]:
+def _starts(search: Search, options_tried: set[str]) -> Iterator[list[Trial]]:
     """Yield the starts of every phenomenon that may be there and is not."""
     structure, z = search.structure, search.z
     kinds = structure.kinds
     whiches = np.array([term.which for term in structure.terms])
     common = np.array([term.muscle is None for term in structure.terms])
-    there = {TABLE[kind].phenomenon for kind in kinds[search.active]}
+    present = {TABLE[kind].phenomenon for kind in kinds[search.active]}
 
     def trial(name: str, terms: Mask, begun: Array = z) -> Trial:
         return Trial(name, terms, replace(search, active=search.active | terms, z=begun))
 
     count = len(structure.obstacles)
-    own = whiches[search.active & (kinds == "obstacles")]
-    met = {structure.obstacles[which][0] for which in own}
-    for side in [side for side in (1, -1) if side not in met and "obstacle" in tried]:
+    numbers = whiches[search.active & (kinds == "obstacles")]
+    met = {structure.obstacles[number][0] for number in numbers}
+    for side in [side for side in (1, -1) if side not in met and "obstacle" in options_tried]:
         at_place = (
-            ((kinds == "obstacles") & (whiches == place))
-            | ((kinds == "places") & (whiches % count == place))
-            for place, (to, _) in enumerate(structure.obstacles)
+            ((kinds == "obstacles") & (whiches == k))
+            | ((kinds == "places") & (whiches % count == k))
+            for k, (to, _) in enumerate(structure.obstacles)
             if to == side
         )
         yield [trial(f"obstacle {side:+d}", terms) for terms in at_place]
     for name, forms in FORMS.items():
-        if there & {name, *(kind.excludes for kind in forms if kind.excludes)}:
+        if present & {name, *(kind.excludes for kind in forms if kind.excludes)}:
             continue
         starts = list[Trial]()
         for kind in forms:
@@ -147,7 +147,7 @@ def _starts(search: Search, tried: set[str]) -> Iterator[list[Trial]]:
             ends = (0.0, structure.bench.natural(kind.unit))
             if kind.name == "pushes":
                 ends = search.problem.resisted(structure, z)
-            for share in kind.begins if kind.option in tried else ():
+            for share in kind.begins if kind.option in options_tried else ():
                 begun = z
                 if share:
                     begun = z.copy()
@@ -168,27 +168,29 @@ def prune(search: Search) -> Search:
     gram = (triangle[:, :-1] / size).T @ (triangle[:, :-1] / size)
     far, keep = (search.z - search.none)[places] * size, np.ones(places.size, dtype=bool)
     while True:
-        here = np.flatnonzero(keep)
-        free = {terms[places[i]] for i in here if places[i] < len(terms)}
+        positions = np.flatnonzero(keep)
+        free = {terms[places[i]] for i in positions if places[i] < len(terms)}
         may = [
             places[i] < len(terms) and _may_go(search.structure, terms[places[i]], free)
-            for i in here
+            for i in positions
         ]
-        inverse = np.linalg.pinv(gram[np.ix_(here, here)], hermitian=True)
-        own = np.diag(inverse)
-        lost = np.where(own > 0.0, far[here] ** 2 / np.where(own > 0.0, own, 1.0), 0.0)
+        inverse = np.linalg.pinv(gram[np.ix_(positions, positions)], hermitian=True)
+        variances = np.diag(inverse)
+        lost = np.where(
+            variances > 0.0, far[positions] ** 2 / np.where(variances > 0.0, variances, 1.0), 0.0
+        )
         lost[~np.array(may)] = np.inf
         worst = int(np.argmin(lost))
         if not lost[worst] < LITTLE * (triangle[:, -1] @ triangle[:, -1]):
             break
-        if own[worst] > 0.0:
-            far[here] -= inverse[:, worst] / own[worst] * far[here[worst]]
-        keep[here[worst]] = False
+        if variances[worst] > 0.0:
+            far[positions] -= inverse[:, worst] / variances[worst] * far[positions[worst]]
+        keep[positions[worst]] = False
     fewer = search.without(~np.isin(np.arange(len(terms)), places[keep]))
     triangle[:, -1] += triangle[:, :-1] @ (fewer.z - search.z)[places]
-    left = triangle[:, np.append(keep, True)]
+    kept_columns = triangle[:, np.append(keep, True)]
     try:
-        return replace(fewer, z=fewer.solved(left, fewer.z, FIRST_DAMPING))
+        return replace(fewer, z=fewer.solved(kept_columns, fewer.z, FIRST_DAMPING))
     except ModelError:  # as in a descent, a step that cannot be solved for is not taken
         return fewer
 

@@ -87,8 +87,8 @@ def covariance_of_balance(runs: FreeRuns, fixed: Sequence[int]) -> tuple[float, 
 
     mean_squares[lost] = mean_squares[:, lost] = np.nan
     covariance[np.ix_(free, free)] = mean_squares * np.outer(sizes, sizes)
-    known = usable.all() and lowest > 0.0
-    return float(np.sqrt(highest / lowest)) if known else np.inf, covariance
+    is_known = usable.all() and lowest > 0.0
+    return float(np.sqrt(highest / lowest)) if is_known else np.inf, covariance
 
 
 def _samples_per_independent_error(errors: Array, pieces: Sequence[Array]) -> float:
@@ -113,9 +113,9 @@ def _block_jackknife(
     blocks = [block for piece in blocks_of(pieces, BLOCKS) for block in piece if block.size]
     shifts_without_block = []
     for block in blocks:
-        own = slopes[block].reshape(-1, slopes.shape[-1])
+        part = slopes[block].reshape(-1, slopes.shape[-1])
         shifts_without_block.append(
-            _inverted(products - own.T @ own)[0] @ (errors[block].ravel() @ own)
+            _inverted(products - part.T @ part)[0] @ (errors[block].ravel() @ part)
         )
     degrees_of_freedom = max(len(blocks) - 1, 1)
     wider = (student(degrees_of_freedom) / NORMAL_95) ** 2
@@ -130,9 +130,9 @@ def _inverted(products: Array) -> tuple[Array, Mask]:
     size = np.sqrt(np.diag(products))
     size[size == 0.0] = 1.0
     values, vectors = np.linalg.eigh(products / np.outer(size, size))
-    kept = values > ROUNDING * values[-1]
-    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(size, size)
-    return inverse, (vectors[:, ~kept] ** 2).sum(axis=1) > LOST
+    is_kept = values > ROUNDING * values[-1]
+    inverse = (vectors[:, is_kept] / values[is_kept]) @ vectors[:, is_kept].T / np.outer(size, size)
+    return inverse, (vectors[:, ~is_kept] ** 2).sum(axis=1) > LOST
 
 
 def _output_shift_by_input_noise(runs: FreeRuns) -> Array:

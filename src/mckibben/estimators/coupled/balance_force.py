@@ -79,8 +79,8 @@ class BalanceForceEstimator(SearchEstimator):
 
     @classmethod
     def objection(cls, recordings: Sequence[Recording], channels: Channels) -> str | None:
-        own = cls.own_roles(channels)
-        kinds = [base_name(name) for name in (*own.inputs, *own.outputs)]
+        roles = cls.own_roles(channels)
+        kinds = [base_name(name) for name in (*roles.inputs, *roles.outputs)]
         if kinds not in (["length", "force"], ["displacement", "force"]):
             return "it maps length, or displacement, to force"
         return super().objection(recordings, channels)
@@ -89,7 +89,7 @@ class BalanceForceEstimator(SearchEstimator):
         return fixed_in(block)
 
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
-        place, (pressure,) = data.inputs[0], data.scheduled
+        position, (pressure,) = data.inputs[0], data.scheduled
         balance = BalanceEstimator(
             of_force=True,
             n_stops=self.n_stops,
@@ -99,16 +99,18 @@ class BalanceForceEstimator(SearchEstimator):
             terms=self.terms,
             prior=self.prior,
         )
-        rest = None
-        if place.name.startswith("length"):
-            given = self.prior is not None
-            rest = as_prior(self.prior).sheet.rest_length_mm if given else data.input_range[1]
-        displacement = place if rest is None else Channel("displacement", place.unit)
+        rest_length = None
+        if position.name.startswith("length"):
+            has_prior = self.prior is not None
+            rest_length = (
+                as_prior(self.prior).sheet.rest_length_mm if has_prior else data.input_range[1]
+            )
+        displacement = position if rest_length is None else Channel("displacement", position.unit)
         runs = tuple(
             replace(
                 run,
                 driven=run.scheduled,
-                outputs=run.driven if rest is None else rest - run.driven,
+                outputs=run.driven if rest_length is None else rest_length - run.driven,
                 scheduled=run.outputs,
             )
             for run in data.runs
@@ -122,8 +124,8 @@ class BalanceForceEstimator(SearchEstimator):
             spans=balance.spans,
         ).stretches(FEWEST_IN_A_ROW - 1)  # a force that does not count is not to be given as a load
         force = load_of(balance.find(muscle, tracker))
-        if rest is None:
+        if rest_length is None:
             return force
-        shortening = Affine(-1.0, rest, place, displacement)
+        shortening = Affine(-1.0, rest_length, position, displacement)
         before = PerChannel((shortening, Affine(1.0, 0.0, pressure, pressure)))
         return Series((before, *(force.parts if isinstance(force, Series) else (force,))))

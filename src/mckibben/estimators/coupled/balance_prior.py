@@ -63,31 +63,33 @@ class PriorErrors:
 
         origin, by_origin = 0.0, np.zeros(1)
         for _ in range(ORIGIN_STEPS):
-            here = residuals(terms, origin)
-            by_origin = (residuals(terms, origin + STEP * origin_std) - here) / (STEP * origin_std)
-            step = -float(by_origin @ here) / float(by_origin @ by_origin)
+            at_terms = residuals(terms, origin)
+            by_origin = (residuals(terms, origin + STEP * origin_std) - at_terms) / (
+                STEP * origin_std
+            )
+            step = -float(by_origin @ at_terms) / float(by_origin @ by_origin)
             origin += min(max(step, -origin_std), origin_std)
 
-        here = residuals(terms, origin)
-        of_area = np.array([kind == "areas" and which > 0 for kind, which, _ in structure.terms])
+        at_terms = residuals(terms, origin)
+        of_area = np.array([kind == "areas" and number > 0 for kind, number, _ in structure.terms])
         smoothing = np.where(of_area, 1.0 / scales, 0.0)
-        errors = np.append(here, smoothing * terms)
+        errors = np.append(at_terms, smoothing * terms)
         if wanted is None:
             return errors, np.zeros((0, terms.size))
 
-        jacobian, places = np.zeros((here.size, terms.size)), np.flatnonzero(wanted).tolist()
+        jacobian, places = np.zeros((at_terms.size, terms.size)), np.flatnonzero(wanted).tolist()
         jacobian[:, places] = differences(
-            lambda moved: residuals(moved, origin), terms, STEP * scales, places
+            lambda shifted: residuals(shifted, origin), terms, STEP * scales, places
         )
         jacobian -= np.outer(by_origin, by_origin @ jacobian) / float(by_origin @ by_origin)
         return errors, np.concatenate([jacobian, np.diag(smoothing)])
 
 
-def as_prior(given: Any) -> Prior:
+def as_prior(prior: Any) -> Prior:
     """Return a prior as given, or that of a muscle's name, a file or a data sheet."""
-    if isinstance(given, Prior):
-        return given
-    return prior_of(Sheet(**given) if isinstance(given, Mapping) else given)
+    if isinstance(prior, Prior):
+        return prior
+    return prior_of(Sheet(**prior) if isinstance(prior, Mapping) else prior)
 
 
 def check_single_muscle(data: TrainingData) -> None:

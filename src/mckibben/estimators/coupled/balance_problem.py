@@ -192,7 +192,7 @@ class Problem:
         errors, table, bench = list[Array](), [np.zeros((0, z.size))], structure.bench
         sloped = wanted is not None
         first, last = structure.positions("filling").start, len(structure.terms)
-        air = [place for place in range(first, last) if wanted is not None and wanted[place]]
+        air = [row for row in range(first, last) if wanted is not None and wanted[row]]
         nonlinear = [*range(structure.mix.shape[1], first), *air]
 
         for run, result, slopes in self.simulated(structure, z, self.still, sloped=sloped, air=air):
@@ -225,7 +225,10 @@ class Problem:
         steps = np.zeros(z.size)
         steps[n:last] = np.where(z[n:last] + STEP * scales <= high, STEP, -STEP) * scales
         return differences(
-            lambda moved: self.acting(run, structure, structure.expanded(moved)), z, steps, places
+            lambda moved: self.acting(run, structure, structure.expanded(moved)),
+            z,
+            steps,
+            places,
         )
 
     @property
@@ -245,8 +248,8 @@ class Problem:
             stiffness = springs_at(springs, x.T, structure.degree)
             spring_force = np.einsum("tji,ti->tj", stiffness, positions)
             resistances.append(-(spring_force + loads @ shares.T))
-        whole = np.concatenate(resistances)
-        return float(whole.min()), float(whole.max())
+        table_of_runs = np.concatenate(resistances)
+        return float(table_of_runs.min()), float(table_of_runs.max())
 
     # -- the linear stage ------------------------------------------------------------------------
 
@@ -327,8 +330,8 @@ class Problem:
                 of_muscle += STICKING * float(values[structure.at["friction"][k]].sum())
                 stiffness += np.outer(of_muscle, direction**2)
             table.append(stiffness)
-        whole = np.concatenate(table)
-        return np.maximum(whole, LEAST_SHARE * np.median(np.abs(whole), axis=0))
+        rows = np.concatenate(table)
+        return np.maximum(rows, LEAST_SHARE * np.median(np.abs(rows), axis=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -435,8 +438,8 @@ def coarser(data: TrainingData, most: int) -> TrainingData:
     while every > 1 and not _straight(data, every):
         every -= 1
     count = max(min(len(data.runs) * most * every // total, len(data.runs)), 1)
-    chosen = np.unique(np.linspace(0, len(data.runs) - 1, count).round().astype(int))
-    return replace(data, runs=tuple(data.runs[i].thinned(every) for i in chosen))
+    indices = np.unique(np.linspace(0, len(data.runs) - 1, count).round().astype(int))
+    return replace(data, runs=tuple(data.runs[i].thinned(every) for i in indices))
 
 
 def _straight(data: TrainingData, every: int) -> bool:

@@ -72,8 +72,8 @@ class Search:
     @cached_property
     def free(self) -> NDArray[np.intp]:
         """Indices of the free unknowns."""
-        rest = np.ones(self.z.size - self.active.size, dtype=bool)
-        return np.flatnonzero(np.append(self.active, rest))
+        others = np.ones(self.z.size - self.active.size, dtype=bool)
+        return np.flatnonzero(np.append(self.active, others))
 
     # -- errors ----------------------------------------------------------------------------------
 
@@ -130,8 +130,8 @@ class Search:
 
     def without(self, terms: Mask) -> Search:
         """Return the search without terms: they are none, and not free."""
-        gone = np.append(terms, np.zeros(self.z.size - terms.size, dtype=bool))
-        return replace(self, active=self.active & ~terms, z=np.where(gone, self.none, self.z))
+        removed = np.append(terms, np.zeros(self.z.size - terms.size, dtype=bool))
+        return replace(self, active=self.active & ~terms, z=np.where(removed, self.none, self.z))
 
     def narrowed(self) -> Search:
         """Return the search restricted to free terms."""
@@ -147,8 +147,8 @@ class Search:
         few = self.narrowed()
 
         def errors(z: Array, sloped: bool) -> tuple[Array, Array]:
-            found, slopes = few.errors(z, few.active if sloped else None)
-            return found, slopes[:, few.free]
+            errors_now, slopes = few.errors(z, few.active if sloped else None)
+            return errors_now, slopes[:, few.free]
 
         improved = (tracker or Tracker()).update
         z, n = levenberg_marquardt(errors, few.solved, few.z, steps, improved), few.active.size
@@ -162,14 +162,14 @@ class Search:
 
     def ahead(self, options: list[Mask]) -> list[float]:
         """Return the cost that a linear model expects of every choice of terms."""
-        every = replace(self, active=np.any(options, axis=0))
-        (triangle, count), expected = every.linearised(), []
+        widest = replace(self, active=np.any(options, axis=0))
+        (triangle, count), expected = widest.linearised(), []
         for active in options:
-            one = replace(self, active=active)
-            places = np.searchsorted(every.free, one.free)
-            moved = one.solved(triangle[:, np.append(places, -1)], self.z, FIRST_DAMPING)
-            left = triangle[:, -1] + triangle[:, places] @ (moved - self.z)[one.free]
-            expected.append(float(np.sqrt(left @ left / count)))
+            option = replace(self, active=active)
+            places = np.searchsorted(widest.free, option.free)
+            solution = option.solved(triangle[:, np.append(places, -1)], self.z, FIRST_DAMPING)
+            remainder = triangle[:, -1] + triangle[:, places] @ (solution - self.z)[option.free]
+            expected.append(float(np.sqrt(remainder @ remainder / count)))
         return expected
 
     def solved(self, triangle: Array, z: Array, damping: float) -> Array:
@@ -183,13 +183,13 @@ class Search:
         n = structure.mix.shape[1]
         size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
         scales = np.append(structure.scales(), np.ones(z.size - self.active.size))[free]
-        known = size * scales > UNKNOWN * (size * scales).max()
-        free, reduced = free[known], triangle[:, np.append(known, True)]
+        is_known = size * scales > UNKNOWN * (size * scales).max()
+        free, reduced = free[is_known], triangle[:, np.append(is_known, True)]
         target = reduced[:, :-1] @ z[free] - reduced[:, -1]
-        tried, others = z.copy(), np.setdiff1d(np.arange(z.size), free)
+        tried, fixed = z.copy(), np.setdiff1d(np.arange(z.size), free)
 
         def of_free(sides: Array, least: Array) -> tuple[Array, Array]:
-            return sides[:, free], least - sides[:, others] @ z[others]
+            return sides[:, free], least - sides[:, fixed] @ z[fixed]
 
         def asked(sides: Array, least: Array) -> tuple[Array, Array]:
             return of_free(*self._of_all(sides, least, z.size))
@@ -212,8 +212,8 @@ class Search:
         low, high, much = structure.nonlinear_ranges
         shape, far = z[n:n_terms], LONGEST_STEP * much
         bounds = np.append(np.maximum(low, shape - far), -np.minimum(high, shape + far))
-        one = np.eye(z.size)[n:n_terms]
-        return np.concatenate([on_all, one, -one]), np.concatenate([least, bounds])
+        identity = np.eye(z.size)[n:n_terms]
+        return np.concatenate([on_all, identity, -identity]), np.concatenate([least, bounds])
 
     def _of_all(self, sides: Array, least: Array, size: int) -> tuple[Array, Array]:
         """Return constraints of linear coefficients as those of all unknowns."""

@@ -53,17 +53,17 @@ from mckibben.blocks.solving import eliminate
 FEW_STEPS = 6
 """Maximum number of Newton steps without a line search."""
 
-CLOSE = 1e-7
+LAST_STEP_RESIDUAL = 1e-7
 """Residual force, relative to the forces that add up to it, from which one more step is the last."""
 
 
 @kernel
-def mix(to: Array, kept: float, share: float, row: Array) -> None:
+def mix(to: Array, share_kept: float, share: float, row: Array) -> None:
     """Set an array to ``kept * to + share * row``."""
-    if kept == 1.0 and share == 0.0:
+    if share_kept == 1.0 and share == 0.0:
         return
     for i in range(to.size):
-        to[i] = kept * to[i] + share * row[i]
+        to[i] = share_kept * to[i] + share * row[i]
 
 
 # -- places of derivatives ---------------------------------------------------------------------------
@@ -95,9 +95,9 @@ def first_of_shape(c: Array, columns: Array, dp: Array) -> int:
 
 
 @kernel
-def past_row(c: Array, place: int) -> int:
+def past_row(c: Array, position: int) -> int:
     """Return the row of a state's derivatives; only the stretches, before the stops, have none."""
-    return place - int(c[at.N_MUSCLES])
+    return position - int(c[at.N_MUSCLES])
 
 
 # -- derivatives of forces at a given past -----------------------------------------------------------
@@ -303,8 +303,8 @@ def carry_stops(
     n_stops, stiffness_at = int(c[at.N_STOPS]), terms_at(c, k) + int(c[at.STOP])
     growth = limit_growth(c, p, x) if way != AT_REST else 0.0
     for i in range(n_stops):
-        place = int(c[at.STOPS]) + k * n_stops + i
-        s, upper, row = state[place], c[at.LIMITS + i] * growth, past_row(c, place)
+        position = int(c[at.STOPS]) + k * n_stops + i
+        s, upper, row = state[position], c[at.LIMITS + i] * growth, past_row(c, position)
         present = c[stiffness_at + i] != 0.0
         if present and not -c[at.RATIO] * upper < s < upper:
             mix(past[row], 0.0, -1.0, now)
@@ -364,7 +364,7 @@ def approach(c: Array, state: Array, way: int, q: Array, x: Array, p: Array, wor
         eliminate(matrix, residual)
         for j in range(m):
             q[j] -= residual[j]
-        if largest <= CLOSE:
+        if largest <= LAST_STEP_RESIDUAL:
             break
 
 
@@ -409,10 +409,10 @@ def by_muscle(
     """
     n, m, n_lags = int(c[at.N_MUSCLES]), int(c[at.N_COORDINATES]), int(c[at.N_LAGS])
     n_terms, coefficients = int(c[at.N_TERMS]), terms_at(c, k)
-    y, moved, by_force = shortening(c, k, q), rows[k], rows[n + k]
+    y, state_moves, by_force = shortening(c, k, q), rows[k], rows[n + k]
     late = rows[2 * n + 2 * m, k * n_lags : (k + 1) * n_lags]
     shape, column = by_force[first_of_shape(c, by_force, dp) :], coefficients - coordinate_at(c, 0)
-    along(c, k, past, moved)
+    along(c, k, past, state_moves)
 
     by_force[:] = 0.0
     fill(by_force[column : column + n_terms], terms)
@@ -422,9 +422,9 @@ def by_muscle(
     by_shape(c, k, way, y, p[k], x, dp[k], terms, shape)
 
     if way != AT_REST:
-        through_past(c, k, terms, past, moved, by_force)
+        through_past(c, k, terms, past, state_moves, by_force)
     if way == IN_TIME and c[at.RATE] > 0.0 and c[coefficients + at.LINE] > 0.0:
-        through_line(c, k, state, terms, moved, by_force)
+        through_line(c, k, state, terms, state_moves, by_force)
 
 
 @inlined
@@ -522,8 +522,8 @@ def simulate_samples(
     measured: Array,
     x: Array,
     dp: Array,
-    held: bool,
-    every: int,
+    is_held: bool,
+    step_of_rows: int,
     past: Array,
     rows: Array,
     scratch: Array,
@@ -560,33 +560,33 @@ def simulate_samples(
 
     for t in range(-1, driven.shape[0]):
         way = AT_REST if t < 0 else FROM_REST if t == 0 else IN_TIME
-        now, place = max(t, 0), max(t, 0) // every
+        now, row = max(t, 0), max(t, 0) // step_of_rows
 
         # before the first sample pressures are 0, unless muscles were held from the start
-        pressurised = t >= 0 or (held and c[at.HELD] == 0.0)
+        pressurised = t >= 0 or (is_held and c[at.HELD] == 0.0)
         fill(p, driven[now] if pressurised else p)
         dp_now = dp[now + 1 if pressurised else 0]
 
-        if held:
+        if is_held:
             fill(q, measured[now])
             unbalanced(c, state, way, q, x[now], p, work)
-            fill(results[place], work)
+            fill(results[row], work)
         else:
             extrapolate(q, last, t > 0)
             approach(c, state, way, q, x[now], p, work)
-            fill(results[place], q)
+            fill(results[row], q)
             if sloped:
                 invert_stiffness(c, state, way, q, x[now], p, rows, work)
 
         if sloped:
-            slopes_of_forces(c, state, way, q, x[now], p, dp_now, past, rows, slopes[place], terms)
+            slopes_of_forces(c, state, way, q, x[now], p, dp_now, past, rows, slopes[row], terms)
         update_state(c, state, way, q, p, x[now])
-        if sloped and not held:
-            slopes_of_coordinates(c, past, rows, slopes[place])
+        if sloped and not is_held:
+            slopes_of_coordinates(c, past, rows, slopes[row])
         if sloped:
             carry_past(c, state, way, p, x[now], dp_now, past, rows)
-        if not held and c[at.TARED] != 0.0:
-            subtract_tare(t, q, tare, past, results[place], slopes[place])
+        if not is_held and c[at.TARED] != 0.0:
+            subtract_tare(t, q, tare, past, results[row], slopes[row])
 
 
 def run(

@@ -275,8 +275,8 @@ class Structure:
             if q or not self.bench.tare:  # relative coordinates have no constant force
                 columns.append((Term("springs", q), [int(self.springs[j, q, 0])]))
             for i in range(j, self.m):
-                both = {int(self.springs[j, q, 1 + i]), int(self.springs[i, q, 1 + j])}
-                columns.append((Term("springs", q), sorted(both)))
+                columns_of_pair = {int(self.springs[j, q, 1 + i]), int(self.springs[i, q, 1 + j])}
+                columns.append((Term("springs", q), sorted(columns_of_pair)))
         for j in range(self.m):
             if not self.bench.of_force:
                 columns += [(Term("loads", j), [index]) for index in self.at["loads"][j].tolist()]
@@ -292,7 +292,7 @@ class Structure:
     @cached_property
     def terms(self) -> tuple[Term, ...]:
         """Candidate terms, linear first, then nonlinear."""
-        nonlinear = [Term(name, which) for name in NONLINEAR for which in range(self.at[name].size)]
+        nonlinear = [Term(name, k) for name in NONLINEAR for k in range(self.at[name].size)]
         return (*(term for term, _ in self._columns), *nonlinear)
 
     @cached_property
@@ -374,8 +374,8 @@ class Structure:
             "springs": [(0, 0), *product(schedules, degrees)],
         }
         return [
-            (kind, initial[kind][which] if kind in initial else which, muscle)
-            for kind, which, muscle in self.terms
+            (kind, initial[kind][number] if kind in initial else number, muscle)
+            for kind, number, muscle in self.terms
         ]
 
     @cached_property
@@ -452,7 +452,9 @@ class Structure:
         """
         bench, n = self.bench, self.n
         shape = {name: self.nonlinear_values(values, name) for name in NONLINEAR}
-        for name in (one for one in NONLINEAR if TABLE[one].least == 0.0):  # but for rounding
+        for name in (
+            term_name for term_name in NONLINEAR if TABLE[term_name].least == 0.0
+        ):  # but for rounding
             shape[name] = np.maximum(shape[name], 0.0)
         never_slack = bool((shape["pushes"] >= NEVER).all())
         ratio, slopes = float(shape["asymmetry"][0]), shape["friction_slopes"]
@@ -517,15 +519,15 @@ class Structure:
 
     def reduced(self, active: Collection[Term]) -> Structure:
         """Return the structure without inactive stops, lags, obstacles and powers."""
-        used = {(term.kind, term.which) for term in active}
+        present = {(term.kind, term.which) for term in active}
 
         def chosen(kind: str, items: tuple[Item, ...]) -> tuple[Item, ...]:
-            return tuple(item for i, item in enumerate(items) if (kind, i) in used)
+            return tuple(item for i, item in enumerate(items) if (kind, i) in present)
 
         def highest(kind: str, least: int) -> int:
-            return 1 + max((which for name, which in used if name == kind), default=least - 1)
+            return 1 + max((number for name, number in present if name == kind), default=least - 1)
 
-        squares = any(kind == "springs" and q > 0 and q % 2 == 0 for kind, q in used)
+        squares = any(kind == "springs" and q > 0 and q % 2 == 0 for kind, q in present)
         return replace(
             self,
             n_elastic=highest("elasticity", 0),
@@ -574,8 +576,8 @@ class Structure:
             bounds.append(np.array([self.least_stiffness]))
 
         first = len(signs) + 1 + (1 + 3 * GRID) * np.arange(self.n)
-        whole = np.concatenate(sides), np.concatenate(bounds)
-        return whole, first[:, np.newaxis] + 3 * np.arange(GRID)
+        stacked = np.concatenate(sides), np.concatenate(bounds)
+        return stacked, first[:, np.newaxis] + 3 * np.arange(GRID)
 
     def _muscle_constraints(self, k: int) -> tuple[Array, Array]:
         """Return the constraints of muscle k: of the area at rest, then three at every grid point.

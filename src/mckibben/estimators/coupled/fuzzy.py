@@ -119,14 +119,14 @@ class Consequents:
         """Return consequents from normal equations, shape (rules * terms, outputs)."""
         n_rules = len(gram) // n_terms
         parts = np.hstack([np.tile(np.eye(n_terms), (n_rules, 1)), np.eye(len(gram))])
-        whole = parts.T @ gram @ parts
-        size = np.diag(whole)[:n_terms]
+        normal = parts.T @ gram @ parts
+        size = np.diag(normal)[:n_terms]
         unit = np.tile(1.0 / np.sqrt(np.where(size > 0, size, 1.0)), 1 + n_rules)
-        whole *= unit * unit[:, np.newaxis]
+        normal *= unit * unit[:, np.newaxis]
         damping = np.repeat([0.0, self.ridge], [n_terms, len(gram)])
-        whole[np.diag_indices_from(whole)] += damping + LIGHTEST
-        found = np.linalg.solve(whole, unit[:, np.newaxis] * (parts.T @ right))
-        return np.asarray(parts @ (unit[:, np.newaxis] * found))
+        normal[np.diag_indices_from(normal)] += damping + LIGHTEST
+        solution = np.linalg.solve(normal, unit[:, np.newaxis] * (parts.T @ right))
+        return np.asarray(parts @ (unit[:, np.newaxis] * solution))
 
     def fit(self, x: Array, columns: Array, y: Array) -> Array:
         """Return consequents by damped least squares, shape (rules * terms, outputs)."""
@@ -203,8 +203,8 @@ def fit_network(
         columns = Problem(x[part], y[part], solver).columns(sets)
         gram, right = gram + columns.T @ columns, right + columns.T @ y[part]
     n_terms = x.shape[1] + solver.constants
-    driven, scheduled, given = channels
-    consequents = solver.solve(gram, right, n_terms).reshape(-1, n_terms, len(given))
+    driven, scheduled, outputs = channels
+    consequents = solver.solve(gram, right, n_terms).reshape(-1, n_terms, len(outputs))
     if solver.constants:
         consequents[:, -1] -= np.einsum("i,rij->rj", origin, consequents[:, :-1])
     ends = (end(x + origin, axis=0) for end in (np.min, np.max))
@@ -215,7 +215,7 @@ def fit_network(
         rows(sets.widths),
         vector(np.moveaxis(consequents, 2, 1).ravel()),
         driven,
-        given,
+        outputs,
         scheduled,
         solver.constants,
         rows(np.column_stack([low - margin, high + margin])),
@@ -237,8 +237,8 @@ def project(problem: Problem, n_sets: int, low: Array, high: Array, tracker: Tra
 
     def errors(theta: Array) -> tuple[Array, Callable[[], Array]]:
         sets = start.replaced(theta)
-        every = np.append(problem.errors(sets), staying * (theta - start.vector))
-        return every, lambda: np.vstack([sensitivities(problem, sets), np.diag(staying)])
+        with_bounds = np.append(problem.errors(sets), staying * (theta - start.vector))
+        return with_bounds, lambda: np.vstack([sensitivities(problem, sets), np.diag(staying)])
 
     tracker.budget = MOST_STEPS + 1
     path = trust_region(
@@ -267,8 +267,8 @@ def sensitivities(problem: Problem, sets: Sets) -> Array:
     derivative = np.empty((n, n_out, 2, n_in, n_sets))
     for i in range(n_in):
         # what fires through each set of this input, (n, sets, outputs)
-        own = grid.sum(axis=tuple(1 + k for k in range(n_in) if k != i))
-        change = own - phi[:, i, :, np.newaxis] * f[:, np.newaxis, :]
+        others_product = grid.sum(axis=tuple(1 + k for k in range(n_in) if k != i))
+        change = others_product - phi[:, i, :, np.newaxis] * f[:, np.newaxis, :]
         away = x[:, i, np.newaxis] - sets.centres[i]
         for place, slope in enumerate((away / sets.widths[i] ** 2, away**2 / sets.widths[i] ** 3)):
             derivative[:, :, place, i] = np.moveaxis(change * slope[:, :, np.newaxis], 2, 1)
@@ -284,11 +284,11 @@ def swarmed(problem: Problem, n_sets: int, swarm: Swarm, seed: int, tracker: Tra
     start = rng.standard_normal((swarm.particles, 2 * shape[0] * shape[1]))
     nowhere = np.full(start.shape[1], np.inf)
 
-    def sets(place: Array) -> Sets:
-        centres, widths = place.reshape(2, *shape)
+    def sets(position: Array) -> Sets:
+        centres, widths = position.reshape(2, *shape)
         return Sets(centres, np.maximum(np.abs(widths), LEAST_WIDTH))
 
-    def costs(places: Array) -> Array:
-        return np.array([problem.cost(sets(place)) for place in places])
+    def costs(positions: Array) -> Array:
+        return np.array([problem.cost(sets(position)) for position in positions])
 
     return sets(particle_swarm(costs, -nowhere, nowhere, swarm, tracker, rng, start=start))

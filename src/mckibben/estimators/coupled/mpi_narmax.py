@@ -115,14 +115,14 @@ class MPINarmaxEstimator(CoupledEstimator):
             settings["rate_time_constant"] = 5.0 * data.timed()
         channel = replace(data.outputs[0], name=f"{data.outputs[0].name}_free")
         hysteresis = memory_of(self.memory, settings, free.runs, 0, free, channel)
-        known = loaded if self.learns_from == "loaded" and loaded.runs else data
-        problem = RecurrentProblem(self, after(hysteresis, known))
+        training = loaded if self.learns_from == "loaded" and loaded.runs else data
+        problem = RecurrentProblem(self, after(hysteresis, training))
         even = Sets.even(*problem.ranges, self.n_sets)
-        chosen = (even, np.zeros_like(even.centres))
+        sets = (even, np.zeros_like(even.centres))
         if self.method == "pso":
-            chosen = problem.swarm(even, self.seed, tracker)
+            sets = problem.swarm(even, self.seed, tracker)
         tracker.reached(0.9)
-        return Series((hysteresis, problem.best(*chosen)))
+        return Series((hysteresis, problem.best(*sets)))
 
 
 def _parted(data: TrainingData) -> tuple[TrainingData, TrainingData]:
@@ -131,8 +131,8 @@ def _parted(data: TrainingData) -> tuple[TrainingData, TrainingData]:
     shares = (largest / np.maximum(largest.max(axis=0), 1e-300)).max(axis=1)
     free = shares <= max(UNLOADED, float(shares.min()))
 
-    def those(wanted: NDArray[np.bool_]) -> TrainingData:
-        runs = tuple(run for run, is_one in zip(data.runs, wanted, strict=True) if is_one)
+    def those(mask: NDArray[np.bool_]) -> TrainingData:
+        runs = tuple(run for run, is_one in zip(data.runs, mask, strict=True) if is_one)
         return replace(data, runs=runs)
 
     return those(free), those(~free)
@@ -155,8 +155,8 @@ def after(hysteresis: Block, data: TrainingData) -> TrainingData:
     """Return the data with the outputs of a hysteresis instead of its inputs."""
 
     def driven(run: Run) -> Run:
-        found = hysteresis.simulate(run.driven, sample_time=run.sample_time)
-        return replace(run, driven=np.asarray(found))
+        memory = hysteresis.simulate(run.driven, sample_time=run.sample_time)
+        return replace(run, driven=np.asarray(memory))
 
     return replace(data.changed(driven), inputs=hysteresis.outputs)
 
@@ -221,8 +221,8 @@ class RecurrentProblem:
 
     def free_runs(self, network: RecurrentFuzzyNetwork) -> tuple[list[Array], float]:
         """Return the network's free-running outputs, and their RMSE; infinite for diverging runs."""
-        every = ((run.inputs, run.sample_time) for run in self.data.runs)
-        outputs = [run_many([network], u, sample_time=step)[0, :, 0] for u, step in every]
+        pairs = ((run.inputs, run.sample_time) for run in self.data.runs)
+        outputs = [run_many([network], u, sample_time=step)[0, :, 0] for u, step in pairs]
         with np.errstate(over="ignore", invalid="ignore"):
             return outputs, rms(np.concatenate(outputs) - self.data.stacked("y"))
 
@@ -235,22 +235,22 @@ class RecurrentProblem:
             If every one of them leaves all bounds.
         """
         pasts = [run.y for run in self.data.runs]
-        found, least = None, np.inf
+        best_network, least = None, np.inf
         for _ in range(ROUNDS):
             network = self.solved(sets, feedbacks, pasts)
             outputs, cost = self.free_runs(network)
             if cost < least:
-                found, least = network, cost
+                best_network, least = network, cost
             if not np.isfinite(cost):
                 break
             # halfway from what was measured to what it makes of itself: whole steps may circle
             pasts = [0.5 * (a + b) for a, b in zip(pasts, outputs, strict=True)]
-        if found is None:
+        if best_network is None:
             raise ModelError(
                 "the network diverges in a free run",
                 remedy="raise `settings[ridge]`, lower `settings[n_sets]`, or fit balance",
             )
-        return found
+        return best_network
 
     def swarm(self, even: Sets, seed: int, tracker: Tracker) -> tuple[Sets, Array]:
         """Return centres, widths and feedbacks by particle swarm on the free-running error."""
@@ -265,18 +265,18 @@ class RecurrentProblem:
         thin = replace(self, data=self.data.changed(lambda run: run.cut(0, most)))
         measured = [run.y for run in thin.data.runs]
 
-        def split(place: Array) -> tuple[Sets, Array]:
+        def split(position: Array) -> tuple[Sets, Array]:
             n = even.vector.size
-            return even.replaced(place[:n]), place[n:].reshape(even.centres.shape)
+            return even.replaced(position[:n]), position[n:].reshape(even.centres.shape)
 
-        def cost(place: Array) -> float:
+        def cost(position: Array) -> float:
             try:
-                return thin.free_runs(thin.solved(*split(place), measured))[1]
+                return thin.free_runs(thin.solved(*split(position), measured))[1]
             except (MckibbenError, np.linalg.LinAlgError):
                 return np.inf
 
-        def costs(places: Array) -> Array:
-            return np.array([cost(place) for place in places])
+        def costs(positions: Array) -> Array:
+            return np.array([cost(position) for position in positions])
 
-        own = tracker.part(0.1, 0.9)
-        return split(particle_swarm(costs, lower, upper, SWARM, own, rng, start=start))
+        part = tracker.part(0.1, 0.9)
+        return split(particle_swarm(costs, lower, upper, SWARM, part, rng, start=start))

@@ -36,7 +36,7 @@ PENALTIES = np.geomspace(1e-8, 10.0, 28)
 N_BLOCKS = 10
 """Smallest number of cross-validation blocks; the same in every run."""
 
-LEAST = 1e-12
+SMALLEST_PENALTY = 1e-12
 """Smallest penalty, on the same scale, which makes the equations solvable."""
 
 
@@ -104,14 +104,14 @@ class PlayRidgeEstimator(CoupledEstimator):
             vector(np.where(relative, inputs.min(axis=0), 0.0)),
         )
         blocks = []
-        for place, run in enumerate(data.runs):
-            tracker.reached(place / len(data.runs))
-            whole = np.hstack([features(template, run.inputs, run.sample_time), run.outputs])
+        for k, run in enumerate(data.runs):
+            tracker.reached(k / len(data.runs))
+            table = np.hstack([features(template, run.inputs, run.sample_time), run.outputs])
             n_blocks = -(-N_BLOCKS // len(data.runs))
-            blocks += [one.T @ one for one in np.array_split(whole[run.counts], n_blocks)]
+            blocks += [block.T @ block for block in np.array_split(table[run.counts], n_blocks)]
         sums = np.array(blocks)
-        given = None if self.ridge is None else (self.ridge,) * len(data.outputs)
-        self.penalties_ = given or chosen(sums, width)
+        penalties = None if self.ridge is None else (self.ridge,) * len(data.outputs)
+        self.penalties_ = penalties or chosen(sums, width)
         return template.unpack(readout_of(sums.sum(axis=0), width, self.penalties_).ravel())
 
     def left_out(self, runs: FreeRuns, parts: Sequence[Mask]) -> list[list[Array]]:
@@ -124,12 +124,12 @@ class PlayRidgeEstimator(CoupledEstimator):
             tables.append(features(block, inputs, run.sample_time)[len(past) :])
             scored.append(np.hstack([tables[-1], run.outputs])[run.counts])
         rows = np.concatenate(scored)
-        total, found = rows.T @ rows, []
+        total, result = rows.T @ rows, []
         for part in parts:
             out = rows[part[::m]]
             readout = readout_of(total - out.T @ out, width, self.penalties_)
-            found.append([table @ readout.T for table in tables])
-        return found
+            result.append([table @ readout.T for table in tables])
+        return result
 
 
 class CoupledMemoryEstimator(PlayRidgeEstimator):
@@ -160,14 +160,17 @@ def readout_of(sums: Array, width: int, penalties: Sequence[float]) -> Array:
     penalties : sequence of m float
         Relative to the diagonal of ``sums``.
     """
-    found = [solve_products(sums[np.newaxis], width, _damping(width, one))[0] for one in penalties]
-    return np.array([readout[:, k] for k, readout in enumerate(found)])
+    solutions = [
+        solve_products(sums[np.newaxis], width, _damping(width, penalty))[0]
+        for penalty in penalties
+    ]
+    return np.array([readout[:, k] for k, readout in enumerate(solutions)])
 
 
 def _damping(width: int, penalty: float) -> Array:
     """Return the penalty of everything read out, its constant excepted."""
-    damping = np.full(width, penalty + LEAST)
-    damping[0] = LEAST
+    damping = np.full(width, penalty + SMALLEST_PENALTY)
+    damping[0] = SMALLEST_PENALTY
     return damping
 
 
@@ -180,11 +183,12 @@ def chosen(blocks: Array, width: int) -> tuple[float, ...]:
         Sums as of `readout_of`, of every block, which are left out in turn.
     width : int
     """
-    others, m = sums_of_others(blocks, np.arange(len(blocks))), blocks.shape[1] - width
-    solve = partial(solve_products, others, width, effects=np.diag(blocks.sum(axis=0))[:width])
+    other_sums, m = sums_of_others(blocks, np.arange(len(blocks))), blocks.shape[1] - width
+    solve = partial(solve_products, other_sums, width, effects=np.diag(blocks.sum(axis=0))[:width])
     # squared errors of every output on blocks left out, by penalty
     errors = np.stack(
-        [squared_errors(blocks, solve(ridge=_damping(width, one))) for one in PENALTIES], axis=1
+        [squared_errors(blocks, solve(ridge=_damping(width, ridge_))) for ridge_ in PENALTIES],
+        axis=1,
     )
     least = errors.sum(axis=0).argmin(axis=0)
     more = errors - errors[:, least, range(m)][:, np.newaxis]
@@ -204,9 +208,9 @@ def features(block: CoupledMemory, inputs: Array, sample_time: float | None) -> 
     linear = many.simulate(np.ascontiguousarray(inputs), sample_time=sample_time)
     first = linear[:, 1 : 1 + n]
     products = [
-        np.prod(first[:, list(chosen)], axis=1)
+        np.prod(first[:, list(factors)], axis=1)
         for power in range(2, block.degree + 1)
-        for chosen in combinations_with_replacement(range(n), power)
+        for factors in combinations_with_replacement(range(n), power)
     ]
     if block.crossed:
         products += [first[:, [k]] * linear[:, 1 + n :] for k in range(n)]

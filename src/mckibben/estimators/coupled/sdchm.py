@@ -128,14 +128,14 @@ class SDCHMEstimator(CoupledEstimator):
     def fixed(self, block: Block) -> tuple[int, ...]:
         """Return the indices of the unit gains, and of parameters fixed by the hysteresis fits."""
         places = [
-            place
-            for place, (part, _, index) in enumerate(block.numbers())
+            k
+            for k, (part, _, index) in enumerate(block.numbers())
             if isinstance(part, Coupling) and index[0] == index[1]
         ]
         if self.memory is not None:
-            own, first = registry.load("estimators", self.memory)(), 0
+            memory, first = registry.load("estimators", self.memory)(), 0
             for muscle in block.parts[0].parts:  # type: ignore[attr-defined]
-                places += [first + place for place in own.fixed(muscle)]
+                places += [first + k for k in memory.fixed(muscle)]
                 first += muscle.n_parameters
         return tuple(places)
 
@@ -144,16 +144,16 @@ class SDCHMEstimator(CoupledEstimator):
         front: tuple[Block, ...] = ()
         runs, driven = list(data.runs), data.inputs
         if self.memory is not None:
-            chosen = [softest(data, muscle) for muscle in range(len(data.inputs))]
+            softest_runs = [softest(data, muscle) for muscle in range(len(data.inputs))]
             settings = settings_of(self.memory, {"seed": self.seed} | (self.memory_settings or {}))
             memories = [
                 memory_of(self.memory, settings, [run], k, data, data.outputs[k])
-                for k, run in enumerate(chosen)
+                for k, run in enumerate(softest_runs)
             ]
             tracker.reached(0.2)
-            front = (PerChannel(tuple(memories)), coupled(memories, chosen, data))
-            used = {id(run) for run in chosen}
-            runs = [run for run in data.runs if id(run) not in used] or runs
+            front = (PerChannel(tuple(memories)), coupled(memories, softest_runs, data))
+            used_ids = {id(run) for run in softest_runs}
+            runs = [run for run in data.runs if id(run) not in used_ids] or runs
             driven = data.outputs
         if not self.n_sets:
             if data.scheduled:
@@ -191,18 +191,18 @@ class SDCHMEstimator(CoupledEstimator):
                 target = [unrubbed.simulate(run.outputs) for run in runs]
         return parts[0] if len(parts) == 1 else Series(parts)
 
-    def friction(self, given: list[Array], runs: list[Run], muscle: int, channel: Channel) -> PI:
+    def friction(self, inputs: list[Array], runs: list[Run], muscle: int, channel: Channel) -> PI:
         """Return the friction memory of a muscle: play operators with positive partial sums."""
-        low = min(float(part.min()) for part in given)
-        high = max(float(part.max()) for part in given)
+        low = min(float(part.min()) for part in inputs)
+        high = max(float(part.max()) for part in inputs)
         span = high - low
         radii = np.append(0.0, span * np.geomspace(*FRICTION, self.n_friction))
-        plays = np.concatenate([play_operators(part, radii, "first_sample") for part in given])
+        plays = np.concatenate([play_operators(part, radii, "first_sample") for part in inputs])
         # weights are differences of partial sums, which must stay positive for an inverse
         steps = np.column_stack([-np.diff(plays, axis=1), plays[:, -1]])
         least = np.full(radii.size, LEAST_SLOPE)
-        wanted = np.concatenate([run.outputs[:, muscle] for run in runs])
-        sums, offset = solve_bounded(steps, wanted, least)
+        outputs = np.concatenate([run.outputs[:, muscle] for run in runs])
+        sums, offset = solve_bounded(steps, outputs, least)
         weights = np.diff(sums, prepend=0.0)
         ends = low - BEYOND * span, high + BEYOND * span
         return PI(vector(radii), vector(weights), offset, ends, input=channel, output=channel)
@@ -313,7 +313,7 @@ def trained_inverse(
     search = Search("pso", SDCHMEstimator.search_samples, printed_swarm(), seed)
     tracker = Tracker(progress=progress)
     inverse = learned_inverse(model, recordings, search=search, tracker=tracker)
-    pairs = [(one, inverse.simulate(one)) for one in recordings]
+    pairs = [(recording, inverse.simulate(recording)) for recording in recordings]
     return inverse, {
         channel.name: rmse(*(np.concatenate([p[k][channel.name] for p in pairs]) for k in (0, 1)))
         for channel in inverse.outputs
@@ -358,11 +358,11 @@ def learned_inverse(
         )
     hysteresis, coupling, network, *friction = parts
     assert isinstance(network, FuzzyNetwork)
-    given, wanted, scheduling = (
+    pressures, motions, scheduling = (
         tuple(channel.name for channel in channels)
         for channels in (hysteresis.inputs, model.outputs, network.scheduled)
     )
-    data = SDCHMEstimator(input=given, output=wanted, scheduling=scheduling).data(recordings)
+    data = SDCHMEstimator(input=pressures, output=motions, scheduling=scheduling).data(recordings)
     before = tuple(part.inverse() for part in reversed(friction))
     h = network_inputs((hysteresis, coupling), data.runs)[:, : len(data.inputs)]
     with warnings.catch_warnings():  # noise at the ends is clipped

@@ -58,7 +58,7 @@ HORIZON_SAMPLES, SELECTION_SAMPLES, LAYER_SAMPLES = 4000, 5000, 3000
 LAYER_EVALUATIONS, DAMPING = 15, 1e-4
 """Maximum number of evaluations for a hidden layer, and ridge of its output weights."""
 
-FAR, STEEPEST = 10.0, 1e6
+MOST_ERROR, MOST_SLOPE = 10.0, 1e6
 """Bounds to which errors and their derivatives are clipped, relative to half the output's range."""
 
 HOLD = 1000
@@ -127,10 +127,10 @@ class NarxEstimator(SearchEstimator):
 
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the best bounded model."""
-        found = self._polynomials if self.mapping == "polynomial" else self._networks
+        identify = self._polynomials if self.mapping == "polynomial" else self._networks
         error = cache(partial(free_run_rmse, data=data))
         paths: list[list[Narx]] = []
-        for model in found(self._fields(data), data):
+        for model in identify(self._fields(data), data):
             if data.target.size <= model.n_parameters:
                 raise DataError(
                     f"{data.target.size} samples are too few for {model.n_parameters} parameters",
@@ -140,27 +140,27 @@ class NarxEstimator(SearchEstimator):
             for horizon in HORIZONS if self.refine else ():
                 path += self._refined(path[-1], horizon, data, tracker)[-1:]
         paths.sort(key=lambda path: error(path[-1]))
-        tried: list[Narx] = []
+        candidates: list[Narx] = []
         for path in paths:
-            if self.refine and len(tried) < MOST_REFINED:
+            if self.refine and len(candidates) < MOST_REFINED:
                 path += self._refined(path[-1], None, data, tracker)[1:]
-            tried += islice((m for m in sorted(path, key=error) if stable(m, data)), 1)
-        if not tried and self.allow_unstable:
-            tried = [model for path in paths for model in path]
+            candidates += islice((m for m in sorted(path, key=error) if stable(m, data)), 1)
+        if not candidates and self.allow_unstable:
+            candidates = [model for path in paths for model in path]
             warnings.warn(
                 "the NARX model diverges for constant or continued input: do not simulate it",
                 ModelWarning,
                 stacklevel=4,
             )
-        if not tried:
+        if not candidates:
             raise ModelError(
                 "every NARX model found diverges in a free run",
                 remedy="use fewer terms or units, `settings[n_play]=3`, or "
                 "`settings[allow_unstable]=true` to return it anyway",
             )
-        chosen = min(tried, key=error)
-        tracker.best_cost = error(chosen)
-        return chosen
+        best = min(candidates, key=error)
+        tracker.best_cost = error(best)
+        return best
 
     def _fields(self, data: TrainingData) -> dict[str, Any]:
         """Return the common fields of all candidate models; the scales map the data to -1 to 1."""
@@ -194,8 +194,8 @@ class NarxEstimator(SearchEstimator):
         models: list[Narx] = []
         for size in sorted({max(len(order) // part, 1) for part in (1, 2, 4)}, reverse=True):
             weights = np.linalg.lstsq(columns[:, order[:size]], y, rcond=1e-12)[0]
-            chosen = tuple(terms[index] for index in order[:size])
-            models.append(NarxPolynomial(terms=chosen, weights=vector(weights), **fields))
+            selection = tuple(terms[index] for index in order[:size])
+            models.append(NarxPolynomial(terms=selection, weights=vector(weights), **fields))
         return models
 
     def _networks(self, fields: Mapping[str, Any], data: TrainingData) -> list[Narx]:
@@ -228,9 +228,9 @@ class NarxEstimator(SearchEstimator):
         # the samples before a stretch may be measured nowhere, or seldom
         if sum(int(piece.run.counts.sum()) for piece in pieces) < start.size:
             return []
-        found = StretchErrors(model, pieces)
+        stretch_errors = StretchErrors(model, pieces)
         path = trust_region(
-            tracker.watched(found.errors, model.output_scale[1]),
+            tracker.watched(stretch_errors.errors, model.output_scale[1]),
             start,
             scale=relative_sizes(start),
             least_gain=LEAST_GAIN,
@@ -306,22 +306,22 @@ def one_step_pairs(fields: Mapping[str, Any], data: TrainingData, most: int) -> 
 
 def select(columns: Array, target: Array, most: int) -> list[int]:
     """Return columns, (n, k), ordered by their contribution to the target, (n,)."""
-    left, rest = columns.copy(), target.copy()
+    left, residual = columns.copy(), target.copy()
     power = np.maximum((columns**2).sum(axis=0), 1e-300)
-    chosen: list[int] = []
+    indices: list[int] = []
     for _ in range(min(most, columns.shape[1])):
         size = (left**2).sum(axis=0)
         usable = size > DEPENDENT * power
-        usable[chosen] = False
+        usable[indices] = False
         if not usable.any():
             break
-        explained = np.where(usable, (left.T @ rest) ** 2 / np.where(usable, size, 1.0), -1.0)
+        explained = np.where(usable, (left.T @ residual) ** 2 / np.where(usable, size, 1.0), -1.0)
         best = int(np.argmax(explained))
         direction = left[:, best] / np.sqrt(size[best])
-        rest = rest - direction * (direction @ rest)
+        residual = residual - direction * (direction @ residual)
         left = left - np.outer(direction, direction @ left)
-        chosen.append(best)
-    return chosen
+        indices.append(best)
+    return indices
 
 
 @dataclass(frozen=True)
@@ -359,16 +359,16 @@ class HiddenLayers:
     def errors(self, layer: Array) -> tuple[Array, Callable[[], Array]]:
         """Return the errors, and a function to their projected derivatives (Kaufman)."""
         columns, (n, k) = self.columns(layer), self.x.shape
-        network, left = self.solved(layer, columns)
+        network, residual = self.solved(layer, columns)
 
         def slopes() -> Array:
             by_all, _ = network.slopes(self.x)
-            moved = np.zeros((len(columns), layer.size))
-            moved[:n] = by_all[:, 1 + k :].reshape(n, self.units, -1)[:, :, :-1].reshape(n, -1)
-            taken = np.linalg.qr(columns)[0]
-            return np.asarray(moved - taken @ (taken.T @ moved))
+            moves = np.zeros((len(columns), layer.size))
+            moves[:n] = by_all[:, 1 + k :].reshape(n, self.units, -1)[:, :, :-1].reshape(n, -1)
+            span = np.linalg.qr(columns)[0]
+            return np.asarray(moves - span @ (span.T @ moves))
 
-        return left, slopes
+        return residual, slopes
 
 
 @dataclass(frozen=True, eq=False)
@@ -390,7 +390,7 @@ def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stre
             Stretch(run, model.state_after(model.past(run), run), driven(model, run))
             for run in data.runs
         ]
-    found: list[Stretch] = []
+    result: list[Stretch] = []
     n, m = model.output_lags, model.past_inputs
     for run in data.runs:
         regressors = driven(model, run)
@@ -400,9 +400,9 @@ def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stre
             before, stop = start - 1 - np.arange(max(n, m)), start + horizon
             if run.counts[before[:n]].all():
                 state = np.concatenate([y[before[:n]], x[before[:m]], played[start - 1]])
-                found.append(Stretch(run.cut(start, stop), state, regressors[start:stop]))
-    few = min(len(found), -(-HORIZON_SAMPLES // horizon))
-    return [found[k] for k in np.linspace(0, len(found) - 1, few).round().astype(int)]
+                result.append(Stretch(run.cut(start, stop), state, regressors[start:stop]))
+    few = min(len(result), -(-HORIZON_SAMPLES // horizon))
+    return [result[k] for k in np.linspace(0, len(result) - 1, few).round().astype(int)]
 
 
 @kernel
@@ -458,7 +458,11 @@ class StretchErrors:
         model = self.model.unpack(theta)
         outputs = self.outputs(model)
         errors = (outputs[self.counts] - self.target) / model.output_scale[1]
-        errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
+        errors = np.clip(
+            np.nan_to_num(errors, nan=MOST_ERROR, posinf=MOST_ERROR, neginf=-MOST_ERROR),
+            -MOST_ERROR,
+            MOST_ERROR,
+        )
         return errors, lambda: self.slopes(model, outputs)
 
     def slopes(self, model: Narx, outputs: Array) -> Array:
@@ -474,15 +478,15 @@ class StretchErrors:
             feed_back(by_parameters, by_past)
         slopes = by_parameters[self.counts]
         errors = y[self.counts] - scaled(self.target, model.output_scale)
-        slopes[~((np.abs(slopes).max(axis=1) < STEEPEST) & (np.abs(errors) < FAR))] = 0.0
+        slopes[~((np.abs(slopes).max(axis=1) < MOST_SLOPE) & (np.abs(errors) < MOST_ERROR))] = 0.0
         return slopes
 
 
 def free_run_rmse(model: Narx, data: TrainingData) -> float:
     """Return the RMSE of free runs from measured starts; infinite on overflow."""
-    whole = StretchErrors(model, stretches(model, data, None))
+    problem = StretchErrors(model, stretches(model, data, None))
     with np.errstate(over="ignore", invalid="ignore"):
-        return rms(whole.outputs(model)[whole.counts] - whole.target)
+        return rms(problem.outputs(model)[problem.counts] - problem.target)
 
 
 def stable(model: Narx, data: TrainingData) -> bool:
@@ -498,9 +502,9 @@ def stable(model: Narx, data: TrainingData) -> bool:
         np.linspace(start, stop, 2 + int(abs(stop - start) / fastest))
         for start, stop in pairwise(levels)
     ]
-    held = np.concatenate([np.append(ramp, np.full(HOLD, ramp[-1])) for ramp in ramps])
+    inputs_held = np.concatenate([np.append(ramp, np.full(HOLD, ramp[-1])) for ramp in ramps])
     swept = np.concatenate(ramps * 3)
-    for inputs in (*(run.u for run in data.runs), held, swept):
+    for inputs in (*(run.u for run in data.runs), inputs_held, swept):
         outputs = model.simulate(inputs, sample_time=data.sample_time)
         if not np.isfinite(outputs).all() or np.abs(outputs - centre).max() > most:
             return False

@@ -21,7 +21,7 @@ def layer(
     readout: Array,
     first: int,
     x: Array,
-    known: Array,
+    features: Array,
     act: Array,
     result: Array,
 ) -> None:
@@ -45,11 +45,11 @@ def layer(
     total, width = linear.shape
     n, units, q = x.shape[0], hidden.shape[0], x.shape[1] - 1
     for d in range(n):
-        known[d] = x[d, 0]
+        features[d] = x[d, 0]
     for j in range(units):
         s = 0.0
         for e in range(width):
-            s += hidden[j, e] * known[e]
+            s += hidden[j, e] * features[e]
         act[j] = np.tanh(s)
     for k in range(result.shape[0]):
         row, d = result[k], first + k
@@ -58,7 +58,7 @@ def layer(
 
         # the value
         for e in range(width):
-            row[0] += linear[d, e] * known[e]
+            row[0] += linear[d, e] * features[e]
         for j in range(units):
             row[0] += readout[d, j] * act[j]
         if q == 0:
@@ -74,11 +74,11 @@ def layer(
 
         # derivatives by the weights of this layer, at fixed states
         for e in range(width):
-            row[1 + d * width + e] += known[e]
+            row[1 + d * width + e] += features[e]
         for j in range(units):
             slope = readout[d, j] * (1.0 - act[j] * act[j])
             for e in range(width):
-                row[1 + (total + j) * width + e] += slope * known[e]
+                row[1 + (total + j) * width + e] += slope * features[e]
             row[1 + (total + units) * width + d * units + j] += act[j]
 
 
@@ -92,7 +92,7 @@ def simulate_network(
     inputs: Array,
     substeps: int,
     skipped: int,
-    wanted: Mask,
+    is_wanted: Mask,
     outputs: Array,
 ) -> bool:
     """Simulate a network with linearly interpolated inputs, one Runge-Kutta step per sample of them.
@@ -122,13 +122,13 @@ def simulate_network(
     n, columns = state.shape
     m = inputs.shape[1]
     at, rate, total = state.copy(), np.zeros((n, columns)), np.zeros((n, columns))
-    known, act, row = np.ones(linear.shape[1]), np.zeros(hidden.shape[0]), 0
+    features, act, row = np.ones(linear.shape[1]), np.zeros(hidden.shape[0]), 0
     for t in range(inputs.shape[0] - 1):
         # the stages of a step
         for position, weight, ahead in RUNGE_KUTTA:
             for j in range(m):
-                known[n + j] = inputs[t, j] + position * (inputs[t + 1, j] - inputs[t, j])
-            layer(linear, hidden, readout, 0, at, known, act, rate)
+                features[n + j] = inputs[t, j] + position * (inputs[t + 1, j] - inputs[t, j])
+            layer(linear, hidden, readout, 0, at, features, act, rate)
             for d in range(n):
                 for i in range(columns):
                     total[d, i] += weight * rate[d, i]
@@ -144,9 +144,9 @@ def simulate_network(
 
         # the outputs, at samples
         k = (t + 1) // substeps - skipped - 1
-        if (t + 1) % substeps == 0 and k >= 0 and wanted[k]:
+        if (t + 1) % substeps == 0 and k >= 0 and is_wanted[k]:
             for j in range(m):
-                known[n + j] = inputs[t + 1, j]
-            layer(linear, hidden, readout, n, state, known, act, outputs[row])
+                features[n + j] = inputs[t + 1, j]
+            layer(linear, hidden, readout, n, state, features, act, outputs[row])
             row += 1
     return True

@@ -62,13 +62,13 @@ def of_lags(data: TrainingData, n: int) -> LinearStart:
     lags = step * np.geomspace(FASTEST_LAG, max(SLOWEST_LAG * longest, 2 * FASTEST_LAG), N_LAGS)
     m = data.stacked("inputs").shape[1]
 
-    chosen, readout = _best_lags(data, lags, n)
-    rates = 1.0 / lags[chosen // m]
+    lag_choice, readout = _best_lags(data, lags, n)
+    rates = 1.0 / lags[lag_choice // m]
     rate = float(rates.max())
 
     dynamics = np.zeros((n, n + m + 1))
     dynamics[range(n), range(n)] = -rates / rate
-    dynamics[range(n), n + chosen % m] = rates / rate
+    dynamics[range(n), n + lag_choice % m] = rates / rate
     weights = np.vstack([dynamics, readout])
     return LinearStart(weights, rate, float(rates.min()), LARGEST_LAG_SUBSTEP, 1.0)
 
@@ -85,8 +85,8 @@ def _best_lags(data: TrainingData, lags: Array, n: int) -> tuple[Array, Array]:
 
     best: tuple[float, list[int], Array] | None = None
     n_chosen = -(-n // m)
-    for chosen in combinations(range(N_LAGS), min(n_chosen, N_LAGS)):
-        numbers = [lag * m + j for lag in chosen for j in range(m)][:n]
+    for combination in combinations(range(N_LAGS), min(n_chosen, N_LAGS)):
+        numbers = [lag * m + j for lag in combination for j in range(m)][:n]
         regressors = np.hstack([columns[:, numbers], columns[:, N_LAGS * m :]])
         gram = regressors.T @ regressors
         gram[np.diag_indices_from(gram)] *= 1 + 1e-6

@@ -121,9 +121,9 @@ class Polynomials:
     def of(cls, theta: Array, orders: Orders) -> Polynomials:
         """Return the polynomials of a parameter vector."""
         sizes = np.cumsum([orders.zeros, orders.poles, orders.c, orders.d])
-        b, poles, c, d, rest = np.split(theta, sizes)
+        b, poles, c, d, constants = np.split(theta, sizes)
         n = orders.recursions
-        return cls(b.reshape(orders.inputs, -1), poles.reshape(n, -1), c, d, float(rest[0]))
+        return cls(b.reshape(orders.inputs, -1), poles.reshape(n, -1), c, d, float(constants[0]))
 
     @property
     def monic(self) -> tuple[Array, ...]:
@@ -189,7 +189,7 @@ class Contribution:
 
 
 def free_response(
-    poles: Array, driven: Array, u: Array, rest: float, whiten: Whitening
+    poles: Array, driven: Array, u: Array, rest_input: float, whiten: Whitening
 ) -> Contribution:
     """Return the contribution of an input through 1 / F from an estimated start.
 
@@ -203,7 +203,7 @@ def free_response(
         B u at rest.
     """
     states = range(poles.size - 1)
-    output = recursion(poles, driven + rest)
+    output = recursion(poles, driven + rest_input)
     by_output = whiten(recursion(poles, output))
     by_impulse = -whiten(recursion(poles, np.eye(1, u.size)[0]))
     return Contribution(
@@ -217,7 +217,7 @@ def free_response(
 
 
 def response_from_rest(
-    poles: Array, driven: Array, u: Array, rest: float, whiten: Whitening
+    poles: Array, driven: Array, u: Array, rest_input: float, whiten: Whitening
 ) -> Contribution:
     """Return the contribution of an input through 1 / F from rest; arguments as of `free_response`."""
     output, total = recursion(poles, driven), float(poles.sum())
@@ -225,11 +225,11 @@ def response_from_rest(
     by_rest = -whiten(np.ones(u.size)) / total
     return Contribution(
         output,
-        rest / total,
+        rest_input / total,
         by_input=-whiten(recursion(poles, u)),
         by_rest=by_rest,
         by_poles=tuple(
-            delayed(by_output, i + 1) - rest / total * by_rest for i in range(poles.size - 1)
+            delayed(by_output, i + 1) - rest_input / total * by_rest for i in range(poles.size - 1)
         ),
     )
 
@@ -273,9 +273,9 @@ def errors(
 
     by_b: list[Array] = []
     for number, b in enumerate(p.b):
-        whole = run.driven[:, number]
-        rest = 0.0 if start == "virgin" else float(whole[0]) + before
-        u = whole - rest
+        input_ = run.driven[:, number]
+        rest = 0.0 if start == "virgin" else float(input_[0]) + before
+        u = input_ - rest
         lagged_inputs = (
             coefficient * delayed(u, lag)
             for lag, coefficient in zip(orders.input_lags, b, strict=True)
@@ -372,22 +372,22 @@ def evaluate(
     theta: Array, orders: Orders, runs: Sequence[Run], start: Beginning = "estimated"
 ) -> tuple[Array, Array, float]:
     """Return errors, derivatives with optimal starts, and the RMSE at scored samples."""
-    found, slopes = [], []
+    errors_of_runs, slopes = [], []
     for run in runs:
         # how the start's own response moves with theta counts too: slopes are taken at the start found
         e, starts = errors(theta, orders, run, start, only_starts=True)
         if not starts.shape[1]:
-            e, own = from_rest(theta, orders, run, start)
-            e, own = e[run.counts], own[run.counts]
+            e, run_slopes = from_rest(theta, orders, run, start)
+            e, run_slopes = e[run.counts], run_slopes[run.counts]
         else:
             states, responses = known_starts(starts, run.counts)
             e, jacobian = errors(theta, orders, run, start, -states @ (responses.T @ e[run.counts]))
-            e, own = e[run.counts], jacobian[run.counts, : orders.size]
+            e, run_slopes = e[run.counts], jacobian[run.counts, : orders.size]
             e = e - responses @ (responses.T @ e)
-            own = own - responses @ (responses.T @ own)
-        found.append(e)
-        slopes.append(own)
-    e = np.concatenate(found)
+            run_slopes = run_slopes - responses @ (responses.T @ run_slopes)
+        errors_of_runs.append(e)
+        slopes.append(run_slopes)
+    e = np.concatenate(errors_of_runs)
     return e, np.concatenate(slopes), rms(e)
 
 
@@ -428,12 +428,14 @@ def known_starts(free: Array, counts: Mask, least: float = LEAST_RESPONSE) -> tu
     size = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
     responses, spread, turned = np.linalg.svd(free / size, full_matrices=False)
     moved = spread > 1e-12 * spread[0]
-    left, norms, right = np.linalg.svd(responses[np.ix_(counts, moved)], full_matrices=False)
+    left_vectors, norms, right = np.linalg.svd(
+        responses[np.ix_(counts, moved)], full_matrices=False
+    )
     determined = norms > least
     states = (
         turned[moved].T @ (right[determined] / spread[moved]).T / norms[determined] / size[:, None]
     )
-    return np.asarray(states), np.asarray(left[:, determined])
+    return np.asarray(states), np.asarray(left_vectors[:, determined])
 
 
 def minimise(
@@ -457,8 +459,8 @@ def minimise(
     search = partial(trust_region, tracker.watched(sloped), least_gain=LEAST_GAIN)
 
     def first_steps(theta: Array) -> tuple[Array, float]:
-        found, squares = search(theta, max_evaluations=FIRST_STEPS)[-1]
-        return found, float(np.sqrt(squares))
+        best, squares = search(theta, max_evaluations=FIRST_STEPS)[-1]
+        return best, float(np.sqrt(squares))
 
     starting = (theta for theta in starts if admissible(theta, orders))
     follow_best(starting, first_steps, partial(search, max_evaluations=STEPS), FOLLOWED, SAME)
@@ -482,7 +484,7 @@ def filtered(run: Run, numerator: Sequence[float], denominator: Sequence[float])
 
 
 def starting_points(
-    runs: Sequence[Run], known: Sequence[Run], orders: Orders, n_starts: int, seed: int
+    runs: Sequence[Run], stretches: Sequence[Run], orders: Orders, n_starts: int, seed: int
 ) -> list[Array]:
     """Return initial parameters without noise model: ARX, typical lags and oscillations, random lags.
 
@@ -490,16 +492,18 @@ def starting_points(
     """
     rng = np.random.default_rng(seed)
     n = orders.a + orders.f
-    tried = [_steiglitz_mcbride(known, orders, rounds) for rounds in (0, 1, 3, 10) if known]
+    trials = [
+        _steiglitz_mcbride(stretches, orders, rounds) for rounds in (0, 1, 3, 10) if stretches
+    ]
     speeds = [[0.2], [0.9], [0.99, 0.9], [0.9995, 0.97]]
     turns = np.exp(1j * np.array([0.03, 0.2, 1.0]))
     oscillating = [[0.98 * z, 0.98 * z.conj(), 0.97, 0.2] for z in turns] if n > 1 else []
     roots = [np.resize(speed, n) * (1 - 1e-3 * np.arange(n)) for speed in speeds]
     roots += [np.append(poles, np.full(max(n - 4, 0), 0.2))[:n] for poles in oscillating]
-    while len(tried) + len(roots) < n_starts:
+    while len(trials) + len(roots) < n_starts:
         roots.append(1 - 10 ** rng.uniform(-4, 0, n))
-    tried += [np.real(np.poly(poles))[1:] for poles in roots]
-    return [_complete(poles, orders, runs) for poles in tried if spectral_radius(poles) < STABLE]
+    trials += [np.real(np.poly(poles))[1:] for poles in roots]
+    return [_complete(poles, orders, runs) for poles in trials if spectral_radius(poles) < STABLE]
 
 
 def _complete(poles: Array, orders: Orders, runs: Sequence[Run]) -> Array:
@@ -528,7 +532,7 @@ def arma(series: Sequence[Array], n_c: int, n_d: int) -> Array:
     from scipy.signal import lfilter
 
     short = [v[:NOISE_SAMPLES] for v in series]
-    best, found = np.inf, np.zeros(n_c + n_d)
+    best, coefficients = np.inf, np.zeros(n_c + n_d)
     for c in _tried(n_c):
         filtered = [np.asarray(lfilter([1.0], [1.0, *c], v)) for v in short]
         now = np.concatenate(filtered)
@@ -536,8 +540,8 @@ def arma(series: Sequence[Array], n_c: int, n_d: int) -> Array:
         d = inside(-np.linalg.lstsq(past.T @ past, past.T @ now, rcond=1e-14)[0], 1.0)
         cost = float(np.mean((now + past @ d) ** 2))
         if cost < best:
-            best, found = cost, np.concatenate([c, d])
-    return found
+            best, coefficients = cost, np.concatenate([c, d])
+    return coefficients
 
 
 def _tried(order: int) -> list[Array]:
@@ -550,8 +554,8 @@ def _tried(order: int) -> list[Array]:
         roots += [list(pair) for pair in combinations_with_replacement(radii, 2)]
         turns = np.exp(1j * np.array([0.1, 0.5, 1.0, 1.6, 2.2, 2.7]))
         roots += [[r * z, r * z.conj()] for r in (0.6, 0.9, 0.99) for z in turns]
-    padded = [np.append(given, np.zeros(order - len(given))) for given in roots]
-    return [np.asarray(np.real(np.poly(given))[1:], dtype=np.float64) for given in padded]
+    padded = [np.append(poles, np.zeros(order - len(poles))) for poles in roots]
+    return [np.asarray(np.real(np.poly(poles))[1:], dtype=np.float64) for poles in padded]
 
 
 def lagged(x: Array, lags: int) -> Array:
@@ -566,6 +570,6 @@ def _steiglitz_mcbride(runs: Sequence[Run], orders: Orders, rounds: int) -> Arra
     simple = replace(orders, a=orders.a + orders.f, f=0, c=0, d=0)
     poles = np.zeros(simple.a)
     for _ in range(rounds + 1):
-        found = arx([filtered(run, [1.0], [1.0, *poles]) for run in runs], simple)
-        poles = inside(Polynomials.of(found, simple).poles[0], STABLE * (1 - 1e-4))
+        model = arx([filtered(run, [1.0], [1.0, *poles]) for run in runs], simple)
+        poles = inside(Polynomials.of(model, simple).poles[0], STABLE * (1 - 1e-4))
     return poles

@@ -98,28 +98,28 @@ class ProcessModelEstimator(SeparableEstimator):
         columns = [unit.simulate(run.u, sample_time=run.sample_time)]
         if "Z" in self.structure:
             zero = data.latest("zero", theta, lambda: replace(unit, zero_time=1.0))
-            whole = zero.simulate(run.u, sample_time=run.sample_time)
-            columns.append(whole - columns[0])
+            response = zero.simulate(run.u, sample_time=run.sample_time)
+            columns.append(response - columns[0])
         columns.append(np.ones(run.u.size))
-        responses, left = np.column_stack(columns), np.zeros(run.u.size)
+        responses, start_left = np.column_stack(columns), np.zeros(run.u.size)
         if self.initial == "first_sample" and run.counts[0]:
             ones = np.ones(run.u.size)
             plain = replace(unit, input_offset=0.0)
             at_zero = plain.initial_state(np.array([0.0]), sample_time=run.sample_time).tolist()
-            left = 1.0 - plain.simulate(ones, initial=at_zero, sample_time=run.sample_time)
-            left /= left[0]
-        known = responses - np.outer(left, responses[0])
-        return np.column_stack([known, left * float(run.y[0])])
+            start_left = 1.0 - plain.simulate(ones, initial=at_zero, sample_time=run.sample_time)
+            start_left /= start_left[0]
+        relative = responses - np.outer(start_left, responses[0])
+        return np.column_stack([relative, start_left * float(run.y[0])])
 
     def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
         """Return gain, zero and offset, and 1 for the share of the first output."""
-        known, others = data.target - matrix[:, -1], matrix[:, 1:-1]
-        found = np.linalg.lstsq(matrix[:, :-1], known, rcond=1e-12)[0]
-        gain = np.clip(found[0], *self.gain_range(data))
-        if gain != found[0]:  # with a single bound the optimum is on it
-            rest = np.linalg.lstsq(others, known - gain * matrix[:, 0], rcond=1e-12)[0]
-            found = np.append(gain, rest)
-        return np.append(found, 1.0), 0.0
+        target, start_columns = data.target - matrix[:, -1], matrix[:, 1:-1]
+        solution = np.linalg.lstsq(matrix[:, :-1], target, rcond=1e-12)[0]
+        gain = np.clip(solution[0], *self.gain_range(data))
+        if gain != solution[0]:  # with a single bound the optimum is on it
+            starts = np.linalg.lstsq(start_columns, target - gain * matrix[:, 0], rcond=1e-12)[0]
+            solution = np.append(gain, starts)
+        return np.append(solution, 1.0), 0.0
 
     def gain_range(self, data: TrainingData) -> tuple[float, float]:
         """Return the bounds of the gain; a larger one is not seen in the recordings."""

@@ -96,15 +96,15 @@ def path_of(run: Run, template: StateNetwork, warm: int) -> Path:
     A periodic run is band-limited between samples, and comes after ``warm`` samples of its own; the
     inputs of others go in straight lines, from the first on, or from 0 of a virgin start.
     """
-    given, n, substeps = run.inputs, len(run), template.substeps
+    inputs, n, substeps = run.inputs, len(run), template.substeps
     if not run.source.periodic:
-        before = given[:1] if template.initial == "first_sample" else np.zeros_like(given[:1])
-        whole, steps = np.vstack([before, given]), np.arange(1 + substeps * n) / substeps
-        columns = [np.interp(steps, np.arange(n + 1), column) for column in whole.T]
+        before = inputs[:1] if template.initial == "first_sample" else np.zeros_like(inputs[:1])
+        samples, steps = np.vstack([before, inputs]), np.arange(1 + substeps * n) / substeps
+        columns = [np.interp(steps, np.arange(n + 1), column) for column in samples.T]
         return Path(run, np.column_stack(columns), substeps, 0)
     ratio = BETWEEN * substeps
     substep = np.arange(-(warm + 1) * ratio, (n - 1) * ratio + 1) % (n * ratio)
-    columns = [band_limited(column, ratio)[substep] for column in given.T]
+    columns = [band_limited(column, ratio)[substep] for column in inputs.T]
     return Path(run, np.column_stack(columns), ratio, warm)
 
 
@@ -131,17 +131,17 @@ def held_back(data: TrainingData) -> list[Mask]:
     the same inputs.
     """
     masks = []
-    whole = len(data.runs) >= HELD_BACK
+    by_run = len(data.runs) >= HELD_BACK
     for number, run in enumerate(data.runs):
-        held = np.zeros(len(run), dtype=bool)
+        mask = np.zeros(len(run), dtype=bool)
         if run.source.periodic:
             pass
-        elif whole:
-            held |= run.counts & (number % HELD_BACK == HELD_BACK - 1)
+        elif by_run:
+            mask |= run.counts & (number % HELD_BACK == HELD_BACK - 1)
         else:
             counting = np.flatnonzero(run.counts)
-            held[counting[len(counting) - len(counting) // HELD_BACK :]] = True
-        masks.append(held)
+            mask[counting[len(counting) - len(counting) // HELD_BACK :]] = True
+        masks.append(mask)
     return masks
 
 
@@ -193,15 +193,15 @@ class StateNetworkEstimator(CoupledEstimator):
 
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
         merged = averaged(data)
-        held = held_back(merged)
+        masks = held_back(merged)
         searches = [
-            NetworkErrors(template, merged, held, warm) for template, warm in self.starts(merged)
+            NetworkErrors(template, merged, masks, warm) for template, warm in self.starts(merged)
         ]
         few = FIRST_STEPS if len(searches) > 1 else 0
         tracker.budget = len(searches) * few + self.n_steps
-        begun = [descend(search, search.origin, few, tracker) for search in searches]
-        best = int(np.argmin([error for _, error in begun]))
-        return self._finish(searches[best], begun[best][0], tracker)
+        descents = [descend(search, search.origin, few, tracker) for search in searches]
+        best = int(np.argmin([error for _, error in descents]))
+        return self._finish(searches[best], descents[best][0], tracker)
 
     def find_again(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the network once more, from the weights found before."""
@@ -234,19 +234,19 @@ class StateNetworkEstimator(CoupledEstimator):
         slowest_sampling = max(run.sample_time or 0.0 for run in data.runs)
         longest = max(len(run) for run in data.runs)
         for number in range(self.n_starts):
-            own = linear[-1 - number % len(linear)]  # alternate, oscillator first
-            hidden = HIDDEN_SCALE * rng.normal(size=(self.n_units, own.weights.shape[1]))
-            hidden[:, n:-1] *= own.forced
-            fewest = np.ceil(own.rate * slowest_sampling / own.largest_substep)
+            block = linear[-1 - number % len(linear)]  # alternate, oscillator first
+            hidden = HIDDEN_SCALE * rng.normal(size=(self.n_units, block.weights.shape[1]))
+            hidden[:, n:-1] *= block.forced
+            fewest = np.ceil(block.rate * slowest_sampling / block.largest_substep)
             template = StateNetwork(
-                linear=rows(own.weights),
+                linear=rows(block.weights),
                 hidden=rows(hidden),
-                readout=rows(READOUT_SCALE * rng.normal(size=(len(own.weights), self.n_units))),
-                rate=own.rate,
+                readout=rows(READOUT_SCALE * rng.normal(size=(len(block.weights), self.n_units))),
+                rate=block.rate,
                 substeps=self.substeps or int(np.clip(fewest, 1, MOST_SUBSTEPS)),
                 **common,
             )
-            slowest = FORGOTTEN / max(own.decay * (data.runs[0].sample_time or 1.0), 1e-9)
+            slowest = FORGOTTEN / max(block.decay * (data.runs[0].sample_time or 1.0), 1e-9)
             yield template, int(min(np.ceil(slowest), MOST_PERIODS * longest))
 
     def _common(self, data: TrainingData) -> dict[str, Any]:
@@ -388,10 +388,10 @@ class NetworkErrors:
     def _errors_at(self, theta: Array, samples: Sequence[Mask], sloped: bool = False) -> Array:
         """Return scaled errors at samples, and perhaps their derivatives, shape (N, 1 or 1 + q)."""
         tables = []
-        for path, wanted in zip(self.paths, samples, strict=True):
-            if wanted.any():
-                table = self._simulate(theta, path, wanted, sloped)
-                table[:, :, 0] -= (path.run.outputs[wanted] - self.offsets) / self.scales
+        for path, mask in zip(self.paths, samples, strict=True):
+            if mask.any():
+                table = self._simulate(theta, path, mask, sloped)
+                table[:, :, 0] -= (path.run.outputs[mask] - self.offsets) / self.scales
                 tables.append(table.reshape(-1, table.shape[2]))
         return np.concatenate(tables)
 
@@ -439,10 +439,10 @@ def _thinned(masks: Sequence[Mask], n_outputs: int) -> list[Mask]:
     thinned, before = [], 0
     for mask in masks:
         samples = np.flatnonzero(mask)
-        kept = np.zeros_like(mask)
-        kept[samples[(-before) % stride :: stride]] = True
+        mask_kept = np.zeros_like(mask)
+        mask_kept[samples[(-before) % stride :: stride]] = True
         before += len(samples)
-        thinned.append(kept)
+        thinned.append(mask_kept)
     return thinned
 
 
@@ -455,7 +455,7 @@ def _add_slopes_at_rest(
     """
     n = len(state)
     act, rates = np.zeros(len(hidden)), np.zeros_like(state)
-    known = np.concatenate([state[:, 0], inputs, [1.0]])
-    layer(linear, hidden, readout, 0, state, known, act, rates)
+    features = np.concatenate([state[:, 0], inputs, [1.0]])
+    layer(linear, hidden, readout, 0, state, features, act, rates)
     by_state = linear[:n, :n] + (readout[:n] * (1 - act**2)) @ hidden[:, :n]
     state[:, 1:] = -np.linalg.lstsq(by_state, rates[:, 1:], rcond=None)[0]

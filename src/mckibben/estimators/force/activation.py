@@ -120,8 +120,8 @@ class ActivationMemoryEstimator(SeparableEstimator):
             [np.full(y.size, 1.0 / max(float(np.ptp(y)), 1e-9)) for y in parts]
         )
         columns = np.column_stack([np.ones(len(matrix)), matrix]) * weights[:, np.newaxis]
-        found, _ = solve_bounded(columns, data.target * weights, with_offset=False)
-        return found[1:], float(found[0])
+        solution, _ = solve_bounded(columns, data.target * weights, with_offset=False)
+        return solution[1:], float(solution[0])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         return self.unit(data).unpack([offset, *linear])
@@ -183,8 +183,8 @@ class ActivationPressureEstimator(SearchEstimator):
 
     def find(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the model, set to the first moving run's frequency."""
-        step, smoothed, given = data.timed(), self.rate_time_constant, self.frequency
-        at = frequencies(data) if given is None else np.full(len(data.runs), given)
+        step, smoothed, frequency = data.timed(), self.rate_time_constant, self.frequency
+        at = frequencies(data) if frequency is None else np.full(len(data.runs), frequency)
         moving = at >= STATIC_SHARE * at.max()
         loops = replace(data, runs=tuple(data.runs[i] for i in np.flatnonzero(moving)))
         contractions, pressures = characteristic_points(data.runs, moving)
@@ -211,31 +211,31 @@ class ActivationPressureEstimator(SearchEstimator):
         gamma phi is fixed up to a factor, which is chosen such that gamma is 1 at the mean
         frequency.
         """
-        whole, static = data.simulated([model, replace(model, gamma=(0.0, 0.0))])
-        rate, rest, middle = whole - static, data.target - static, float(at.mean())
+        full, static = data.simulated([model, replace(model, gamma=(0.0, 0.0))])
+        rate, residual, middle = full - static, data.target - static, float(at.mean())
         rises = (at - middle) / max(middle, 1e-9)
         rise = np.repeat(rises, [int(run.counts.sum()) for run in data.runs])
         force = data.scored(lambda run: run.scheduled[:, 0])
         largest = max(float(np.abs(force).max()), 1.0)
         # a cubic of fewer forces than four, and a slope by one frequency, are not determined
-        known = np.append(np.arange(4, 0, -1) <= len(by_force(data.runs)), np.ptp(at) > 0)
-        powers = np.vander(force / largest, 4) * known[:4]
-        start = np.linalg.lstsq(powers * rate[:, np.newaxis], rest, rcond=1e-9)[0]
+        is_determined = np.append(np.arange(4, 0, -1) <= len(by_force(data.runs)), np.ptp(at) > 0)
+        powers = np.vander(force / largest, 4) * is_determined[:4]
+        start = np.linalg.lstsq(powers * rate[:, np.newaxis], residual, rcond=1e-9)[0]
         width = np.maximum(np.abs(start), np.abs(start).max(initial=1e-6))
         bounds = np.append(start - 2 * width, -1.0), np.append(start + 2 * width, 1.0)
 
         def errors(point: Array) -> tuple[Array, Callable[[], Array]]:
             shape, grown = powers @ point[:4], (1 + point[4] * rise) * rate
             slopes = [powers * grown[:, np.newaxis], shape * rise * rate]
-            return shape * grown - rest, lambda: np.column_stack(slopes)
+            return shape * grown - residual, lambda: np.column_stack(slopes)
 
         if self.method == "pso":
-            found = _swarmed(errors, bounds, tracker, self.seed)
+            solution = _swarmed(errors, bounds, tracker, self.seed)
         else:
-            found = _searched(tracker.watched(errors), np.append(start, 0.0), bounds)
-        found = found * known
-        phi = found[:4] / largest ** np.array([3, 2, 1, 0])
-        slope = float(found[4]) / max(middle, 1e-9)
+            solution = _searched(tracker.watched(errors), np.append(start, 0.0), bounds)
+        solution = solution * is_determined
+        phi = solution[:4] / largest ** np.array([3, 2, 1, 0])
+        slope = float(solution[4]) / max(middle, 1e-9)
         return phi, (slope, 1.0 - slope * middle)
 
 
@@ -258,12 +258,12 @@ def _swarmed(errors: Errors, bounds: tuple[Array, Array], tracker: Tracker, seed
 
 def frequencies(data: TrainingData) -> Array:
     """Return the dominant frequency of each run's input [Hz]; 0 if it is constant."""
-    spans, found = np.array([np.ptp(run.u) for run in data.runs]), []
+    spans, result = np.array([np.ptp(run.u) for run in data.runs]), []
     for run in data.runs:
-        moved, n = run.u - run.u.mean(), 4 * len(run)
-        spectrum = np.abs(np.fft.rfft(moved * np.hanning(moved.size), n))
-        found.append(np.argmax(spectrum) / (n * data.timed()))
-    return np.where(spans < CONSTANT_SHARE * spans.max(), 0.0, found)
+        centred, n = run.u - run.u.mean(), 4 * len(run)
+        spectrum = np.abs(np.fft.rfft(centred * np.hanning(centred.size), n))
+        result.append(np.argmax(spectrum) / (n * data.timed()))
+    return np.where(spans < CONSTANT_SHARE * spans.max(), 0.0, result)
 
 
 # -- characteristic points -------------------------------------------------------------------
@@ -313,8 +313,8 @@ def characteristic_points(runs: Sequence[Run], moving: Sequence[bool]) -> tuple[
     forces, groups_of = np.array(list(groups)), list(groups.values())
     pressures = np.concatenate([run.y[run.counts] for run in runs])
     lowest, span = float(pressures.min()), float(np.ptp(pressures))
-    loops = [[i for i in own if moving[i]] or own for own in groups_of]
-    extremes = np.array([outermost([runs[i] for i in own]) for own in loops])
+    loops = [[i for i in group if moving[i]] or group for group in groups_of]
+    extremes = np.array([outermost([runs[i] for i in group]) for group in loops])
     still = extremes[:, 1, 0] <= extremes[:, 0, 0]
     if still.any():
         raise DataError(
@@ -327,8 +327,8 @@ def characteristic_points(runs: Sequence[Run], moving: Sequence[bool]) -> tuple[
     low = min(lowest + LOW * span, float(fitted[0, 1].min()) - MARGIN * span)
     high = max(lowest + HIGH * span, float(fitted[1, 1].max()) + MARGIN * span)
     bounds = [
-        boundaries([runs[i] for i in own], fitted[:, :, k], (low, high))
-        for k, own in enumerate(groups_of)
+        boundaries([runs[i] for i in group], fitted[:, :, k], (low, high))
+        for k, group in enumerate(groups_of)
     ]
     contractions = [*ends[:, 0], *(regress(forces, bound) for bound in np.transpose(bounds))]
     constants = [[0.0, 0.0, 0.0, level] for level in (low, high)]
@@ -348,14 +348,14 @@ def by_force(runs: Sequence[Run]) -> dict[float, list[int]]:
 
 def outermost(runs: Sequence[Run]) -> Array:
     """Return contraction and pressure, (2, 2), at the outermost turning points."""
-    found = []
+    extrema = []
     for run in runs:
         # where a run begins and ends, it does not turn
-        places = [place for place in reversals(run.u)[1:-1] if run.counts[place]]
+        places = [row for row in reversals(run.u)[1:-1] if run.counts[row]]
         if len(places) < 2:  # one that hardly turns counts as a whole
             places = list(np.flatnonzero(run.counts))
-        found.append(np.column_stack([run.u[places], run.y[places]]))
-    turns = np.concatenate(found)
+        extrema.append(np.column_stack([run.u[places], run.y[places]]))
+    turns = np.concatenate(extrema)
     return turns[[turns[:, 0].argmin(), turns[:, 0].argmax()]]
 
 
@@ -366,17 +366,17 @@ def boundaries(runs: Sequence[Run], extremes: Array, levels: tuple[float, float]
     alike.
     """
     (e_1, y_1), (e_2, y_2) = extremes
-    every = [(run.u[run.counts], run.y[run.counts]) for run in runs]
-    e, p = (np.concatenate(parts) for parts in zip(*every, strict=True))
-    scales = [max(float(np.ptp(y)), 1e-9) * np.sqrt(max(y.size, 1)) for _, y in every]
-    weight = 1.0 / np.repeat(scales, [y.size for _, y in every])
+    samples = [(run.u[run.counts], run.y[run.counts]) for run in runs]
+    e, p = (np.concatenate(parts) for parts in zip(*samples, strict=True))
+    scales = [max(float(np.ptp(y)), 1e-9) * np.sqrt(max(y.size, 1)) for _, y in samples]
+    weight = 1.0 / np.repeat(scales, [y.size for _, y in samples])
     powers = np.vander((e - e_1) / (e_2 - e_1), 4)
     pressures = np.array([y_1, y_2, *levels])
 
     def errors(away: Array) -> Array:
         through = np.vander([0.0, 1.0, -away[0], 1.0 + away[1]], 4)
-        found: Array = (powers @ np.linalg.solve(through, pressures) - p) * weight
-        return found
+        residual: Array = (powers @ np.linalg.solve(through, pressures) - p) * weight
+        return residual
 
     rise = max(y_2 - y_1, 1e-9)
     straight = np.array([y_1 - levels[0], levels[1] - y_2]) / rise
@@ -390,5 +390,5 @@ def regress(forces: Array, values: Array) -> Array:
     """Return a cubic of the force through values; of lower order for few forces."""
     order = min(3, forces.size - 1)
     scale = max(float(np.abs(forces).max()), 1.0)
-    found = np.polyfit(forces / scale, values, order) / scale ** np.arange(order, -1, -1)
-    return np.concatenate([np.zeros(3 - order), found])
+    coefficients = np.polyfit(forces / scale, values, order) / scale ** np.arange(order, -1, -1)
+    return np.concatenate([np.zeros(3 - order), coefficients])

@@ -164,10 +164,10 @@ class TonduLopezEstimator(SeparableEstimator):
     def law(
         self, theta: Array, mu: tuple[float, float], constant: float, data: TrainingData
     ) -> TonduLopez:
-        rest = self.rest_length or data.input_range[1]
+        rest_length = self.rest_length or data.input_range[1]
         angle, *kappa = theta.tolist()
         channels = self.channels(data)
-        return TonduLopez(rest, self.diameter, angle, mu, tuple(kappa), constant, **channels)
+        return TonduLopez(rest_length, self.diameter, angle, mu, tuple(kappa), constant, **channels)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the ideal force, with and without the decay of mu."""

@@ -188,8 +188,8 @@ class MultistateEstimator(SeparableEstimator):
         for index, direction in enumerate(self.directions):
             element = self._unit_element(index, theta)
             force = element.simulate(run.inputs, sample_time=run.sample_time)[:, 0]
-            both = direction == "both"
-            columns += [force * lengthening, force * ~lengthening] if both else [force]
+            both_ways = direction == "both"
+            columns += [force * lengthening, force * ~lengthening] if both_ways else [force]
         return np.column_stack(columns)
 
     @property

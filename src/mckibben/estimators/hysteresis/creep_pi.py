@@ -111,8 +111,8 @@ class CreepPIEstimator(SeparableEstimator):
         """Return decreasing weights, on the logarithm and nearly on the input, with some creep."""
         lower, upper = self.bounds(data)
         n, k = self.n_operators, self.n_creep
-        place = np.linspace(lower[n + 1 : n + 1 + k], upper[n + 1 : n + 1 + k], 5)[1:4]
-        spreads = [np.array([place[min(1 + j, 2), j] for j in range(k)]), place[0]]
+        levels = np.linspace(lower[n + 1 : n + 1 + k], upper[n + 1 : n + 1 + k], 5)[1:4]
+        spreads = [np.array([levels[min(1 + j, 2), j] for j in range(k)]), levels[0]]
         guesses = []
         for fading in (0.5, 1.5):
             weights = np.maximum(np.exp(-fading * np.arange(n)), LEAST_REVERSIBLE)
@@ -157,9 +157,9 @@ class CreepPIEstimator(SeparableEstimator):
             slopes = pieces.slopes(x) @ linear
             at_once = slopes[:, np.newaxis] * np.column_stack([by_weights, by_offset])
             crept = with_creep(at_once, taus, compliances, run.sample_time)
-            given = pieces.pieces(x) @ linear
-            moved = creep_moves(given, taus, compliances, run.sample_time)
-            return np.column_stack([crept, moved])
+            static = pieces.pieces(x) @ linear
+            moves = creep_moves(static, taus, compliances, run.sample_time)
+            return np.column_stack([crept, moves])
 
         return data.scored(of)
 
@@ -169,20 +169,20 @@ class CreepPIEstimator(SeparableEstimator):
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Series:
         """Return the series: logarithm, memory, map and creep."""
-        given, result = data.inputs[0], data.outputs[0]
+        input_, output = data.inputs[0], data.outputs[0]
         added, radii, (low, high), (bottom, top) = self.memory(theta, data)
         weights, start = theta[: self.n_operators] / (top - bottom), float(-bottom / (top - bottom))
         rule, reach = self.starting_rule, (float(low), float(high))
         memory = PI(
-            vector(radii), vector(weights), start, reach, initial=rule, input=given, output=result
+            vector(radii), vector(weights), start, reach, initial=rule, input=input_, output=output
         )
         taus, compliances = self.creep(theta)
         settled = offset / (1.0 + compliances.sum())
-        increasing = PolynomialMap(self.map_size).build(linear, settled, 0.0, 1.0, result)
-        parts = (Logarithm(added, given, given), memory, increasing)
+        increasing = PolynomialMap(self.map_size).build(linear, settled, 0.0, 1.0, output)
+        parts = (Logarithm(added, input_, input_), memory, increasing)
         if not taus.size:
             return Series(parts)
-        creep = Creep(vector(compliances), vector(taus), "first_sample", result, result)
+        creep = Creep(vector(compliances), vector(taus), "first_sample", output, output)
         return Series((*parts, creep))
 
 
@@ -200,17 +200,17 @@ def with_creep(
     return crept
 
 
-def creep_moves(given: Array, taus: Array, compliances: Array, step: float | None) -> Array:
+def creep_moves(inputs: Array, taus: Array, compliances: Array, step: float | None) -> Array:
     """Return derivatives of a creeping signal by log time constants, then compliances, (n, 2 k)."""
     from scipy.signal import lfilter
 
     if len(taus) == 0:
-        return np.empty((given.size, 0))
+        return np.empty((inputs.size, 0))
     assert step is not None
     elements, by_time = [], []
     for tau, compliance in zip(taus, compliances, strict=True):
-        crept = with_creep(given[:, np.newaxis], [tau], np.ones(1), step)[:, 0]
-        elements.append(crept - given)
-        late = compliance * step / tau * (elements[-1] - given)
+        crept = with_creep(inputs[:, np.newaxis], [tau], np.ones(1), step)[:, 0]
+        elements.append(crept - inputs)
+        late = compliance * step / tau * (elements[-1] - inputs)
         by_time.append(np.asarray(lfilter([1.0], [1.0, -np.exp(-step / tau)], late)))
     return np.column_stack([*by_time, *elements])

@@ -114,8 +114,8 @@ class GPIEstimator(SeparableEstimator):
         most = 1.0 + 2.0 * largest / max(data.output_span, 1e-12)
         heights = np.empty((1, 0)) if self.fits_offset else most * HEIGHTS
         end = 2.0 * most * np.ones(heights.shape[1])
-        tried = product(heights, guesses, (0.0, 0.1))
-        starts = [np.hstack([shape, gap, height]) for height, shape, gap in tried]
+        trials = product(heights, guesses, (0.0, 0.1))
+        starts = [np.hstack([shape, gap, height]) for height, shape, gap in trials]
         return np.hstack([lower, 0.0, -end]), np.hstack([upper, 1.0, end]), starts, envelopes
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:

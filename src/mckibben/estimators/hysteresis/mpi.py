@@ -215,10 +215,10 @@ class MPIEstimator(SeparableEstimator):
             total = columns[:, : weights.size] @ weights
             return columns[np.argmin(total)], columns[np.argmax(total)]
         radii, by_rate = self.radii(theta, data), (0, self.n_operators * self.rate_dependent)
-        held = [end - radii for end in data.input_range]
+        ends_reached = [end - radii for end in data.input_range]
         if self.starting_rule != "first_sample":
-            held = [np.clip(0.0, end - radii, end + radii) for end in data.input_range]
-        low, high = (np.pad(values, by_rate) for values in held)
+            ends_reached = [np.clip(0.0, end - radii, end + radii) for end in data.input_range]
+        low, high = (np.pad(values, by_rate) for values in ends_reached)
         return low, high
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
@@ -257,8 +257,8 @@ class MPIEstimator(SeparableEstimator):
         lowest, highest = self._ends(theta, columns, data)
         low, high = self.level(theta, data)
         x = (operators @ weights - low) / (high - low)
-        moved = (columns - lowest - np.outer(x, highest - lowest)) / (high - low)
-        return np.asarray((self.map.slopes(x) @ linear)[:, np.newaxis] * moved)
+        moves = (columns - lowest - np.outer(x, highest - lowest)) / (high - low)
+        return np.asarray((self.map.slopes(x) @ linear)[:, np.newaxis] * moves)
 
     def lower_bounds(self, matrix: Array, data: TrainingData) -> Array:
         """Return a small lower bound of every piece, so that the map increases."""

@@ -69,8 +69,8 @@ class FreePolynomialMap(PolynomialMap):
 
 def centred(powers: Array) -> Array:
     """Return a polynomial of an argument from 0 to 1 in powers of one from -1 to 1."""
-    found = np.polynomial.Polynomial(powers)(np.polynomial.Polynomial([0.5, 0.5])).coef
-    return np.pad(found, (0, powers.size - found.size))
+    coefficients = np.polynomial.Polynomial(powers)(np.polynomial.Polynomial([0.5, 0.5])).coef
+    return np.pad(coefficients, (0, powers.size - coefficients.size))
 
 
 @lru_cache

@@ -51,8 +51,8 @@ class PreisachEstimator(SeparableEstimator):
         block = Preisach if self.relays == "sudden" else KrasnoselskiiPokrovskii
         levels = vector(np.linspace(*data.input_range, self.n_levels + 1))
         n = self.n_levels * (self.n_levels + 1) // 2
-        own: dict[str, Any] = {"initial": self.starting_rule} | self.channels(data)
-        return block(levels, (0.0,) * n, 0.0, **own)
+        keywords: dict[str, Any] = {"initial": self.starting_rule} | self.channels(data)
+        return block(levels, (0.0,) * n, 0.0, **keywords)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the output of every cell separately, over the run."""

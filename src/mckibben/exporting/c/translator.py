@@ -21,7 +21,7 @@ from mckibben.exporting.c.language import BOOL, FUNCTIONS, INT, REAL, TYPES, Sou
 from mckibben.exporting.naming import TAKEN, commented
 from mckibben.exporting.templating import literal, wrapped
 
-LEAST, MOST = 1e-6, 3.4e38
+SMALLEST_CONSTANT, LARGEST_CONSTANT = 1e-6, 3.4e38
 """Range of the sizes of constants that are the same in both precisions."""
 
 ATOM, UNARY, TIMES, PLUS, RELATION, EQUAL, AND, OR, CHOICE = 15, 13, 12, 11, 9, 8, 5, 4, 3
@@ -32,10 +32,10 @@ ARITHMETIC: dict[type[ast.AST], str] = dict(zip(_BINARY, "+-*//%", strict=True))
 _COMPARED = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 COMPARISON = dict(zip(_COMPARED, ("<", "<=", ">", ">=", "==", "!="), strict=True))
 
-WHOLE = 32767
+LARGEST_INTEGER = 32767
 """Largest integer literal: it fits into an `int` of C and is exact in single precision."""
 
-FITTING = {INT: "take int(...) of it", BOOL: "compare it"}
+CONVERSIONS = {INT: "take int(...) of it", BOOL: "compare it"}
 """Replacements for numbers that a type cannot represent."""
 
 
@@ -628,7 +628,7 @@ class _Translator:
         value = self.value(node)
         if _widest(value.type, kind) != kind:
             what = f"{ast.unparse(node)!r}, of type {value.type}, for {kind}"
-            raise self.refusal(node, what, FITTING[kind])
+            raise self.refusal(node, what, CONVERSIONS[kind])
         return value.to(kind)
 
     def _name(self, node: ast.Name) -> Value:
@@ -657,11 +657,16 @@ class _Translator:
     def _written(self, number: int | float, node: ast.AST) -> Value:
         """Return a literal in C; raise an error if `int` or single precision cannot represent it."""
         if not isinstance(number, float):
-            if abs(number) > WHOLE:
+            if abs(number) > LARGEST_INTEGER:
                 raise self.refusal(node, f"the whole number {number}", f"write {number}.0")
             return Value(str(int(number)), ATOM, BOOL if isinstance(number, bool) else INT)
         is_literal = self.translation.single or isinstance(node, ast.Constant)
-        if is_literal and number and math.isfinite(number) and not LEAST < abs(number) < MOST:
+        if (
+            is_literal
+            and number
+            and math.isfinite(number)
+            and not SMALLEST_CONSTANT < abs(number) < LARGEST_CONSTANT
+        ):
             what = f"the number {number!r}, which single precision has no room for, or rounds away"
             raise self.refusal(node, what, "name it, and add it to the table SINGLE of the module")
         text = literal(number, single=self.translation.single)
@@ -746,10 +751,10 @@ class _Translator:
             return node.elts
         if not isinstance(node, ast.Name) or node.id in self.types:
             return None
-        kernel = self.bound.get(node.id, self.source.globals.get(node.id))
+        meaning = self.bound.get(node.id, self.source.globals.get(node.id))
         arrays = self.arrays.get(node.id)
         return (
-            arrays if isinstance(arrays, list) else kernel if hasattr(kernel, "py_func") else None
+            arrays if isinstance(arrays, list) else meaning if hasattr(meaning, "py_func") else None
         )
 
     def _call(self, node: ast.Call, pointers: Sequence[str] = ()) -> Value:

@@ -47,7 +47,7 @@ RANGE = 5.0
 SAME_FORCE = 0.03
 """Share of the forces' range below which forces of runs are one."""
 
-SLOW = 0.25
+SLOWEST_SHARE = 0.25
 """Highest frequency of a slow cycle, relative to the median of all."""
 
 CYCLES = 8
@@ -117,7 +117,7 @@ def recognised(runs: Sequence[Features]) -> list[Labels]:
     periodic = [run.regular("pressure") for run in runs]
     frequencies = [float(f"{run.frequency('pressure'):.2g}") for run in runs]
     of_periodic = [f for f, regular in zip(frequencies, periodic, strict=True) if regular]
-    slow = SLOW * float(np.median(of_periodic or [0.0]))
+    slow = SLOWEST_SHARE * float(np.median(of_periodic or [0.0]))
     of_sines = sorted({f for f in of_periodic if f >= slow})
 
     result: list[Labels] = []

@@ -112,7 +112,7 @@ def points(model: ActivationPressure, force: float) -> tuple[Array, Array]:
     return contractions, pressures
 
 
-def _percent_rmse(
+def _percent(
     model: ActivationPressure, condition: tuple[float, float, str], run: Recording
 ) -> float:
     """Return the RMSE of the paper's model over a sine of a frequency, in percent of its range."""
@@ -195,7 +195,7 @@ def _rates(study: Study) -> None:
         scale = float(np.polyval(model.gamma, middle))
         gamma = np.polyval(model.gamma, frequencies) / scale
         phi = scale * np.polyval(model.phi, forces)
-        errors = [_percent_rmse(model, *sine) for sine in study.sines.items()]
+        errors = [_percent(model, *sine) for sine in study.sines.items()]
         columns.append(
             [model.gamma[0] / scale, *gamma.tolist(), *phi.tolist(), rms(np.array(errors))]
         )
@@ -275,7 +275,7 @@ def _loops(study: Study) -> None:
     """Add loops of sines and random waves, and their extracted hysteresis."""
     for key, recordings in (("sines", study.sines), ("waves", study.waves)):
         panels: dict[str, Curves] = {}
-        for condition in _sample_conditions([*recordings]):
+        for condition in _sample([*recordings]):
             run = recordings[condition]
             pressures = {run.origin: run["pressure"]} | modelled(study, run, condition[1])
             part = _last_periods(run, condition[1], SHOWN[key])
@@ -303,9 +303,7 @@ def _last_periods(recording: Recording, frequency: float, periods: float) -> sli
     return slice(max(len(recording) - round(periods / frequency / recording.step) - 1, 0), None)
 
 
-def _sample_conditions(
-    conditions: Sequence[tuple[float, float, str]],
-) -> list[tuple[float, float, str]]:
+def _sample(conditions: Sequence[tuple[float, float, str]]) -> list[tuple[float, float, str]]:
     """Return up to four conditions: weak and strong forces, low and high frequencies."""
     forces, frequencies = (sorted({condition[i] for condition in conditions}) for i in (0, 1))
     indices = product(

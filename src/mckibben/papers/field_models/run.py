@@ -183,10 +183,10 @@ def _error_tables(experiment: Experiment, results: Mapping[str, MethodResult]) -
 
 
 def _parameter_tables(
-    experiment: Experiment, results: Mapping[str, MethodResult], step: float
+    experiment: Experiment, fits: Mapping[str, MethodResult], step: float
 ) -> None:
     """Add Table 1, and the parameters of P2UZ, Box-Jenkins and PI with the printed ones."""
-    models = {name: result.models for name, result in results.items() if result.models is not None}
+    models = {name: result.models for name, result in fits.items() if result.models is not None}
     match: dict[str, Any] = {name: pair[1].parts[1] for name, pair in models.items()}
     plain = {name: pair[0] for name, pair in models.items()}
     lines = {name: [line.gain, line.offset] for name, line in match.items()}

@@ -196,10 +196,10 @@ def _output_errors(experiment: Experiment, name: str, runs: Sequence[Recording])
 def _sets(experiment: Experiment, runs: Runs) -> None:
     """Add the errors on test runs: all pressures random at once, and along the patterns."""
     names = [name for name in PREDICTING if name in experiment.models]
-    held = runs.select("validation", stage="joint") or runs.select("validation")
+    validation_ = runs.select("validation", stage="joint") or runs.select("validation")
     best = min(
         (OURS, BALANCE),
-        key=lambda n: rms(_output_errors(experiment, n, held or runs.select("train"))),
+        key=lambda n: rms(_output_errors(experiment, n, validation_ or runs.select("train"))),
     )
     for kind, labels in SETS.items():
         test, validation = (runs.select(role, **labels) for role in ("test", "validation"))
@@ -232,7 +232,7 @@ def _sets(experiment: Experiment, runs: Runs) -> None:
         facts["other"] = size[BALANCE if best == OURS else OURS]
         facts["all"] = ", ".join(f"{name} {value:.2f} mm" for name, value in size.items())
         facts |= {"failing": ", ".join(failing)} if failing else {}
-        experiment.add_facts(best=best, on="validation" if held else "training")
+        experiment.add_facts(best=best, on="validation" if validation_ else "training")
         experiment.add_facts(**{f"{kind}_{name}": value for name, value in facts.items()})
 
 

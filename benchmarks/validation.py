@@ -139,7 +139,7 @@ def responded(module: Any, pressure: Array, load: Array) -> Array:
     loads = np.repeat(load, fine)[:, np.newaxis] if module.BENCH.loads else np.zeros((0, 0))
     times = np.arange(fine * pressure.size) / fine
     steps = np.interp(times, np.arange(pressure.size), pressure)
-    return np.asarray(module.respond(steps[:, np.newaxis], loads)[::fine, 0])
+    return np.asarray(module.move(steps[:, np.newaxis], loads).answered()[::fine, 0])
 
 
 def faults(seeds: int) -> None:

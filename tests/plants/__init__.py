@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from functools import partial
 
-from tests.plants.plant import Bench, Fact, Plant, Respond, drawn
+from tests.plants.plant import Bench, Fact, Motion, Plant, drawn
 
-__all__ = ["DEVELOP", "PLANTS", "SEALED", "Bench", "Fact", "Plant", "Respond"]
+__all__ = ["DEVELOP", "PLANTS", "SEALED", "Bench", "Fact", "Motion", "Plant"]
 
 DEVELOP = ("lugre_muscle", "antagonistic_joint", "continuum_section", "soft_finger")
 SEALED = (

@@ -19,6 +19,7 @@ q:
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
@@ -26,7 +27,7 @@ from scipy.optimize import brentq
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Record, Runs, numbered
+from tests.plants.plant import Bench, Fact, Motion, Record, Runs, after, numbered
 
 BENCH = Bench(
     numbered("pressure", 2), ("torque",), ("angle",), 0.02, high=6.0, noise=(0.003, 0.001)
@@ -73,13 +74,12 @@ def _dry(speed: float) -> float:
 
 
 @deferred
-def _run(commands: Array, payloads: Array, step: float, substeps: int) -> Array:
+def _run(commands: Array, payloads: Array, step: float, substeps: int) -> Iterator[float]:
     angle = speed = 0.0
     first, second = commands[0, 0] * BAR, commands[0, 1] * BAR
     dt = step / substeps
-    outputs = np.empty(len(commands))
     for k in range(len(commands)):
-        outputs[k] = angle
+        yield angle
         following = min(k + 1, len(commands) - 1)
         ahead = commands[following] - commands[k]
         for j in range(substeps):
@@ -94,14 +94,13 @@ def _run(commands: Array, payloads: Array, step: float, substeps: int) -> Array:
             kept = max(abs(free) - dt * _dry(free) / INERTIA, 0.0)
             speed = math.copysign(kept, free)
             angle += dt * speed
-    return outputs
 
 
-def respond(pressures: Array, loads: Array) -> Array:
+def move(pressures: Array, loads: Array) -> Motion:
     """Return angles [rad], shape (n, 1), at two pressures [bar] and a payload's torque [N m]."""
     commands, lead = motions.from_empty(BENCH.allowed(pressures), BENCH.sample_time)
     payloads = np.append(np.linspace(0.0, loads[0, 0], lead), loads[:, 0])
-    return _run(commands, payloads, BENCH.sample_time, SUBSTEPS)[lead:, None]
+    return after(lead, commands, _run(commands, payloads, BENCH.sample_time, SUBSTEPS))
 
 
 def facts() -> dict[str, Fact]:

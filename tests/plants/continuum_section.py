@@ -15,6 +15,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
@@ -23,7 +24,7 @@ from mckibben import Recording
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Record, Runs, numbered
+from tests.plants.plant import Bench, Fact, Motion, Record, Runs, numbered
 
 BENCH = Bench(
     numbered("pressure", 3),
@@ -59,9 +60,8 @@ def _tip(lengths: Array) -> tuple[float, float]:
 
 
 @deferred
-def _tips(command: Array, step: float, substeps: int) -> Array:
-    """Return the tip at every sample [mm], shape (n, 2), from pressures [bar], shape (n, 3)."""
-    tips = np.empty((command.shape[0], 2))
+def _tips(command: Array, step: float, substeps: int) -> Iterator[tuple[float, float]]:
+    """Yield the tip at every sample [mm] from pressures [bar], shape (n, 3)."""
     dt = step / substeps
     pressure, longer, moved = np.zeros(3), np.zeros(3), np.zeros(3)
     bristles = np.zeros((3, SPRINGS.size))
@@ -82,13 +82,13 @@ def _tips(command: Array, step: float, substeps: int) -> Array:
                 for j in range(SPRINGS.size):
                     stretched = bristles[m, j] + moved[m]
                     bristles[m, j] = min(max(stretched, -SLIDING[j]), SLIDING[j])
-        tips[i, 0], tips[i, 1] = _tip(LENGTH + longer)
-    return tips
+        yield _tip(LENGTH + longer)
 
 
-def respond(commands: Array, loads: Array) -> Array:
+def move(pressures: Array, loads: Array) -> Motion:
     """Return the tip's x and y [mm], shape (n, 2), of a section that begins vented; it has no loads."""
-    return _tips(BENCH.allowed(commands), BENCH.sample_time, SUBSTEPS)
+    commands = BENCH.allowed(pressures)
+    return Motion(commands, _tips(commands, BENCH.sample_time, SUBSTEPS))
 
 
 def facts() -> dict[str, Fact]:

@@ -21,6 +21,7 @@ Equations, in SI units and with the contraction x of the braid within, which is 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
@@ -29,7 +30,7 @@ from mckibben import Recording
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Record, Runs, one_muscle
+from tests.plants.plant import Bench, Fact, Motion, Record, Runs, after, one_muscle
 
 BENCH = Bench(
     ("pressure",), ("length",), ("force",), 0.02, high=6.0, noise=(0.002, 0.4), load=240.0
@@ -99,18 +100,18 @@ def _clamped(lengths: Array) -> Array:
 
 
 @deferred
-def _run(pressures: Array, lengths: Array, step: float, substeps: int) -> Array:
+def _run(commands: Array, lengths: Array, step: float, substeps: int) -> Iterator[float]:
     x, f = LENGTH - lengths[0], 0.0
     q = 0.0
     h = step / substeps
-    outputs = np.empty(pressures.size)
-    for k in range(pressures.size):
-        outputs[k] = _tension(x, q, lengths[k])
-        following = min(k + 1, pressures.size - 1)
-        faster = (pressures[following] - pressures[k]) / substeps
+    for k in range(commands.size):
+        yield _tension(x, q, lengths[k])
+        following = min(k + 1, commands.size - 1)
+        pressure = BAR * commands[k]
+        faster = (BAR * commands[following] - pressure) / substeps
         longer = (lengths[following] - lengths[k]) / substeps
         for j in range(substeps):  # Runge and Kutta's steps
-            p, at = pressures[k] + j * faster, lengths[k] + j * longer
+            p, at = pressure + j * faster, lengths[k] + j * longer
             x1, f1, q1 = _rates(x, f, q, p, at)
             p, at = p + 0.5 * faster, at + 0.5 * longer
             x2, f2, q2 = _rates(x + 0.5 * h * x1, f + 0.5 * h * f1, q + 0.5 * h * q1, p, at)
@@ -122,15 +123,13 @@ def _run(pressures: Array, lengths: Array, step: float, substeps: int) -> Array:
             most = _limit(p, x)  # which can fall beneath the friction
             f += h / 6.0 * (f1 + 2.0 * f2 + 2.0 * f3 + f4)
             f = min(max(f, -most), most)
-    return outputs
 
 
-def respond(pressures: Array, loads: Array) -> Array:
+def move(pressures: Array, loads: Array) -> Motion:
     """Return forces [N], shape (n, 1), at pressures [bar] and lengths between the clamps [mm]."""
     commands, lead = motions.from_empty(BENCH.allowed(pressures), BENCH.sample_time)
     lengths = 1e-3 * _clamped(np.append(np.full(lead, loads[0, 0]), loads[:, 0]))
-    forces = _run(BAR * commands[:, 0], lengths, BENCH.sample_time, SUBSTEPS)
-    return forces[lead:, None]
+    return after(lead, commands, _run(commands[:, 0], lengths, BENCH.sample_time, SUBSTEPS))
 
 
 def facts() -> dict[str, Fact]:

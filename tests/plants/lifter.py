@@ -13,13 +13,14 @@
   (1980).
 - Regulator: a lag of first order.
 
-The session of ten minutes is one simulation, of which some stretches are recorded. `respond` begins at
+The session of ten minutes is one simulation, of which some stretches are recorded. `move` begins at
 switch-on, as training does.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
@@ -27,7 +28,7 @@ from scipy.optimize import brentq
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Record, Runs, one_muscle
+from tests.plants.plant import Bench, Fact, Motion, Record, Runs, one_muscle
 
 BENCH = Bench(
     ("pressure",), ("force",), ("displacement",), 0.01, high=5.0, noise=(0.0025, 0.02), load=30.0
@@ -65,9 +66,8 @@ def _elastic(lift: float) -> float:
 
 
 @deferred
-def _lifts(command: Array, weight: Array, step: float, substeps: int) -> Array:
-    """Return the lift at every sample [mm], from pressures [bar] and weights [N]."""
-    lifts = np.empty(command.size)
+def _lifts(command: Array, weight: Array, step: float, substeps: int) -> Iterator[float]:
+    """Yield the lift at every sample [mm], from pressures [bar] and weights [N]."""
     dt = step / substeps
     fading = np.exp(-dt / TIMES)
     crept = np.zeros(TIMES.size)
@@ -91,14 +91,13 @@ def _lifts(command: Array, weight: Array, step: float, substeps: int) -> Array:
             velocity += dt / mass * (net - friction - DAMPING * velocity - load)
             lift += dt * velocity
         if i >= 0:
-            lifts[i] = 1e3 * lift
-    return lifts
+            yield 1e3 * lift
 
 
-def respond(commands: Array, loads: Array) -> Array:
+def move(pressures: Array, loads: Array) -> Motion:
     """Return lifts [mm], shape (n, 1), from switch-on, from pressures [bar] and weights [N]."""
-    command, weight = BENCH.allowed(commands[:, 0]), np.ascontiguousarray(loads[:, 0])
-    return _lifts(command, weight, BENCH.sample_time, SUBSTEPS)[:, None]
+    commands, weight = BENCH.allowed(pressures[:, :1]), np.ascontiguousarray(loads[:, 0])
+    return Motion(commands, _lifts(commands[:, 0], weight, BENCH.sample_time, SUBSTEPS))
 
 
 def facts() -> dict[str, Fact]:

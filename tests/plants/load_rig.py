@@ -17,6 +17,7 @@ Equations, in SI units and with the contraction x (the weight's rise) and the st
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,7 +26,7 @@ from mckibben import Recording
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Record, Runs, one_muscle
+from tests.plants.plant import Bench, Fact, Motion, Record, Runs, after, one_muscle
 
 BENCH = Bench(
     ("pressure",), ("force",), ("displacement",), 0.01, high=6.0, noise=(0.002, 0.04), load=60.0
@@ -57,14 +58,13 @@ def _pull(pressure: float, x: float) -> float:
 
 
 @deferred
-def _run(commands: Array, loads: Array, step: float, substeps: int) -> Array:
+def _run(commands: Array, loads: Array, step: float, substeps: int) -> Iterator[float]:
     x = -loads[0] / STOP
     v = 0.0
     held = np.zeros(LIMITS.size)
     dt = step / substeps
-    outputs = np.empty(commands.size)
     for k in range(commands.size):
-        outputs[k] = x
+        yield 1e3 * x
         following = min(k + 1, commands.size - 1)
         for j in range(substeps):
             part = (j + 1) / substeps
@@ -81,15 +81,13 @@ def _run(commands: Array, loads: Array, step: float, substeps: int) -> Array:
                 force -= held[i]
             v += dt * force / (FITTING + load / GRAVITY)
             x += dt * v
-    return outputs
 
 
-def respond(pressures: Array, loads: Array) -> Array:
+def move(pressures: Array, loads: Array) -> Motion:
     """Return displacements [mm], shape (n, 1), at pressures in the muscle [bar] and weights [N]."""
     commands, lead = motions.from_empty(BENCH.allowed(pressures), BENCH.sample_time)
     weights = np.append(np.full(lead, loads[0, 0]), loads[:, 0])
-    moved = _run(np.ascontiguousarray(commands[:, 0]), weights, BENCH.sample_time, SUBSTEPS)
-    return 1e3 * moved[lead:, None]
+    return after(lead, commands, _run(commands[:, 0], weights, BENCH.sample_time, SUBSTEPS))
 
 
 def facts() -> dict[str, Fact]:

@@ -18,6 +18,7 @@ Equations, in SI units and with the contraction x (the weight's rise):
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,7 +26,7 @@ from scipy.optimize import brentq
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Record, Runs, one_muscle
+from tests.plants.plant import Bench, Fact, Motion, Record, Runs, after, one_muscle
 
 BENCH = Bench(("pressure",), (), ("displacement",), 0.01, high=6.0, noise=(0.002, 0.03))
 SUBSTEPS = 40
@@ -88,16 +89,15 @@ def _orifice(here: float, there: float) -> float:
 
 
 @deferred
-def _run(commands: Array, step: float, substeps: int) -> Array:
+def _run(commands: Array, step: float, substeps: int) -> Iterator[float]:
     mass = WEIGHT / GRAVITY + FITTING
     x = -WEIGHT / STOP
     v = z = 0.0
     q = np.zeros(len(TIMES))
     tube = muscle = commands[0] * BAR + ATMOSPHERE
     dt = step / substeps
-    outputs = np.empty(commands.size)
     for k in range(commands.size):
-        outputs[k] = x
+        yield 1e3 * x
         ahead = commands[min(k + 1, commands.size - 1)] - commands[k]
         for j in range(substeps):
             regulator = (commands[k] + ahead * (j + 1) / substeps) * BAR + ATMOSPHERE
@@ -119,14 +119,12 @@ def _run(commands: Array, step: float, substeps: int) -> Array:
             force -= BRISTLE * z + BRISTLE_DAMPING * (z - before) / dt + VISCOUS * v
             v += dt * force / mass
             x += dt * v
-    return outputs
 
 
-def respond(pressures: Array, loads: Array) -> Array:
+def move(pressures: Array, loads: Array) -> Motion:
     """Return displacements [mm], shape (n, 1), at pressures of the regulator [bar]; no loads."""
     commands, lead = motions.from_empty(BENCH.allowed(pressures), BENCH.sample_time)
-    moved = _run(np.ascontiguousarray(commands[:, 0]), BENCH.sample_time, SUBSTEPS)
-    return 1e3 * moved[lead:, None]
+    return after(lead, commands, _run(commands[:, 0], BENCH.sample_time, SUBSTEPS))
 
 
 def facts() -> dict[str, Fact]:

@@ -16,20 +16,21 @@ It is no muscle: its input is a voltage, the only one of `Bench.pressures`.
   Design, Modeling and Control of Nanopositioning Systems, 2014). What is asked for is recorded.
 - Stage: mass and flexures, lightly damped.
 
-All runs are stretches of one session, in the middle of which others had used it. `respond` begins where
+All runs are stretches of one session, in the middle of which others had used it. `move` begins where
 training does, after what happened before and was not recorded, and leads to the first voltage.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Record, Runs
+from tests.plants.plant import Bench, Fact, Motion, Record, Runs, after
 
 BENCH = Bench(("voltage",), (), ("displacement",), 0.01, high=120.0, noise=(0.03, 0.0002))
 SUBSTEPS = 4
@@ -71,14 +72,13 @@ def _run(
     readily: Array,
     step: float,
     substeps: int,
-) -> Array:
+) -> Iterator[float]:
     domains = np.full(up.size, -1.0)
     voltage = x = v = 0.0
     last = _reversible(0.0)
     dt = step / substeps
-    outputs = np.empty(command.size)
     for k in range(command.size):
-        outputs[k] = x
+        yield x
         ahead = command[min(k + 1, command.size - 1)] - command[k]
         for j in range(substeps):
             asked = command[k] + ahead * (j + 0.5) / substeps
@@ -95,7 +95,6 @@ def _run(
             goal = _reversible(voltage) + SWITCHING * (0.5 + 0.5 * total / up.size)
             x, v = _swung(x, v, last, goal, dt)
             last = goal
-    return outputs
 
 
 @deferred
@@ -123,13 +122,13 @@ def _before(first: float) -> Array:
     return np.concatenate([used, way, np.full(round(1.0 / step), first)])
 
 
-def respond(commands: Array, loads: Array) -> Array:
+def move(pressures: Array, loads: Array) -> Motion:
     """Return displacements [mm], shape (n, 1), at voltages that are asked for [V]; no loads."""
-    asked = BENCH.allowed(commands[:, 0])
+    asked = BENCH.allowed(pressures[:, 0])
     before = _before(float(asked[0]))
-    everything = np.append(before, asked)
-    moved = _run(everything, UP, DOWN, READILY, BENCH.sample_time, SUBSTEPS)
-    return moved[before.size :, None]
+    commands = np.append(before, asked)[:, None]
+    outputs = _run(commands[:, 0], UP, DOWN, READILY, BENCH.sample_time, SUBSTEPS)
+    return after(before.size, commands, outputs)
 
 
 def facts() -> dict[str, Fact]:

@@ -24,10 +24,10 @@ The plants are written from textbook physics alone and know no model of the pack
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -35,12 +35,35 @@ from mckibben import Recording
 from mckibben.arrays import Array
 
 Fact = float | bool | tuple[float, ...]
-Respond = Callable[[Array, Array], Array]
-"""From pressures (n, n_muscles) [bar] and loads (n, n_loads) to outputs (n, n_outputs), noise-free.
+
+
+class Motion(NamedTuple):
+    """A motion of a plant that happens as its outputs are taken, sample by sample, noise-free.
+
+    ``commands`` are those of all samples, shape (n, n_pressures). Each may be written until the output
+    of its sample is taken, so that a loop can be closed.
+    """
+
+    commands: Array
+    outputs: Iterator[Any]
+
+    def answered(self) -> Array:
+        """Return all outputs, shape (n, n_outputs)."""
+        return np.array(list(self.outputs), dtype=np.float64).reshape(len(self.commands), -1)
+
+
+def after(lead: int, commands: Array, outputs: Iterator[Any]) -> Motion:
+    """Return a motion whose lead is over."""
+    for _ in range(lead):
+        next(outputs)
+    return Motion(commands[lead:], outputs)
+
+
+Move = Callable[[Array, Array], Motion]
+"""From pressures (n, n_muscles) [bar] and loads (n, n_loads) to a motion.
 
 How muscles are found is the plant's to say: vented, or filled to the first pressure and left alone.
 """
-
 
 Runs = tuple[tuple[Recording, ...], Mapping[str, tuple[Recording, ...]]]
 """To fit, and to check by kind of motion."""
@@ -80,15 +103,19 @@ class Bench:
 
 @dataclass(frozen=True)
 class Plant:
-    """One virtual plant: ``train`` to fit, ``test`` by kind of motion, ``respond`` as the truth."""
+    """One virtual plant: ``train`` to fit, ``test`` by kind of motion, ``move`` as the truth."""
 
     name: str
     title: str
     bench: Bench
     train: tuple[Recording, ...]
     test: Mapping[str, tuple[Recording, ...]]
-    respond: Respond
+    move: Move
     facts: Mapping[str, Fact]
+
+    def respond(self, pressures: Array, loads: Array) -> Array:
+        """Return the outputs, shape (n, n_outputs), of a motion."""
+        return self.move(pressures, loads).answered()
 
 
 def numbered(name: str, count: int) -> tuple[str, ...]:
@@ -115,7 +142,7 @@ def one_muscle(friction: float, stiffness: float, **others: Fact) -> dict[str, F
 def drawn(name: str, seed: int) -> Plant:
     """Return a plant of this folder with its runs, each drawn anew from ``seed``.
 
-    Its module has ``BENCH``, ``respond``, ``facts()`` and ``runs(rng, record)``.
+    Its module has ``BENCH``, ``move``, ``facts()`` and ``runs(rng, record)``.
     """
     module, rng = import_module(f"tests.plants.{name}"), np.random.default_rng(seed)
     bench: Bench = module.BENCH
@@ -123,7 +150,7 @@ def drawn(name: str, seed: int) -> Plant:
     def record(name: str, pressures: Array, load: float | Array = 0.0) -> Recording:
         pressures = pressures.reshape(len(pressures), -1)
         loads = np.broadcast_to(np.reshape(load, (-1, 1)), (len(pressures), len(bench.loads)))
-        outputs = module.respond(pressures, loads)
+        outputs = module.move(pressures, loads).answered()
         seen, shown = (
             samples + noise * rng.standard_normal(samples.shape)
             for samples, noise in zip((pressures, outputs), bench.noise, strict=True)
@@ -134,4 +161,4 @@ def drawn(name: str, seed: int) -> Plant:
 
     train, test = module.runs(rng, record)
     title = (module.__doc__ or "").partition(".\n")[0]
-    return Plant(name, title, bench, train, test, module.respond, module.facts())
+    return Plant(name, title, bench, train, test, module.move, module.facts())

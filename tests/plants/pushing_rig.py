@@ -20,6 +20,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
@@ -28,7 +29,7 @@ from mckibben import Recording
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Record, Runs, one_muscle
+from tests.plants.plant import Bench, Fact, Motion, Record, Runs, one_muscle
 
 BENCH = Bench(
     ("pressure",), ("force",), ("displacement",), 0.01, high=6.0, noise=(0.003, 0.02), load=70.0
@@ -76,9 +77,8 @@ def _pull(pressure: float, travel: float) -> float:
 
 
 @deferred
-def _travels(command: Array, preload: Array, step: float, substeps: int) -> Array:
-    """Return the travel at every sample [mm], from pressures [bar] and preloads [N]."""
-    travels = np.empty(command.size)
+def _travels(command: Array, preload: Array, step: float, substeps: int) -> Iterator[float]:
+    """Yield the travel at every sample [mm], from pressures [bar] and preloads [N]."""
     dt = step / substeps
     pressure = travel = velocity = relaxed = 0.0
     for i in range(command.size):
@@ -98,14 +98,13 @@ def _travels(command: Array, preload: Array, step: float, substeps: int) -> Arra
             travel += dt * velocity
             if travel < 0.0:  # at the stop
                 travel = velocity = 0.0
-        travels[i] = 1e3 * travel
-    return travels
+        yield 1e3 * travel
 
 
-def respond(commands: Array, loads: Array) -> Array:
+def move(pressures: Array, loads: Array) -> Motion:
     """Return travels [mm], shape (n, 1), from the stop; loads are preloads [N]."""
-    command, preload = BENCH.allowed(commands[:, 0]), np.ascontiguousarray(loads[:, 0])
-    return _travels(command, preload, BENCH.sample_time, SUBSTEPS)[:, None]
+    commands, preload = BENCH.allowed(pressures[:, :1]), np.ascontiguousarray(loads[:, 0])
+    return Motion(commands, _travels(commands[:, 0], preload, BENCH.sample_time, SUBSTEPS))
 
 
 def facts() -> dict[str, Fact]:

@@ -11,13 +11,14 @@
   where the moment that is left exceeds the friction).
 - Wall: a stiff spring on one side (Johnson, Contact Mechanics, 1985).
 
-Where the wall stands is known: the channel ``wall``, and the load of `respond`, is 1 there and else 0.
+Where the wall stands is known: the channel ``wall``, and the load of `move`, is 1 there and else 0.
 Mass is left out: a finger of silicone is overdamped.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,7 +26,7 @@ from scipy.optimize import brentq
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Record, Runs, one_muscle
+from tests.plants.plant import Bench, Fact, Motion, Record, Runs, one_muscle
 
 BENCH = Bench(("pressure",), ("wall",), ("angle",), 0.01, high=2.5, noise=(0.00125, 0.0007))
 SUBSTEPS = 20
@@ -62,9 +63,8 @@ def _spring(angle: float) -> float:
 
 
 @deferred
-def _angles(command: Array, wall: Array, step: float, substeps: int) -> Array:
-    """Return the angle at every sample [rad], from pressures asked for [bar] and the wall's presence."""
-    angles = np.empty(command.size)
+def _angles(command: Array, wall: Array, step: float, substeps: int) -> Iterator[float]:
+    """Yield the angle at every sample [rad], from pressures asked for [bar] and the wall's presence."""
     dt = step / substeps
     pressure, angle, relaxed = AMBIENT, 0.0, 0.0
     for i in range(command.size):
@@ -85,14 +85,13 @@ def _angles(command: Array, wall: Array, step: float, substeps: int) -> Array:
                 angle += dt * (left - FRICTION_FILLING) / DAMPING
             elif left < -FRICTION_VENTING:
                 angle += dt * (left + FRICTION_VENTING) / DAMPING
-        angles[i] = angle
-    return angles
+        yield angle
 
 
-def respond(commands: Array, loads: Array) -> Array:
+def move(pressures: Array, loads: Array) -> Motion:
     """Return angles [rad], shape (n, 1), of a finger that begins vented; loads are the wall."""
-    command, wall = BENCH.allowed(commands[:, 0]), np.ascontiguousarray(loads[:, 0])
-    return _angles(command, wall, BENCH.sample_time, SUBSTEPS)[:, None]
+    commands, wall = BENCH.allowed(pressures[:, :1]), np.ascontiguousarray(loads[:, 0])
+    return Motion(commands, _angles(commands[:, 0], wall, BENCH.sample_time, SUBSTEPS))
 
 
 def facts() -> dict[str, Fact]:

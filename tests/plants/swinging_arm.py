@@ -23,6 +23,7 @@ one that changes.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
@@ -31,7 +32,7 @@ from mckibben import Recording
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Record, Runs, numbered
+from tests.plants.plant import Bench, Fact, Motion, Record, Runs, after, numbered
 
 BENCH = Bench(
     numbered("pressure", 2), ("mass",), ("angle",), 0.01, high=6.0, noise=(0.004, 0.0008), load=1.0
@@ -118,15 +119,14 @@ def _rates(state: Array, pressures: Array, mass: float, rates: Array) -> None:
 
 
 @deferred
-def _run(commands: Array, masses: Array, step: float, substeps: int) -> Array:
+def _run(commands: Array, masses: Array, step: float, substeps: int) -> Iterator[float]:
     state, rates = np.zeros(5), np.zeros((4, 5))
     state[0] = -HANGING
     pressures, flows = commands[0].copy(), np.zeros(2)
     middle = np.empty(2)
     dt = step / substeps
-    outputs = np.empty(len(commands))
     for k in range(len(commands)):
-        outputs[k] = state[0]
+        yield state[0]
         following = min(k + 1, len(commands) - 1)
         for j in range(substeps):
             part = (j + 0.5) / substeps
@@ -144,14 +144,13 @@ def _run(commands: Array, masses: Array, step: float, substeps: int) -> Array:
             _rates(state + 0.5 * dt * rates[1], middle, mass, rates[2])
             _rates(state + dt * rates[2], middle, mass, rates[3])
             state += dt / 6.0 * (rates[0] + 2.0 * rates[1] + 2.0 * rates[2] + rates[3])
-    return outputs
 
 
-def respond(pressures: Array, loads: Array) -> Array:
+def move(pressures: Array, loads: Array) -> Motion:
     """Return angles [rad], shape (n, 1), at two pressures that are asked for [bar] and masses [kg]."""
     commands, lead = motions.from_empty(BENCH.allowed(pressures), BENCH.sample_time)
     masses = np.append(np.full(lead, loads[0, 0]), loads[:, 0])
-    return _run(commands, masses, BENCH.sample_time, SUBSTEPS)[lead:, None]
+    return after(lead, commands, _run(commands, masses, BENCH.sample_time, SUBSTEPS))
 
 
 def facts() -> dict[str, Fact]:

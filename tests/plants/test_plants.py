@@ -84,6 +84,21 @@ def test_runs_are_what_the_plant_answers_but_for_noise(name: str) -> None:
 
 
 @every_plant
+def test_a_loop_closed_by_and_by_is_the_same_motion(name: str) -> None:
+    plant = drawn(name)
+    bench, run = plant.bench, plant.train[0]
+    pressures = bench.allowed(run.matrix(bench.pressures)[:200])
+    loads = np.full((len(pressures), len(bench.loads)), bench.load)
+    motion = plant.move(np.tile(pressures[0], (len(pressures), 1)), loads)
+    outputs = []
+    for k, row in enumerate(pressures):
+        motion.commands[k] = row
+        outputs.append(next(motion.outputs))
+    answered = plant.respond(pressures, loads)
+    assert np.array_equal(np.reshape(outputs, answered.shape), answered)
+
+
+@every_plant
 def test_answers_stay_finite_whatever_is_asked(name: str) -> None:
     assert np.isfinite(answer(name, np.tile([-50.0, 0.0, 50.0, 2.0], 200))).all()
 

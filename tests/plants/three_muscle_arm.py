@@ -18,6 +18,7 @@ Equations, in SI units and with the section's mean contraction c and the tilts A
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,7 +26,7 @@ from scipy.optimize import brentq
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Record, Runs, numbered
+from tests.plants.plant import Bench, Fact, Motion, Record, Runs, after, numbered
 
 BENCH = Bench(
     numbered("pressure", 3), (), numbered("displacement", 3), 0.02, high=6.0, noise=(0.004, 0.05)
@@ -65,14 +66,15 @@ def _limit(pressures: Array, i: int) -> float:
 
 
 @deferred
-def _run(commands: Array, step: float, substeps: int) -> Array:
+def _run(commands: Array, step: float, substeps: int) -> Iterator[tuple[float, float, float]]:
     pose, speed, force, pressures = np.zeros((4, 3))  # the first three of c, A and B
     bristles, relaxed = np.zeros(3), np.zeros((3, len(TIMES)))
     dt = step / substeps
-    outputs = np.empty(commands.shape)
+    moved = np.empty(3)
     for k in range(len(commands)):
         for i in range(3):
-            outputs[k, i] = pose[0] + RADIUS * (pose[1] * ACROSS[i] + pose[2] * ALONG[i])
+            moved[i] = pose[0] + RADIUS * (pose[1] * ACROSS[i] + pose[2] * ALONG[i])
+        yield 1e3 * moved[0], 1e3 * moved[1], 1e3 * moved[2]
         following = min(k + 1, len(commands) - 1)
         for j in range(substeps):
             tilt = pose[1] ** 2 + pose[2] ** 2
@@ -102,13 +104,12 @@ def _run(commands: Array, step: float, substeps: int) -> Array:
             for i in range(3):
                 speed[i] += dt * force[i] / (TIP if i == 0 else TURNING)
                 pose[i] += dt * speed[i]
-    return outputs
 
 
-def respond(pressures: Array, loads: Array) -> Array:
+def move(pressures: Array, loads: Array) -> Motion:
     """Return contractions [mm], shape (n, 3), at three pressures [bar]; no loads."""
     commands, lead = motions.from_empty(BENCH.allowed(pressures), BENCH.sample_time)
-    return 1e3 * _run(commands, BENCH.sample_time, SUBSTEPS)[lead:]
+    return after(lead, commands, _run(commands, BENCH.sample_time, SUBSTEPS))
 
 
 def facts() -> dict[str, Fact]:

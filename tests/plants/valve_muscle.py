@@ -23,6 +23,7 @@ Equations, in SI units and with the contraction x (the sledge's travel):
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
@@ -30,7 +31,7 @@ from scipy.optimize import brentq
 from mckibben.arrays import Array
 from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Record, Runs, one_muscle
+from tests.plants.plant import Bench, Fact, Motion, Record, Runs, after, one_muscle
 
 BENCH = Bench(("pressure",), (), ("displacement",), 0.01, high=6.0, noise=(0.002, 0.03))
 SUBSTEPS = 40
@@ -99,15 +100,14 @@ def _between(here: float, there: float, here_warm: float, there_warm: float, are
 
 
 @deferred
-def _run(commands: Array, step: float, substeps: int) -> Array:
+def _run(commands: Array, step: float, substeps: int) -> Iterator[float]:
     x = -PRELOAD / STOP
     v = spool = creep = 0.0
     held, slips = np.zeros(SHARES.size), np.zeros(SHARES.size)
     pressure, mass, wall = AMBIENT, AMBIENT * _volume(x) / (GAS * ROOM), ROOM
     dt = step / substeps
-    outputs = np.empty(commands.size)
     for k in range(commands.size):
-        outputs[k] = x
+        yield 1e3 * x
         ahead = commands[min(k + 1, commands.size - 1)] - commands[k]
         for j in range(substeps):
             goal = (commands[k] + ahead * (j + 0.5) / substeps) * BAR + AMBIENT
@@ -157,14 +157,12 @@ def _run(commands: Array, step: float, substeps: int) -> Array:
             pressure -= dt * GAMMA * pressure * swelling / volume
             mass += dt * (entering - leaving)
             wall += dt / HEAT * (heating + friction * v + slower * flowing - LOSS * (wall - ROOM))
-    return outputs
 
 
-def respond(pressures: Array, loads: Array) -> Array:
+def move(pressures: Array, loads: Array) -> Motion:
     """Return displacements [mm], shape (n, 1), at pressures that are asked for [bar]; no loads."""
     commands, lead = motions.from_empty(BENCH.allowed(pressures), BENCH.sample_time)
-    moved = _run(np.ascontiguousarray(commands[:, 0]), BENCH.sample_time, SUBSTEPS)
-    return 1e3 * moved[lead:, None]
+    return after(lead, commands, _run(commands[:, 0], BENCH.sample_time, SUBSTEPS))
 
 
 def facts() -> dict[str, Fact]:

@@ -29,8 +29,8 @@ Cost of one step in single precision on an Arm Cortex-M4F (`gcc -O2`) emulated b
 counts are exact and repeatable; the number of cycles on a chip is somewhat larger. Each model is its
 documentation example unless stated otherwise, run on about 200 samples with minor loops and holds.
 
-- *Median* and *max* are the instructions of a step, *first* those of the first one, which also initializes
-  the memory.
+- *Median* and *max* are the instructions of a step, *first* those of the first one, which also
+  initializes the memory.
 - *RAM* is the memory of one model in bytes. *Stack* is the maximum, including the C library. *Flash* is
   code and constants, without functions of the C library such as `exp`.
 - *Error* is the largest difference from Python in double precision, relative to the output range.

@@ -9,7 +9,7 @@ from mckibben.blocks.compose import Parallel
 from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.control import Twin, track
+from mckibben.control import Twin, control_law, track, tune_pid
 from mckibben.papers.paper import printed
 from tests.cli.conftest import cli as cli  # a fixture
 
@@ -41,3 +41,16 @@ def test_feedforward_gives_the_force_exactly_where_the_model_is_the_plant() -> N
     blind = track(ForceFeedforward(LAW), STAND, reference(), approach=2.0, pressure_loop=False)
     assert blind.rmse["force"] > 30.0
     assert ForceFeedforward.of(PI.example()) is None
+
+
+def test_pid_follows_a_force_where_nothing_moves() -> None:
+    stand = Twin(MODEL, limits={"pressure": (-9.0, 9.0)}, sample_time=0.02, held={"length": 194.0})
+    ahead, law_alone = ForceFeedforward.of(MODEL), ForceFeedforward(LAW)
+    assert ahead is not None
+    pid = tune_pid(stand, sample_time=0.02, hold=2.0, references=ahead.inputs[:1])
+    assert pid.driven[0].name == "force"
+    alone, corrected = (
+        track(law, STAND, reference(), approach=2.0, pressure_loop=False).rmse["force"]
+        for law in (law_alone, control_law("feedforward-pid", law_alone, lambda: pid))
+    )
+    assert corrected < 0.2 * alone

@@ -200,7 +200,7 @@ def fill_points(motion: Json) -> None:
 def parse_points(text: str) -> Points:
     """Return points from a text, such as ``0 5; 2 10; 4 5``: times [s] and values.
 
-    >>> drawn("0 5; 2 10")
+    >>> parse_points("0 5; 2 10")
     [(0.0, 5.0), (2.0, 10.0)]
     """
     try:

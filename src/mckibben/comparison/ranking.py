@@ -389,7 +389,11 @@ class _Work:
         remaining = sum(self.efforts[name] for name in waiting)
         finished = sum(self.efforts.values()) - remaining
         spent = time.monotonic() - self.started
-        pace = spent / finished if finished > FORECAST_SHARE * (finished + remaining) else 1 / self.workers
+        pace = (
+            spent / finished
+            if finished > FORECAST_SHARE * (finished + remaining)
+            else 1 / self.workers
+        )
         self.progress(
             Standing(
                 done=len(self.table.rows),

@@ -74,7 +74,7 @@ def tune_pid(
     Raises
     ------
     ModelError
-        If nothing moves with a muscle's own pressure, or the rig imposes its length.
+        If neither a motion nor, where the length is imposed, the force answers a muscle's own pressure.
     """
     scheduled = scheduled or {}
     measured = untuned_pid(plant, scheduled).driven
@@ -137,7 +137,7 @@ def untuned_pid(
     Raises
     ------
     ModelError
-        If a pressure has no motion of its own.
+        If a pressure has neither a motion nor a force of its own.
     """
     driven = driven_inputs(plant, scheduled)
     followed = [_moved_by(name, plant, driven) for name in driven]
@@ -160,14 +160,19 @@ def untuned_pid(
 
 
 def _moved_by(name: str, rig: Plant, driven: Sequence[str]) -> str:
-    """Return the motion driven by an input of a plant: that of the same number, or the only one."""
+    """Return what an input of a plant drives: the motion of the same number, or the only one.
+
+    Where nothing moves, that is the force.
+    """
     suffix = name[name.find("_") :] if "_" in name else ""
     motions = [stem + suffix for stem in MOVED if stem + suffix in rig.outputs]
     if len(driven) == 1 and not motions and isinstance(rig, Twin):
         motions = [output for output in rig.outputs if not output.startswith((*COMMANDS, "force"))]
+    if not motions and not any(output.startswith(MOVED) for output in rig.outputs):
+        motions = [output for output in rig.outputs if output == f"force{suffix}"]
     if len(motions) != 1:
         raise ModelError(
-            "PID follows a displacement or an angle for every pressure or voltage, each "
+            "PID follows a displacement, an angle or a force for every pressure or voltage, each "
             f"moved by its own; {rig.name} is driven by {', '.join(driven)} and gives "
             f"{', '.join(rig.outputs)}",
             remedy="use the compensator alone, or another rig",

@@ -150,7 +150,9 @@ def settings_of_all(
             raise ModelError(
                 f"{', '.join(estimators)} has no such setting",
                 parameter=key,
-                remedy=next(filter(None, hints), f"give one, or MODEL.NAME, of {', '.join(all_names)}"),
+                remedy=next(
+                    filter(None, hints), f"give one, or MODEL.NAME, of {', '.join(all_names)}"
+                ),
             )
         for model in takers:
             result[model][name] = value

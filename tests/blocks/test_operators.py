@@ -6,10 +6,11 @@ The laws that they share are in `tests.contracts.test_memory`.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -18,7 +19,16 @@ from mckibben.blocks.hysteresis.eupi import eupi_matrix
 from mckibben.blocks.hysteresis.maxwell_slip import slip_matrix
 from mckibben.blocks.hysteresis.play_operators import play_matrix
 from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach
-from tests.blocks.strategies import LOW, eupi_models, gpi_models, numbers, paths
+from tests.blocks.strategies import (
+    HIGH,
+    LOW,
+    eupi_models,
+    gpi_models,
+    numbers,
+    paths,
+    pi_models,
+    preisach_models,
+)
 
 Array = NDArray[np.float64]
 
@@ -68,6 +78,22 @@ def test_unparallel_operators_side_by_side_are_the_model(model: EUPI, u: Array) 
 
 
 @pytest.mark.kernel
+@pytest.mark.parametrize("models", [pi_models, gpi_models, eupi_models, preisach_models])
+@settings(max_examples=300)
+@given(data=st.data())
+def test_the_lowest_input_leads_to_what_is_reachable_after_any_peak(
+    models: Any, data: st.DataObject
+) -> None:
+    model = data.draw(models())
+    low, high = (float(end[0]) for end in model.reachable())
+    swings = np.full(61, LOW)
+    swings[1::2] = np.linspace(LOW, HIGH, 30)  # a higher peak wipes out those before
+    outputs = model.simulate(swings, initial="first_sample")
+    rounding = 1e-9 * (1.0 + np.abs(outputs).max())
+    assert outputs[::2].max() <= low + rounding
+    assert outputs[-2] >= high - rounding
+
+
 def test_springs_side_by_side_are_each_alone() -> None:
     u, limits = np.random.default_rng(0).uniform(0.0, 5.0, 300), np.array([0.2, 0.9, 2.0])
     stiffness, ratio = 1.3, 0.7

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
-from mckibben.rigs import load_rig
+import numpy as np
+import pytest
+
+from mckibben import read
+from mckibben.rigs import load_rig, rig_names
+from mckibben.studying.rig_runs import at_first_commands, commands
 from tests.cli.conftest import Cli
 from tests.refusals import mentions
 
@@ -28,6 +34,49 @@ def test_run_takes_commands_from_a_recording_and_reports_saturation(
     assert result.code == 0, result.err
     assert json.loads(result.out)["saturated"] == {"pressure": 79}
     assert mentions(result.err, (79, 200))
+
+
+@pytest.mark.parametrize("name", rig_names())
+def test_a_signal_covers_by_default_the_range_of_the_channel_that_it_drives(name: str) -> None:
+    rig = load_rig(name)
+    for channel in rig.inputs:
+        limits = rig.limits(channel)
+        for signal in ("triangle:period=2", "random-wave:max-frequency=1", "binary-steps"):
+            samples = commands(rig, [f"{channel}={signal}"], 8.0, 50.0, 0)[channel]
+            assert samples.min() == pytest.approx(limits.low)
+            assert samples.max() == pytest.approx(limits.high)
+
+
+@pytest.mark.parametrize(
+    ("flags", "changes", "rate", "seed", "ideal"),
+    [
+        ((), {}, None, 0, False),
+        (("--seed", 3), {}, None, 3, False),
+        (("--ideal",), {}, None, 0, True),
+        (("--rate", 50), {}, 50.0, 0, False),
+        (("--set", "payload=12", "--seed", 4), {"payload": 12.0}, None, 4, False),
+    ],
+)
+def test_run_writes_what_the_rig_returns(
+    cli: Cli,
+    tmp_path: Path,
+    flags: tuple[Any, ...],
+    changes: dict[str, float],
+    rate: float | None,
+    seed: int,
+    ideal: bool,
+) -> None:
+    out, signal = tmp_path / "run.csv", "random-wave:max-frequency=1"
+    driven = "--signal", signal, "--duration", 2
+    result = cli("rig", "run", "mas20-hanging", *driven, "-o", out, *flags)
+    assert result.code == 0, result.err
+    rig = load_rig("mas20-hanging").changed(changes)
+    given = commands(rig, [signal], 2.0, rate, seed)
+    expected = at_first_commands(rig, given).run(given, seed, ideal=ideal)
+    (found,) = read(out)
+    assert found.channels.keys() == expected.channels.keys()
+    for name, samples in expected.channels.items():
+        assert np.array_equal(found[name], samples), name
 
 
 def test_record_writes_runs_and_what_each_is_for(cli: Cli, tmp_path: Path) -> None:

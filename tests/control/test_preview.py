@@ -14,7 +14,7 @@ from mckibben.blocks.feedback import FeedforwardFeedback, PIDFeedback
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Affine
 from mckibben.control import DisturbanceObserver, EstimatedLoad, Twin, track
-from mckibben.control.controller import BlockController
+from mckibben.control.controller import BlockController, Controller
 from tests.cli.conftest import cli as cli  # a fixture
 
 STEP, LATE = 0.02, 5
@@ -72,11 +72,28 @@ def test_an_observer_and_an_estimated_load_pass_the_preview_on() -> None:
     assert observer.preview == pytest.approx((LATE + 1) * STEP)
     assert error(observer) < 0.02 * SPAN
     assert error(observer) < 0.3 * error(observer, 0.0)
-    channel = Channel("displacement", "mm")
     assert BlockController(feedback()).preview == 0.0
     assert error(feedback(), 0.2) == error(feedback())
-    estimated = EstimatedLoad(
-        BlockController(KNOWN.inverse()), Affine(0.0, 0.0, channel, Channel("force", "N"))
-    )
+    estimated = with_estimate(BlockController(KNOWN.inverse()))
     assert estimated.preview == observer.preview
     assert error(estimated) < 1e-9 * SPAN
+
+
+def with_estimate(controller: Controller) -> EstimatedLoad:
+    """Return a controller that is given the estimate of a load, of which it makes no use."""
+    estimate = Affine(0.0, 0.0, Channel("displacement", "mm"), Channel("force", "N"))
+    return EstimatedLoad(controller, estimate)
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [
+        BlockController(KNOWN.inverse()),
+        BlockController(FeedforwardFeedback.of(KNOWN.inverse(), feedback())),
+        DisturbanceObserver(KNOWN.inverse()),
+    ],
+    ids=["compensator", "with feedback", "observer"],
+)
+def test_a_controller_works_with_an_estimate_as_without(controller: Controller) -> None:
+    alone = error(controller, load=-1.0)
+    assert error(with_estimate(controller), load=-1.0) == pytest.approx(alone, rel=1e-9)

@@ -84,6 +84,22 @@ def test_no_more_runs_than_chance_are_missed_where_a_run_is_off_as_a_whole() -> 
     assert missed > 0
 
 
+@pytest.mark.parametrize("n", [9, 11, 15, 24, 40])
+def test_a_level_bounds_that_share_of_the_runs_and_one_more(n: int) -> None:
+    """A new run is as likely as each of n to be the worst: it counts as one of n + 1."""
+    u = random_wave(STEP * np.arange(40), 0.3, 5.0, seed=0)
+    modelled = MODEL.simulate(u)[:, None]
+    held = []
+    for off in 1.0 + np.arange(n):  # each run is off by its number
+        recording = Recording({"pressure": u, "displacement": modelled[:, 0] + off}, STEP)
+        held.append(FreeRun.of(run_of(recording, ["pressure"], ["displacement"]), modelled))
+    model = find_band(MODEL, held, "run").model
+    for level in (0.5, 0.75, 0.8, 0.9):
+        ends = model.at(level).simulate(Recording({"pressure": u}, STEP))
+        half = 0.5 * (ends["displacement_upper"] - ends["displacement_lower"])
+        assert half == pytest.approx(np.ceil(level * (n + 1)))
+
+
 def test_higher_levels_are_wider_and_hold_the_value(banded: Banded) -> None:
     run = noisy(1001)
     before = 0.0

@@ -137,6 +137,24 @@ def test_loggers_with_clocks_side_by_side(gauge_at: str, laser_at: str, tmp_path
         several([gauge, laser], join=True, columns={"force": "F"})  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("lacking", [(0, 0), (300, 0), (0, 50), (300, 50)])
+def test_loggers_of_one_motion_agree_wherever_their_samples_begin(
+    lacking: tuple[int, int], tmp_path: Path
+) -> None:
+    """Rows without samples at the beginning are cut off, and shift nothing."""
+    paths = []
+    for name, every, fewer in zip(
+        ("pressure_bar", "displacement_mm"), (1, 4), lacking, strict=True
+    ):
+        stamps = [f"2026-03-01T12:00:{t:09.6f}" for t in T[::every]]
+        samples = ["" if k < fewer else f"{x:.6f}" for k, x in enumerate(P[::every])]
+        paths.append(put(tmp_path / f"{name}.csv", f"time,{name}", stamps, samples))
+    (joint,) = several(paths, join=True, gaps="interpolate")  # type: ignore[arg-type]
+    assert joint["displacement"] == pytest.approx(joint["pressure"], abs=1e-3)
+    lost = max(lacking[0], 4 * lacking[1]) * STEP
+    assert joint.duration == pytest.approx(T[-1] - lost, abs=8 * STEP)
+
+
 def test_the_clock_of_one_of_two_loggers_is_shifted_by_hand(tmp_path: Path) -> None:
     laser = put(tmp_path / "b.csv", "time_s,displacement_mm", T[:2500], Y[:2500])
     shifted = one(laser, calibration={"time": (1.0, 0.5)})

@@ -213,6 +213,25 @@ def test_what_a_device_answers_is_not_trusted() -> None:
                 link.state()
 
 
+@given(st.permutations(["pressure", "length", "force"]))
+def test_inputs_by_name_are_sent_in_the_order_of_the_device(names: list[str]) -> None:
+    ports = [
+        {"name": name, "unit": "", "low": 0, "high": 9, "safe": 0}
+        for name in ("force", "length", "pressure")
+    ]
+    state = struct.pack("<BI4d", 1, 7, *range(4))
+    about = json.dumps(ABOUT | {"inputs": ports}).encode()
+    parts = [about[k : k + 200] for k in range(0, len(about), 200)]
+    impostor = Impostor(*parts, b"", state, state)
+    link, bodies = Link(cast(Any, impostor), lock_step=True), []
+    for inputs in ([1.0, 2.0, 3.0], {name: float(" flp".index(name[0])) for name in names}):
+        link.step(inputs)
+        frame = unpacked(impostor.asked.strip(b"\0"))
+        assert frame is not None
+        bodies.append(frame.body)
+    assert bodies[0] == bodies[1]
+
+
 def test_what_is_beyond_limits_is_not_sent() -> None:
     with linked(line := Line()) as link:
         (name,) = (port.name for port in link.device.inputs)

@@ -10,6 +10,7 @@ import pytest
 
 from mckibben import DataError, muscles
 from mckibben.blocks.fields import rows
+from mckibben.blocks.laws import wander
 from mckibben.muscles import Sheet
 from mckibben.muscles.library import FOLDER, described, load
 from mckibben.muscles.prior import prior_of
@@ -48,6 +49,24 @@ def test_traits_do_not_know_size() -> None:
     )
     again = muscles.scaled(larger, OTHER, RAIL.sheet)
     np.testing.assert_allclose(again.pack(), balance.pack(), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_muscle_of_another_size_moves_alike(name: str) -> None:
+    """Displacements go with the stroke, forces with area and pressure, pressures with the highest."""
+    muscle = load(name)
+    balance = replace(muscle.balance, walls=(0.05,))
+    larger = muscles.scaled(balance, muscle.sheet, OTHER)
+    length = OTHER.stroke / muscle.sheet.stroke
+    pressure = OTHER.max_pressure_bar / muscle.sheet.max_pressure_bar
+    force = pressure * OTHER.area / muscle.sheet.area
+    low, high = np.array([(0.1, 0.7), *((0.0, 0.3),) * balance.n_loads]).T
+    shares = wander(low, high, np.random.default_rng(0), 8, 10)
+    motion = shares * [muscle.sheet.stroke, *(muscle.sheet.force,) * balance.n_loads]
+    sizes = [length, *(force,) * balance.n_loads]
+    expected = pressure * balance.simulate(motion, sample_time=0.05)
+    found = larger.simulate(sizes * motion, sample_time=0.05)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
 def test_braid_follows_from_the_largest_force_as_from_the_angle() -> None:

@@ -92,12 +92,13 @@ def test_limits_are_read_and_narrowed() -> None:
 
 
 def test_what_goes_beyond_recordings_is_told(play: Block) -> None:
-    recorded = run_of(play, slow_sine(8.0, 0.5, 2.0), 0)
-    wide, narrow = (
-        plan(recorded, minutes=0.75, limits={"pressure": (0.5, high)}) for high in (4.0, 2.0)
-    )
-    assert (wide.extrapolated, narrow.extrapolated) == (("pressure",), ())
-    assert len(plan_sentences(wide)) == len(plan_sentences(narrow)) + 1
+    recorded = run_of(play, slow_sine(8.0, 1.5, 3.0), 0)
+    ends = (1.5, 3.0), (1.5, 4.0), (0.5, 3.0), (0.5, 4.0)
+    narrow, *wide = (plan(recorded, minutes=0.75, limits={"pressure": each}) for each in ends)
+    assert narrow.extrapolated == ()
+    for one in wide:  # above, below, or both
+        assert one.extrapolated == ("pressure",)
+        assert len(plan_sentences(one)) == len(plan_sentences(narrow)) + 1
 
 
 @pytest.mark.parametrize(

@@ -82,6 +82,16 @@ def test_leaving_ends_them_at_once() -> None:
     assert set(multiprocessing.active_children()) <= before
 
 
+def square_after(common: None, item: float, tell: Any) -> float:
+    time.sleep(item)
+    return item**2
+
+
+def test_results_of_all_are_in_the_order_of_the_items() -> None:
+    items = [0.5, 0.0, 0.01, 0.02]  # the first is finished last
+    assert all_of(square_after, items, 2) == [item**2 for item in items]
+
+
 def test_numbers_of_processes_are_checked() -> None:
     with refused(DataError, parameter="jobs"):
         all_of(square_of, [1], 0)
